@@ -1,8 +1,8 @@
-"""What hand methods say of a block: closed forms, and estimates that engineers use.
+"""Hand methods for a block: closed forms, and estimates that engineers use.
 
-They stand beside a simulation and do not judge it: a criterion says whether the block uplifts,
-slides or overturns, perhaps how far it moves, from a few figures of the base motion. How often that
-agrees with the simulation is what `rockcheck assess` shows.
+They stand beside a simulation and do not judge it: from a few figures of the base motion, a
+criterion says whether the block uplifts, slides or overturns, and may estimate how far it moves.
+`rockcheck assess` shows how often that agrees with the simulation.
 
 Symbols: g gravity, b and h the block's half width and height, R the distance of the pivot from the
 mass's centre, alpha its slenderness angle, p the frequency parameter, mu_s and mu the static and
@@ -72,8 +72,9 @@ def newmark_slip(velocity: float, acceleration: float, resistance: float) -> flo
 
 
 def rectangular_pulse_ratio(length: float, frequency_parameter: float) -> float:
-    """Acceleration over g tan(alpha) above which a rectangular pulse of `length` (s) overturns a
-    slender block: 1/(1 - exp(-p t)) (Housner 1963).
+    """Least acceleration/(g tan alpha) of a rectangular pulse that overturns a slender block.
+
+    1/(1 - exp(-p t)) for a pulse of `length` t (s) (Housner 1963).
     """
     return 1.0 / -math.expm1(-frequency_parameter * length)
 
@@ -163,14 +164,13 @@ def reserve_sliding(scene: Scene, base: Base) -> float:
 
 
 def reserve_rocking(scene: Scene, base: Base) -> float:
-    """Peak rotation (rad) by the reserve-energy estimate of rocking, in the manner of ASCE 43-05,
-    Appendix A; infinite where it says that the block overturns.
+    """Peak rotation (rad) by the reserve-energy estimate of rocking; infinite: the block overturns.
 
-    With a = b/h, per angle th: capacity 2 g (cos th + a sin th - 1)/th, inertia C_I = 4/3 (1 +
-    a^2), frequency f = sqrt(2 g (cos th + a sin th - 1)/(C_I th^2 h))/(2 pi). Damping from
-    Housner's restitution C_R = 1 - 2 a^2/C_I: gamma = -2 ln C_R, gamma/sqrt(4 pi^2 + gamma^2). The
-    smallest th up to alpha whose capacity reaches the spectrum's demand. All of it was derived, the
-    standard's text unread: check it against your copy.
+    In the manner of ASCE 43-05, Appendix A. With a = b/h, per angle th: capacity 2 g (cos th + a
+    sin th - 1)/th, inertia C_I = 4/3 (1 + a^2), frequency f = sqrt(2 g (cos th + a sin th - 1)/(C_I
+    th^2 h))/(2 pi). Damping from Housner's restitution C_R = 1 - 2 a^2/C_I: gamma = -2 ln C_R,
+    gamma/sqrt(4 pi^2 + gamma^2). The smallest th up to alpha whose capacity reaches the spectrum's
+    demand. All of it was derived, the standard's text unread: check it against your copy.
     """
     pivot, gravity = scene.block.weaker_pivot, scene.gravity
     a, height = pivot.arm / pivot.height, pivot.height
@@ -191,9 +191,9 @@ def reserve_rocking(scene: Scene, base: Base) -> float:
 class Criterion:
     """A hand method.
 
-    `event` is what it foretells: the block "uplifts", "slides" or "overturns". `says` gives that,
-    and the motion that it estimates (None: none): m of a method that foretells sliding, alpha
-    of others.
+    `event` is what it predicts: the block "uplifts", "slides" or "overturns". `says` returns
+    whether that happens, and the estimated motion, or None without an estimate: in m for a method
+    that predicts sliding, in alpha for others.
     """
 
     name: str

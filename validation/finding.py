@@ -1,5 +1,4 @@
-"""What a study found, as data: a sentence, and blocks that a terminal, a page, Markdown and CSV
-show alike.
+"""What a study found, as data: an answer and blocks for terminal, page, Markdown and CSV.
 
 A table is described once. `rockcheck.reports.document` renders it; nothing here draws.
 """
@@ -18,7 +17,7 @@ Cell = Any
 class Mark:
     """A cell with a verdict, which colours it, and words that explain it under the pointer.
 
-    `digits` stand for those of its column. `more` is a remark that the page shows below the value.
+    `digits` override the column's. `more` is a remark that the page shows below the value.
     """
 
     value: Any
@@ -34,8 +33,8 @@ class Column:
     """What a column means.
 
     `name` heads it in CSV and JSON, `label` and `unit` for readers. `kind` says how a value is
-    shown: "number" with so many significant `digits`, "percent" (of a share), "used" (how much of a
-    limit, 1 at the limit), "text", or "model" (a model's name, with its colour). Files keep all
+    shown: "number" with `digits` significant digits, "percent" (of a share), "used" (used share of
+    a limit, 1 at the limit), "text", or "model" (a model's name, with its colour). Files keep all
     digits. A terminal shows `brief` columns only. Readers do not see an `optional` column that has
     no value.
     """
@@ -145,9 +144,7 @@ class Series:
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis: what it shows, its scale and limits, and its ticks with their words where they are
-    not the usual ones.
-    """
+    """An axis: label, scale, limits, and the words of ticks that replace the usual ones."""
 
     label: str
     log: bool = False
@@ -167,10 +164,10 @@ class Panel:
 class Plot:
     """A figure.
 
-    `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
-    `rockcheck.reports.drawers`. A `live` one of one panel is read under the pointer on the page.
-    Panels have common scales where they are `shared`. `data` of "lines" gives their x axis in
-    another unit, too: `per_unit`, `other_unit`, `other_label`.
+    `kind` "lines" draws `panels`; any other kind is drawn from `data` by its drawer in
+    `rockcheck.reports.drawers`. On the page, a `live` plot of one panel shows its values under the
+    pointer. Panels have common scales if `shared`. `data` of "lines" may give the x axis in another
+    unit, too: `per_unit`, `other_unit`, `other_label`.
     """
 
     name: str
@@ -207,7 +204,11 @@ Block = Table | Plot | Text
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """When it was made (UTC, ISO 8601), by how many processes, how long (s), with what, on what."""
+    """How a finding was made.
+
+    `created` (UTC, ISO 8601), number of processes `jobs`, duration, versions of the libraries, and
+    hardware.
+    """
 
     created: str
     jobs: int
@@ -220,9 +221,9 @@ class Made:
 class Finding:
     """What a study found.
 
-    `answer` is one sentence, `data` what `--json` says besides the tables. `exit_code` is the
-    command's: 0 where nothing is judged. `failures` give the reason by task; a run that was
-    interrupted, or had no time for all, is not `complete`. `files` are further files by name, such
+    `answer` is one sentence; `data` is added to the tables in the output of `--json`. `exit_code`
+    is the command's: 0 where nothing is judged. `failures` give the reason by task. `complete` is
+    False for a run that was interrupted or ran out of time. `files` are further files by name, such
     as JUnit's or `failures/NAME.toml`, and their content.
     """
 
@@ -251,7 +252,7 @@ class Finding:
         return next(table for table in self.tables() if table.name == name)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the study's own data, its tables by name, and what it was made with."""
+        """For JSON: the study's own data, its tables by name, and how it was made."""
         return {
             "title": self.title,
             "answer": self.answer,

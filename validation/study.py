@@ -1,8 +1,8 @@
 """The shape of every study, and the only runner: tasks, play, gather.
 
-A study lists tasks, plays each of them anywhere, and gathers what was played into a `Finding`.
-All else is done here, once: results are read back and kept, tasks are played side by side, on a
-cluster or in this process, progress and an estimate are told, a task that fails is a failed task.
+A study lists tasks, plays each of them anywhere, and gathers the records into a `Finding`. The
+runner does the rest: it reads results back and keeps them, plays tasks side by side, on a cluster
+or in this process, reports progress and an estimate, and turns an error in a task into a `Failure`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
 FAULTS = "faults"
-#: An expected time (s) from which it is told before the work begins.
+#: Expected time (s) from which an estimate is announced before the work begins.
 LONG = 10.0
 
 
@@ -49,10 +49,10 @@ LONG = 10.0
 class Task:
     """One piece of a study's work: small, frozen, can be pickled. Equal tasks are one task.
 
-    How it is played does not count for what it is: the wall time that it may take (`seconds`) and
-    takes as a rule (`expected`), the code that it may have to compile (see `execute.pool.Call`),
-    and where: in a worker; "here", since it has threads of its own (a cluster takes it all the
-    same); or "timed", in this process with nothing beside it.
+    The fields of this class do not count for equality: `seconds`, the limit of its wall time;
+    `expected`, its usual wall time (s); `compiles`, the code that it may have to compile (see
+    `execute.pool.Call`); `where` it is played: in a worker; "here", since it has threads of its own
+    (a cluster takes it all the same); or "timed", in this process with nothing beside it.
     """
 
     seconds: float = field(default=math.inf, kw_only=True, compare=False, repr=False)
@@ -70,11 +70,11 @@ class Task:
         )
 
     def fields(self) -> dict[str, Any]:
-        """What it is: the fields that count."""
+        """The fields that identify the task."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.compare}
 
     def depends(self) -> Any:
-        """All that the result depends on, as JSON has it.
+        """All that the result depends on, as JSON.
 
         By default the fields, the code that its module can reach, and all libraries.
         """
@@ -89,21 +89,21 @@ class Task:
 
 
 class Study(ABC):
-    """What a study is: `tasks`, `play` and `gather`.
+    """A study: `tasks`, `play` and `gather`.
 
     `record` is the type of its results, a dataclass or a `Stored` model. `memory_mb` limits a
-    worker. `done` maps each task that has ended to its record, or to the `Failure` that it is.
+    worker. `done` maps each task that has ended to its record, or to its `Failure`.
     """
 
     name: str
     record: Any
     memory_mb: float | None = None
-    #: What its folder keeps; see `execute.store`.
+    #: Kinds of results that its folder keeps; see `execute.store`.
     kinds: tuple[str, ...] = (RECORDS,)
 
     @abstractmethod
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Any]:
-        """The tasks that are known once these are done: asked again whenever all have ended."""
+        """All tasks known so far, given those `done`; called again whenever all have ended."""
 
     @staticmethod
     def play(task: Any) -> Any:
@@ -112,14 +112,14 @@ class Study(ABC):
 
     @abstractmethod
     def gather(self, done: Mapping[Any, Any]) -> Finding:
-        """What the records say; a task that there was no time for is missing."""
+        """The finding of the records; a task that there was no time for is missing in `done`."""
 
     def file(self, task: Task) -> str:
-        """The name of what is kept of a task."""
+        """The name of a task's kept record."""
         return name_of(self.name, task.key)
 
     def find(self, store: Store, task: Task) -> Any:
-        """The kept record of a task, None where there is none that has the fields it must have."""
+        """The kept record of a task; None if there is none, or its fields do not fit."""
         found = store.get_record(RECORDS, self.file(task))
         try:
             return None if found is None else self._adapter.validate_python(found["record"])
@@ -148,9 +148,9 @@ def run(
 ) -> Finding:
     """Play what is not up to date in `folder`, keep each record as it comes, and gather.
 
-    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`. What
-    has not begun after `minutes` is left out. Ctrl-C ends the tasks, and what was played is
-    gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
+    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`.
+    Tasks that have not begun after `minutes` are left out. Ctrl-C ends the tasks, and what was
+    played is gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
     """
     if scheduler is not None:
         check_scheduler(scheduler)
@@ -190,7 +190,7 @@ class _Run:
                 self._play(stack, until)
             except KeyboardInterrupt:
                 complete = False
-        # Whatever ended first: a finding does not depend on it.
+        # In the order of the tasks: a finding must not depend on which ended first.
         found = self.study.gather(
             {task: self.done[task] for task in self.known if task in self.done}
         )

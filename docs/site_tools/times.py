@@ -20,6 +20,7 @@ COMMANDS = {
     "validate smoke --out smoke": "five scenes, five models",
     "validate smoke --out smoke --quiet": "the same, read back",
     "validate paper --out paper": "the paper's scenes",
+    "assess fig5a --out assess": "one scene, how sure and by hand methods",
     "spectrum fig8 --size 40 --out fig8": "seven spectra of 1,600 pulses",
     "spectrum --out paper-spectra": "28 spectra of 10,000 pulses",
     "conformance --engine mujoco --out conformance": "the cards of an engine",

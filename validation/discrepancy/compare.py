@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 class Discrepancy(Shown):
     """The figures of one comparison.
 
-    `start` and `end` (s) bound the time that was compared. `gap` says which part of the asked time
-    could not be compared, empty where all was; a comparison with a gap never passes a tolerance.
-    `fall` says that the gap is there because one of the two blocks fell: the models give different
-    answers, which a difference of model form may explain.
+    `start` and `end` (s) bound the time that was compared. `gap` says which part of the requested
+    time could not be compared, empty where all was; a comparison with a gap never passes a
+    tolerance. `fall`: the gap is there because one of the two blocks fell. The models then give
+    different answers, which a difference of model form may explain.
     """
 
     reference: str
@@ -79,13 +79,13 @@ def compare(
     scene: Scene | None = None,
     measures: Collection[str] | None = None,
 ) -> Discrepancy:
-    """Compare two histories over their common time, up to `until` (s), by the `measures` of
-    `validation.discrepancy.measures`.
+    """Compare two histories over their common time, up to `until` (s).
 
-    By default by all but those that are `on_request`. The candidate is interpolated linearly onto
-    the reference's times. `scene` adds its gravity (9.81 m/s^2 otherwise), and is the one both are
-    measured by. A measure that cannot be computed is NaN and says why. Raises `InputError` if the
-    histories have no time in common, or, without a `scene`, two different blocks.
+    `measures` are names from `validation.discrepancy.measures`; by default all but those that are
+    `on_request`. The candidate is interpolated linearly onto the reference's times. Both are
+    measured with `scene`, which also gives the gravity (9.81 m/s^2 otherwise). A measure that
+    cannot be computed is NaN, and its note says why. Raises `InputError` if the histories have no
+    time in common, or, without a `scene`, two different blocks.
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
         check_kind(history, History, "simulate or History.load", key)
@@ -131,7 +131,7 @@ def compare(
 
 
 def _same_block(one: Block | None, other: Block | None) -> bool:
-    """Whether nothing is known against it, to the digits of a file that was written by hand."""
+    """Whether the blocks agree within the digits of a hand-written file; True if one is unknown."""
     if one is None or other is None:
         return True
     first, second = (
@@ -158,9 +158,7 @@ def describe(
     scene: Scene | None = None,
     measures: Collection[str] | None = None,
 ) -> tuple[Figure, ...]:
-    """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on;
-    up to `until` (s).
-    """
+    """The figures of one history, up to `until` (s): peak rotation, impacts, hop and so on."""
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
     window = "" if until is None else f"{until:g}s"
     chosen = (
@@ -182,7 +180,7 @@ def evaluate(
     window: str = "",
     until: float | None = None,
 ) -> Figure:
-    """One measure as a figure; what is not finite becomes None with a note."""
+    """One measure as a figure; a value that is not finite becomes None with a note."""
     try:
         result = measure.evaluate(what)
     except Unavailable as error:
@@ -204,9 +202,7 @@ def evaluate(
 
 
 def too_short(history: History, until: float | None) -> str:
-    """What is missing of a history up to `until`, empty where nothing is: one that ended by falling
-    is whole.
-    """
+    """Why a history does not reach `until`; empty where it does, or ended by overturning."""
     end = float(history.channels["t"][-1])
     if until is None or history.outcome in TURNS or end >= until - 1.5 * _step(history):
         return ""
@@ -214,8 +210,7 @@ def too_short(history: History, until: float | None) -> str:
 
 
 def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
-    """What part of the asked time is missing from the comparison, and whether because one block
-    fell.
+    """Missing part of the requested time, empty if none; True if one block's fall is the cause.
 
     Nothing is missing where both fell to the same side.
     """

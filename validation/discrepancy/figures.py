@@ -1,4 +1,4 @@
-"""What is measured, as it is stored, and how: a figure is the value of one measure.
+"""A figure is the value of one measure: how measures are defined, and how figures are stored.
 
 Measures see one history (`WindowedHistory`) or two on one time axis (`Pair`).
 """
@@ -19,7 +19,7 @@ from pydantic import ConfigDict
 from rockcheck.scenes import Block, Event, History, Scene, kinematics
 from rockcheck.scenes.base import Frozen
 
-#: How the note begins of a figure that asks nothing here, as a ratio to nothing does.
+#: Start of the note of a figure that is undefined here, such as a ratio to zero.
 NOT_DEFINED = "not defined here"
 
 
@@ -30,9 +30,7 @@ class Stored(Frozen):
 
 
 def value_words(value: float | None, *, yes_no: bool) -> str:
-    """A figure's value for people: "-" where there is none, yes or no where the measure asks a
-    question.
-    """
+    """A figure's value for people: "-" without a value, "yes" or "no" for a `yes_no` measure."""
     if value is None:
         return "-"
     return ("yes" if value else "no") if yes_no else f"{value:.6g}"
@@ -52,9 +50,10 @@ class Figure(Stored):
     """The value of one measure of one cell.
 
     `against` names the reference model, "closed form" or, for a figure of the cell itself, is
-    empty. `until` is the end of the window in s, None for the whole common time; `window` says it
-    as the tolerances do ("", "8s", "horizon"). `value` is None where it could not be computed;
-    `note` then says why. `note` also holds what a figure cannot (which event).
+    empty. `until` is the end of the window in s, None for the whole common time; `window` names the
+    window as the tolerances do ("", "8s", "horizon"). `value` is None where it could not be
+    computed; `note` then says why. Otherwise `note` may add a remark, such as the event that the
+    value belongs to.
     """
 
     measure: str
@@ -68,14 +67,12 @@ class Figure(Stored):
 
     @property
     def undefined(self) -> bool:
-        """Whether the measure asks nothing here, so that nothing is judged; its note says why."""
+        """Whether the measure is undefined here, so that nothing is judged; the note says why."""
         return self.value is None and self.note.startswith(NOT_DEFINED)
 
     @property
     def of_a_fall(self) -> bool:
-        """Whether it is the peak rotation of a block that has fallen, which is no peak: the
-        measure's note says so.
-        """
+        """Whether it is the peak rotation of a fallen block, which is no peak; its note says so."""
         return self.measure == "peak_rotation" and bool(self.note)
 
 
@@ -95,7 +92,7 @@ class Unavailable(Exception):
 
 
 class Undefined(Unavailable):
-    """The measure asks nothing of these histories, as a ratio to nothing: no pass and no fail."""
+    """The measure is undefined for these histories, as a ratio to zero: no pass and no fail."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"{NOT_DEFINED}: {why}")
@@ -103,12 +100,11 @@ class Undefined(Unavailable):
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure: its name in tolerances and tables, its label for people, its unit, definition and
-    source, and what a perfect candidate scores.
+    """A measure: its name, unit, definition and source, and the value of a perfect candidate.
 
-    `unit` "angle" stands for alpha, or rad where the block is unknown. `sense` "at most": the
-    distance from `ideal` is limited (`ideal` None: from the expected value); "at least": the value
-    itself must reach the limit.
+    `name` serves tolerances and tables, `label` people. `unit` "angle" stands for alpha, or rad
+    where the block is unknown. `sense` "at most": the distance from `ideal` is limited (`ideal`
+    None: from the expected value); "at least": the value itself must reach the limit.
     """
 
     name: str
@@ -124,28 +120,28 @@ class Measure:
     exact: bool = False
     #: 1 for yes, 0 for no: neither near a limit nor far from it.
     yes_no: bool = False
-    #: Changes below this mean nothing (in the measure's unit); 0 for what is counted. The least
+    #: Changes below this mean nothing (in the measure's unit); 0 for counts. The least
     #: floor.
     resolution: float = 1e-6
 
     @property
     def role(self) -> Literal["error", "quantity", "count"]:
-        """What its values are: an error has a perfect value, and the nearer to it the better."""
+        """The kind of its values: an error has a perfect value, and the nearer to it the better."""
         if self.ideal is not None or self.sense == "at least":
             return "error"
         return "quantity" if self.resolution else "count"
 
 
 def by_name(*measures: Measure) -> dict[str, Measure]:
-    """A book of measures."""
+    """Measures by their names."""
     return {measure.name: measure for measure in measures}
 
 
 def between_rows(unit: str, frequency_parameter: float, gravity: float, step: float) -> float:
-    """What rows `step` (s) apart cannot tell from nothing: how far a free block is from a chord.
+    """Largest distance of a free block from a chord between rows `step` (s) apart.
 
-    Of an angle (p h)^2/8, in alpha; of a length g h^2/8, in m; of a time h, in s. Other units have
-    no such floor.
+    Smaller values cannot be told from zero. Of an angle (p h)^2/8, in alpha; of a length g h^2/8,
+    in m; of a time h, in s. Other units have no such floor.
     """
     share = step**2 / 8.0
     return {"angle": frequency_parameter**2 * share, "m": gravity * share, "s": step}.get(unit, 0.0)
@@ -153,8 +149,9 @@ def between_rows(unit: str, frequency_parameter: float, gravity: float, step: fl
 
 @dataclass(frozen=True)
 class WindowedHistory:
-    """One history as the figures see it: cut to a window, with the scene's gravity and walls where
-    they are known.
+    """One history as the figures see it: cut to a window, with the scene if it is known.
+
+    The scene gives the block, gravity and walls.
     """
 
     history: History
@@ -189,7 +186,7 @@ class WindowedHistory:
     def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
         """Events of these kinds within the window, from `start` (s) on.
 
-        A landing that strikes is a floor impact, whichever name the model has for it.
+        A landing with an impulse counts as a floor impact, whatever the model calls it.
         """
         return [
             event
@@ -209,10 +206,10 @@ class WindowedHistory:
 
 @dataclass(frozen=True)
 class Pair:
-    """Reference and candidate over their common time up to `until` (s), the candidate interpolated
-    linearly.
+    """Reference and candidate over their common time up to `until` (s).
 
-    The time axis is the reference's; `start` and `end` bound the common time within the window.
+    The time axis is the reference's; the candidate is interpolated linearly. `start` and `end`
+    bound the common time within the window.
     """
 
     reference: History
@@ -261,7 +258,7 @@ class Pair:
 
     @cached_property
     def alpha(self) -> float | None:
-        """Slenderness of the block, rad, wherever it is known from."""
+        """Slenderness angle of the block, rad, from the scene or a history; None if unknown."""
         if self.scene is not None:
             return self.scene.block.alpha
         return self.reference.alpha if self.reference.alpha is not None else self.candidate.alpha
@@ -275,14 +272,14 @@ class Pair:
 
     @cached_property
     def known(self) -> WindowedHistory:
-        """The one of the two whose block is known."""
+        """The history whose block is known: the reference's where both are."""
         return WindowedHistory(
             self.reference if self.reference.alpha is not None else self.candidate, self.scene
         )
 
     @property
     def rocking(self) -> tuple[Array, Array]:
-        """`theta`, where the reference's peak is large enough to divide by."""
+        """`theta`; raises `Undefined` where the reference's peak is too small to divide by."""
         floor = Measure.resolution
         if self.alpha is not None and len(self.time) > 1:
             g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
@@ -314,12 +311,12 @@ class Pair:
         return float(np.sum(steps * 0.5 * (values[1:] + values[:-1])) / np.sum(steps))
 
     def rms(self, columns: tuple[Array, Array]) -> float:
-        """Sqrt <d^2>."""
+        """RMS difference over time, sqrt(mean (candidate - reference)^2)."""
         return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
 
     @cached_property
     def sprague_geers(self) -> tuple[float, float]:
-        """M and P of theta."""
+        """Magnitude and phase errors M and P of theta (Sprague and Geers)."""
         reference, candidate = self.rocking
         rr, cc, rc = (
             self.mean(product) for product in (reference**2, candidate**2, reference * candidate)
@@ -332,8 +329,9 @@ class Pair:
 
     @cached_property
     def impacts(self) -> MatchedImpacts:
-        """The impacts of both within the common time, matched; a history without any event, unlike
-        the other's, does not know them.
+        """The impacts of both within the common time, matched.
+
+        A history without any event, unlike the other's, does not record them: raises `Unavailable`.
         """
         both = [
             WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
@@ -347,9 +345,7 @@ class Pair:
 
 @dataclass(frozen=True)
 class MatchedImpacts:
-    """Impacts of two histories: pairs (reference, candidate), and those of either that have no
-    counterpart.
-    """
+    """Matched impacts as (reference, candidate), and those of either without a counterpart."""
 
     pairs: Sequence[tuple[Event, Event]]
     only_reference: Sequence[Event]
@@ -357,10 +353,10 @@ class MatchedImpacts:
 
 
 def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
-    """Match impacts of one kind within `SAME_IMPACT`, nearest first; weak ones (`WEAK_IMPACT`) need
-    no counterpart.
+    """Match impacts of one kind within `SAME_IMPACT`, nearest first.
 
-    A falling block's end counts as an event of its own kind.
+    Weak impacts (`WEAK_IMPACT`) need no counterpart. Overturning counts as an event of its own
+    kind.
     """
     pairs: list[tuple[Event, Event]] = []
     alone: tuple[list[Event], list[Event]] = ([], [])

@@ -21,9 +21,9 @@ from rockcheck.validation.discrepancy.figures import Stored
 #: both bottom corners at once.
 FLUSH_LAWS: tuple[ImpactLaw, ...] = ("closed", "open", "floor-first")
 FLAT_LAWS: tuple[ImpactLaw, ...] = ("moreau", "leading-first", "trailing-first")
-#: How long (s) a history is looked at before and after such a landing.
+#: Time (s) before and after such a landing in which a history is compared with the laws.
 WINDOW = 0.1
-#: Rotations (alpha) nearer than this are one motion; laws whose motions stay nearer than TELLS are
+#: Rotations (alpha) closer than SAME are one motion; laws whose motions stay within TELLS are
 #: not distinguished.
 SAME, TELLS = 1e-6, 1e-3
 #: A history follows a law if it is nearer to it than this part of the distance to the next one.
@@ -31,12 +31,12 @@ NEAR = 0.25
 
 
 class LawFollowed(Stored):
-    """What a history did after the first landing at which the laws part, at `t` s.
+    """The law that a history followed after the first landing at which the laws part, at `t` s.
 
-    `law` is the nearest one, or "closed or open" where such two cannot be told apart there, or
-    "none" where the history is farther from it than a quarter of the `spread`, its distance to the
-    next law. `errors` are the history's distances from all of them: RMS of the rotation up to
-    WINDOW after the laws have parted, alpha.
+    `law` is the nearest one; "closed or open" where those two cannot be told apart there; "none"
+    where the history is farther from it than a quarter of the `spread`, the nearest law's distance
+    to the next law. `errors` are the history's distances from all laws, in alpha: RMS of the
+    rotation until WINDOW after the laws have parted.
     """
 
     t: float
@@ -46,15 +46,15 @@ class LawFollowed(Stored):
 
     @property
     def error(self) -> float:
-        """The distance from the law that is nearest, alpha."""
+        """The distance from the nearest law, alpha."""
         return min(self.errors.values())
 
 
 class Landing(Stored):
     """The first landing of a scene at which the laws of impacts part.
 
-    `branches` are the rotations (alpha) under each law in the output rows from `start` on. Up to
-    the row `parts`, the one before which is at `t` s, they are one motion.
+    `branches` are the rotations (alpha) under each law in the output rows from `start` on. They are
+    one motion before row `parts`; `t` (s) is the time of the row before it.
     """
 
     t: float
@@ -63,8 +63,9 @@ class Landing(Stored):
     branches: dict[ImpactLaw, tuple[float, ...]]
 
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
-        """The law that a history of the scene followed; None where it ends before, or was on its
-        own way before.
+        """The law that a history of the scene followed.
+
+        None where the history ends before the laws part, or had already left their common motion.
         """
         first = self.parts - self.start
         rows = min(
@@ -97,11 +98,10 @@ class Landing(Stored):
 
 
 def parting_landing(scene: Scene) -> Landing | None:
-    """The first landing of a scene at which the laws part; None where there is no such landing.
+    """The first landing of a scene at which the laws part; None if there is none.
 
-    Played by the unilateral event-based model at tolerance 1e-13: under the laws of the one kind
-    where a wall bounces, under those of the other where the block lands flat. Raises what
-    `simulate` raises.
+    Played by the unilateral event-based model at tolerance 1e-13: under the flush laws where a wall
+    bounces, under the flat laws where the block lands flat. Raises what `simulate` raises.
     """
     laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
     if may_fly(scene) and LANDS_FLAT in _played(scene, "moreau").cost.rules:

@@ -1,10 +1,8 @@
-"""Measured histories: a CSV from a shake table, or from any other program, played back as if it
-were a model.
+"""Measured histories: a CSV of a shake table or another program, played back as if by a model.
 
-Its columns are named as a history's (`scenes.history.COLUMNS`), each with its unit: `t_s` or
+Columns are named as in a history (`scenes.history.COLUMNS`), each with its unit: `t_s` or
 `time_ms`, `theta_deg`, `x_mm`, `slip_rate_mm_s` and so on; a name without unit is in SI units.
-Angles and lengths count as in the scene: theta counterclockwise positive, x the centroid relative
-to the base.
+Signs are the scene's: theta counterclockwise positive, x the centroid relative to the base.
 """
 
 from __future__ import annotations
@@ -50,12 +48,12 @@ MEANINGS = {name: (name, 1.0) for name in UNITS} | {
 
 
 class Measured(Frozen):
-    """Plays back the file of each scene it knows; `offset` (s) is added to the file's times, to
-    align it with the scene's.
+    """Plays back the measured file of each scene that has one.
 
     `files` maps names of scenes to CSV files; several files are repeats of one test, whose mean is
-    played back with its scatter (`History.uncertainty`). `align` shifts the repeats to the first
-    one by cross-correlation, and says by how much.
+    played back with its scatter (`History.uncertainty`). `offset` (s) is added to the file's times,
+    to align it with the scene's. `align` shifts the repeats to the first one by cross-correlation;
+    the history's notes give each shift.
     """
 
     name: ClassVar[str] = "measured"
@@ -106,11 +104,10 @@ class Measured(Frozen):
 
 
 def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
-    """A history from a CSV whose columns name their units, or that rockcheck wrote; `offset` (s) is
-    added to its times.
+    """A history from a CSV whose columns name their units, or from one that rockcheck wrote.
 
-    Raises `InputError`, naming file and column, for whatever is missing, unknown, doubled or not
-    finite.
+    `offset` (s) is added to its times. Raises `InputError`, naming file and column, for whatever is
+    missing, unknown, doubled or not finite.
     """
     shown = printable(path)
     columns: dict[str, tuple[str, float]] = {}
@@ -136,7 +133,7 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
 
 
 def _heading(path: Path, shown: str) -> list[str]:
-    """Names of the columns, with quotes and remarks read as those of the rows are."""
+    """Names of the columns; quotes and comments are read as in the rows."""
     row = read_table(path, header=None, nrows=1, dtype=str, keep_default_na=False)
     if row.empty:
         raise InputError(f"{shown}: empty")
@@ -165,11 +162,10 @@ def _meaning(column: str, shown: str) -> tuple[str, float]:
 
 
 def time_shift(reference: History, candidate: History) -> float:
-    """The time in s to add to the candidate's for the best agreement of the rotations: the peak of
-    their cross-correlation.
+    """Shift (s) of the candidate's times at the peak of the rotations' cross-correlation.
 
-    Both are read on the finer of their mean steps; the peak is a parabola's through three lags.
-    Raises `InputError` where one does not rotate, so that nothing can be aligned.
+    Both are resampled at the finer of their mean steps; the peak is a parabola's through three
+    lags. Raises `InputError` where one does not rotate, so that nothing can be aligned.
     """
     from scipy.signal import correlate, correlation_lags
 
@@ -204,12 +200,11 @@ def shifted(history: History, offset: float) -> History:
 
 
 def mean_history(tests: Sequence[History]) -> History:
-    """The mean of some repeats of one test over their common time, on the first one's times, with
-    its uncertainty u_D.
+    """Mean of repeats of one test on the first one's times, with its uncertainty u_D.
 
-    `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by Student: "theta_rms" (rad, the
-    RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises `InputError` where the tests
-    have no time in common or do not all end alike.
+    Over their common time. `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by
+    Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
+    `InputError` where the tests have no time in common, or only some of them overturn.
     """
     first, *others = tests
     if not others:

@@ -2,8 +2,8 @@
 
 A *difference* is a function of a `Pair` (reference and candidate on one time axis), a *figure* one
 of a `WindowedHistory`. Both return a number, or a number and a remark; they raise `Unavailable`
-where the histories do not hold what is needed. In the formulas r is the reference, c the candidate,
-d = c - r, and <.> the mean over the window, by the trapezoidal rule.
+where the histories lack a column or event that they need. In the formulas r is the reference, c the
+candidate, d = c - r, and <.> the mean over the window, by the trapezoidal rule.
 """
 
 from __future__ import annotations
@@ -304,7 +304,7 @@ def _deepest(motion: WindowedHistory) -> float:
     return float(np.maximum(np.max([-np.min(gap) for gap in gaps]), 0.0))
 
 
-#: A figure without an ideal value is held against an expected one.
+#: A figure without an ideal value is judged by its expected value.
 _quantity = partial(Measure, ideal=None)
 FIGURES = by_name(
     _quantity(
@@ -386,8 +386,8 @@ FIGURES = by_name(
 )
 
 
-# Scenes with a known answer: how far a history is from it. Figures whose perfect value is 0,
-# computed where they are asked for.
+# Scenes with a closed form: distance of a history from it. Figures whose perfect value is 0,
+# computed on request.
 
 
 def _sliding_distance(motion: WindowedHistory) -> float:
@@ -465,7 +465,7 @@ def _scene(motion: WindowedHistory) -> Scene:
 
 
 def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> Scene:
-    """The scene of `what`, which slides flat from the start on."""
+    """The scene; raises `Unavailable` unless its block starts sliding flat with `walls` walls."""
     scene = _scene(motion)
     slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
     _need(slides and len(scene.walls) == walls, what)

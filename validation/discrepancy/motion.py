@@ -46,11 +46,11 @@ QUANTITIES = (
 
 
 class Motion(Stored):
-    """How far a block moves. None: of a block that has fallen, or not known of this history.
+    """How far a block moves; None where unknown and, except `wall_speed`, for a fallen block.
 
     `peak_rotation` over alpha; `slip` and `top_displacement` in m, the largest along the floor and
     of a top corner from where it began; `wall_speed` in m/s, the largest with which the block
-    struck a wall, also of a block that falls, None where it struck none.
+    struck a wall, None where it struck none.
     """
 
     peak_rotation: float | None
@@ -59,7 +59,7 @@ class Motion(Stored):
     wall_speed: float | None
 
     def words(self) -> list[str]:
-        """Those that are known, with their units."""
+        """The known figures, with their units."""
         known = [(q, getattr(self, q.name)) for q in QUANTITIES]
         return [f"{q.label} {value:.4g} {q.unit}" for q, value in known if value is not None]
 
@@ -87,19 +87,17 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
 
 
 def largest_slip(history: History) -> float:
-    """Largest |slip|, m, also of a block that falls; 0 where it is no more than rounding of the
-    pivot's place.
-    """
+    """Largest |slip|, m, also of a block that falls; 0 if it is rounding of the pivot's place."""
     largest = float(np.max(np.abs(history.channels["slip"])))
     height = history.half_height or 0.0
     return largest if largest > ROUNDING * height else 0.0
 
 
 def wall_speeds(history: History, scene: Scene) -> list[float]:
-    """Speeds (m/s) with which the block struck walls, one an event "wall impact".
+    """Speeds (m/s) with which the block struck walls, one per event "wall impact".
 
-    The speed of the outermost corner in the last row before the event, carried on to it by the
-    change from the row before, where nothing happens in between.
+    The speed of the outermost corner in the last row before the event, extrapolated to the event
+    from the last two rows if no other event lies between.
     """
     names = ("t", "x", "theta", "x_dot", "theta_dot")
     if not scene.walls or any(name not in history.channels for name in names):
@@ -129,15 +127,16 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
 
 
 def largest_reach(history: History, scene: Scene, side: str) -> float:
-    """How far (m) the block reaches beyond its first place on `side`: the clear distance without
-    which it would strike a wall there.
+    """Farthest reach (m) of the block beyond its first place on `side`.
+
+    A wall at a smaller clear gap there would be struck.
     """
     x, theta = history.channels["x"], history.channels["theta"]
     return float(np.max(-kinematics.clearance(scene.block, side, 0.0, x, theta)))
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:
-    """Median, 16 and 84 % quantiles and the largest of some values; None where there are none."""
+    """Median, 16 and 84 % quantiles and maximum of `values`; each None if there are none."""
     if not len(values):
         return dict.fromkeys(("median", "p16", "p84", "largest"))
     low, median, high = np.quantile(values, (0.16, 0.5, 0.84)).tolist()

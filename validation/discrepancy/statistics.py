@@ -1,5 +1,6 @@
-"""How far two samples of an ensemble are apart: distributions of the peaks, agreement on
-overturning, bias and scatter.
+"""Differences between two samples of an ensemble.
+
+Distributions of the peaks, agreement on overturning, bias and scatter.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ FEW = "fewer than two scenes in which both rock and neither falls"
 
 @dataclass(frozen=True)
 class Sample:
-    """What one model made of an ensemble: peak rotation (alpha) and outcome of each scene; NaN and
-    "" where it failed.
+    """One model's results for an ensemble: peak rotation (alpha) and outcome of each scene.
+
+    NaN and "" where it failed.
     """
 
     peaks: Array
@@ -60,7 +62,7 @@ class Samples:
 
 
 def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
-    """The peaks of both, those of the fallen `fallen` and no peak beyond it."""
+    """The peaks of both (alpha), limited to `fallen`, which is also the value of fallen blocks."""
     r, c = (
         np.where(one.fallen, fallen, np.minimum(one.peaks, fallen))
         for one in (samples.reference, samples.candidate)
@@ -100,7 +102,7 @@ def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
 
 
 def _share_of(samples: Samples, one: Sample) -> tuple[float, str]:
-    """Of the scenes in which that one falls, the share in which both do."""
+    """Share of the scenes in which `one` falls that both fall in."""
     return _share(samples.reference.fallen & samples.candidate.fallen, int(np.sum(one.fallen)))
 
 

@@ -1,6 +1,4 @@
-"""The models by the names that suites and the command line use; what each is built from and depends
-on.
-"""
+"""The models by the names that suites and the command line use; their code and libraries."""
 
 from __future__ import annotations
 
@@ -15,7 +13,7 @@ from rockcheck.scenes.errors import printable, unknown_name
 
 
 class Model(Protocol):
-    """What every model is: a frozen, validated object with its settings as fields."""
+    """The protocol of a model: a frozen, validated object with its settings as fields."""
 
     def simulate(self, scene: Scene) -> History:
         """The block's motion; raises `scenes.ModelFailure` where the model cannot finish."""
@@ -24,8 +22,9 @@ class Model(Protocol):
 
 @dataclass(frozen=True)
 class Family:
-    """A named kind of model: a class of a package, the settings that the name fixes, and the
-    libraries its results depend on.
+    """A named kind of model: its class, the settings that the name fixes, and its libraries.
+
+    Its results depend on the versions of `libraries`.
     """
 
     module: str
@@ -41,9 +40,9 @@ class Family:
 
 ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
-#: What the engines that step adaptively depend on besides the engine.
+#: Further libraries of the engines that step adaptively.
 STEPPED = ("numba", "llvmlite", "numpy")
-#: The steps of an engine whose compiled code all such engines share.
+#: Value of `time_step` for adaptive steps, whose compiled code the engines share.
 ADAPTIVE = "adaptive"
 FAMILIES: dict[str, Family] = {
     "ebm": Family(
@@ -115,8 +114,9 @@ FAMILIES: dict[str, Family] = {
 
 
 def family(name: str) -> Family:
-    """The family of that name, or of "module:Class" for a model of the user's own; raises
-    `InputError` suggesting the nearest.
+    """The family of that name, or of a user-defined model "module:Class".
+
+    Raises `InputError`, suggesting the nearest name, for an unknown one.
     """
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
@@ -132,9 +132,7 @@ def engine_names() -> tuple[str, ...]:
 
 
 def not_installed(name: str) -> str:
-    """What to say where the engine of that model is not installed; empty where it is, or needs
-    none.
-    """
+    """How to install the engine of that model; empty if it is installed, or none is needed."""
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
@@ -142,15 +140,14 @@ def not_installed(name: str) -> str:
 
 
 def has_wheel(name: str) -> bool:
-    """Whether that model can be had on this Python without a compiler."""
+    """Whether that model can be installed on this Python without a compiler."""
     return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
 
 
 def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
-    """The code that a first run of that model on a machine has to compile, by a name; empty where
-    there is none.
+    """Name of the code that a model's first run on a machine has to compile; empty for none.
 
-    It takes up to a minute, and does not count for the run's limit of time: see
+    Compiling takes up to a minute, and does not count for the run's time limit: see
     `execute.pool.Call`. Engines share the code of their adaptive steps.
     """
     if family(name).module != ENGINES:
@@ -159,17 +156,18 @@ def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
 
 
 def is_own(name: str) -> bool:
-    """True for a user-defined model (module:Class); its code may lie beside the suite or in the
-    working directory.
+    """True for a user-defined model, "module:Class".
+
+    Its code may lie beside the suite or in the working directory.
     """
     return ":" in name
 
 
 def check_allowed(name: str, allow_code: Container[str]) -> None:
-    """Raises `InputError` for a model of the user's own that is not in `allow_code`, or cannot be
-    one. Imports nothing.
+    """Raise `InputError` for a user-defined model that is not allowed, or cannot be a model.
 
-    A suite is data: it may name code, but only who calls rockcheck says that it is run.
+    Allowed are the names in `allow_code`. Imports nothing. A suite is data: it may name code, but
+    only the caller of rockcheck allows it to run.
     """
     if not is_own(name):
         return
@@ -186,9 +184,7 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
 
 
 def home(name: str) -> str:
-    """The module in which the model of that name is defined; for one of the user's own the one that
-    it is named after.
-    """
+    """The module that defines the model of that name; for "module:Class" the named module."""
     return family(name).module if is_own(name) else str(_class_of(name).__module__)
 
 
@@ -203,10 +199,10 @@ def _class_of(name: str) -> Any:
 
 
 def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """The model of that name with these settings; raises `InputError` naming the setting that is
-    not usable.
+    """The model of that name with these settings.
 
-    A model of the user's own is not built here but by the process that plays it: `build_own`.
+    Raises `InputError` naming the setting that is not usable, and for a user-defined model: the
+    process that plays it builds it by `build_own`.
     """
     if is_own(name):
         raise InputError(
@@ -217,8 +213,9 @@ def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
 
 
 def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """`build`, also for a model of the user's own, whose code is imported: for worker processes, of
-    what was allowed.
+    """`build`, also for a user-defined model, whose code is imported.
+
+    For worker processes; call it only for code that was allowed.
     """
     if not is_own(name):
         return build(name, settings)

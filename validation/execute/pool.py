@@ -1,9 +1,11 @@
-"""Calls in processes of their own, with limits of time and memory: for cells, spectra, studies and
-pages alike, on this machine (`Pool`) or beside the workers of a Dask cluster (`Cluster`).
+"""Calls in processes of their own, with limits of time and memory.
 
-A process that crashes, hangs or runs out of memory loses its current call, and nothing else. So a
-Dask worker is kept out of harm's way: its child ends, and it does not. The child is kept for the
-next call of the same run, since starting one takes as long as many a call.
+For cells, spectra, studies and pages, on this machine (`Pool`) or beside the workers of a Dask
+cluster (`Cluster`).
+
+A process that crashes, hangs or runs out of memory loses its current call, and nothing else. A Dask
+worker is protected in the same way: its child process ends, the worker does not. The child is kept
+for the next call of the same run, since starting one takes as long as many a call.
 """
 
 from __future__ import annotations
@@ -35,11 +37,11 @@ from rockcheck.scenes.progress import announce_by, announced
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-#: So many calls a process are given out: it begins the next while its last result is looked at.
+#: Calls given out per process: it begins the next while the run reads its last result.
 AHEAD = 2
-#: What the first call that uses compiled code may take in addition, to compile it, s.
+#: Extra time (s) of the first call that uses compiled code, to compile it.
 COMPILING = 600.0
-#: How many threads a run lets this process have; 0: one a core.
+#: Threads that a run allows this process; 0: one a core.
 THREADS: ContextVar[int] = ContextVar("threads", default=0)
 
 
@@ -49,7 +51,7 @@ class Call:
 
     `seconds` limits its wall time. `compiles` names the code that it may have to compile: of the
     calls with the same name one goes first, with `COMPILING` s more, and the others wait for it.
-    `key` is the caller's own, to know the call again.
+    `key` lets the caller recognise the call.
     """
 
     function: Callable[..., Any]
@@ -63,7 +65,8 @@ class Call:
 class Failure:
     """Why a task has no result, in one line. `refused`: the model or study refused its input.
 
-    `traceback` is that of an exception which no model may raise.
+    `traceback` is given for an unexpected exception, one that is no `ModelFailure`, `InputError` or
+    `MemoryError`.
     """
 
     reason: str
@@ -72,7 +75,7 @@ class Failure:
 
 
 def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What the function returns; whatever goes wrong in it is a `Failure`."""
+    """What the function returns, or a `Failure` for any exception in it."""
     try:
         return function(*arguments)
     except (ModelFailure, InputError) as error:
@@ -85,9 +88,7 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
 
 
 def cores() -> int:
-    """How many threads this process may use: one in a worker, else what its run says, or one a
-    core.
-    """
+    """Number of threads for this process: one in a worker, else `THREADS`, or one a core."""
     one = os.environ.get("NUMBA_NUM_THREADS") == "1"
     return 1 if one else THREADS.get() or os.cpu_count() or 1
 
@@ -99,7 +100,7 @@ class Ended:
     call: Call
     result: Any = None
     error: BaseException | None = None
-    #: How long it was given, s.
+    #: Its time limit, s.
     seconds: float = math.inf
 
     @property
@@ -160,11 +161,10 @@ class Pool:
                 os.environ.pop(key, None) if value is None else os.environ.update({key: value})
 
     def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
-        """Runs the calls and yields each as it ends.
+        """Run the calls, and yield each as it ends.
 
-        The caller may put calls into `waiting`, or take them out, meanwhile.
-
-        What has not ended at `until` (of `time.monotonic`) is ended and not yielded.
+        The caller may put calls into `waiting`, or take them out, meanwhile. Calls that have not
+        ended at `until` (of `time.monotonic`) are ended and not yielded.
         """
         running: dict[Future[Any], tuple[Call, float]] = {}
         told: set[Call] = set()
@@ -191,7 +191,7 @@ class Pool:
                 future.cancel()
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
-        """Gives each process a call, and one ahead.
+        """Give each process a call, and one ahead.
 
         A call that waits for another one to compile is passed over.
         """
@@ -216,7 +216,7 @@ class Pool:
         return AHEAD * self.jobs
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
-        """Give out a call that may take so long; `first`: the one for which others wait."""
+        """Give out a call with a limit of `seconds`; `first`: others wait for it to compile."""
         limit = None if seconds == math.inf else seconds
         return [self._pool.schedule(call.function, args=call.arguments, timeout=limit)]
 
@@ -226,12 +226,11 @@ class Pool:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Ctrl-C waits for the end of this block, and never reaches processes and threads that are
-    started in it.
+    """Delay Ctrl-C to the end of this block, and hide it from processes and threads started in it.
 
-    Ctrl-C goes to all processes of a terminal. One that starts would die of it, with a traceback,
-    before `prepare` can say otherwise. The pool's threads, which replace lost workers, keep this
-    thread's mask.
+    Ctrl-C goes to all processes of a terminal. A starting process would die of it, with a
+    traceback, before `prepare` makes it ignore the signal. The pool's threads, which replace lost
+    workers, inherit this thread's mask.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -254,11 +253,10 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def prepare(memory_mb: float | None, announces: bool = False) -> None:
-    """Make this process die with the run, and fail where it takes more memory than it may (where
-    the system can say so).
+    """Make this process end with the run, and limit its memory where the system can.
 
-    Its output goes nowhere but for what it `announces`, such as a long compilation, which goes to
-    the run's standard error.
+    Its output is discarded, except for messages if it `announces` them, such as a long compilation;
+    these go to the run's standard error.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run itself ends its processes
     if (run := multiprocessing.parent_process()) is not None:
@@ -327,7 +325,7 @@ class Cluster(Pool):
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
         machines = {about["host"]: address for address, about in self._workers().items()}
-        # A worker that is lost must not hold its calls back: the machine is a wish, not an order.
+        # The machine is a preference only: the calls of a lost worker must go elsewhere.
         wishes = [{"workers": [one], "allow_other_workers": True} for one in machines.values()]
         given = call.function, call.arguments, seconds, self.memory_mb, self._run
         return [
@@ -350,10 +348,9 @@ def alone(
     memory_mb: float | None,
     run: str,
 ) -> Any:
-    """Call a function in a process apart: that of this thread's last call where it was of the same
-    run, so of the same code.
+    """Call a function in a child process, kept by this thread for all calls of one run.
 
-    Returns a `Failure` where the process ends without a result.
+    One run means the same code. Returns a `Failure` where the process ends without a result.
     """
     if getattr(_mine, "run", "") != run:
         if hasattr(_mine, "pool"):
@@ -369,11 +366,10 @@ def alone(
 
 @contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """A `distributed.Client` for a scheduler's address ("tcp://host:8786"), or for "local:N", N
-    workers of this machine.
+    """A `distributed.Client` for a scheduler "tcp://host:8786", or for "local:N".
 
-    Work of a worker that dies goes to the others. Raises `InputError` where there is no such
-    scheduler, or no `distributed`.
+    "local:N" starts N workers on this machine. Work of a worker that dies goes to the others.
+    Raises `InputError` where no scheduler answers, or `distributed` is missing.
     """
     count = _local_workers(address)
     from distributed import Client, LocalCluster
@@ -398,7 +394,7 @@ def connected(address: str) -> Iterator[Any]:
 
 
 def check_scheduler(address: str) -> None:
-    """Raises `InputError` for an address that `connected` cannot use; starts no workers."""
+    """Raise `InputError` for an address that `connected` cannot use; starts no workers."""
     if not _local_workers(address):
         with connected(address):
             pass

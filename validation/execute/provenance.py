@@ -1,5 +1,6 @@
-"""What a result depends on: code, libraries, scene and settings, as one key; and what the run's
-machine was.
+"""The key of a result, from all that it depends on; versions and hardware of a run.
+
+A result depends on code, libraries, scene and settings.
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ _KEPT = 30 * 86400.0  # s
 def cell_key(
     scene: Scene, name: str, settings: Mapping[str, Any], search_path: tuple[str, ...] = ()
 ) -> str:
-    """Hash of all that a cell's history depends on: scene, settings, the code it can reach, and the
-    libraries' versions.
+    """Hash of all that a cell's history depends on.
 
-    `search_path` holds folders in which a model of the user's own may lie. Its source is read, not
-    run.
+    That is scene, settings, the files of a measured history, the code that the model can reach, the
+    versions of its libraries and of Python, and the machine type. `search_path` holds folders in
+    which a user-defined model may lie. Its source is read, not run.
     """
     depends = {
         "scene": scene.model_dump(mode="json"),
@@ -56,7 +57,7 @@ def cell_key(
 
 
 def _files(settings: Mapping[str, Any], scene: Scene) -> list[str]:
-    """The files that a measured history of this scene is read from, where they can be."""
+    """The existing files that a measured history of this scene is read from."""
     given = settings.get("files", {}).get(scene.name, [])
     return [file for file in ([given] if isinstance(given, str) else given) if Path(file).is_file()]
 
@@ -68,11 +69,11 @@ def digest(text: str) -> str:
 
 @cache
 def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
-    """Hash of the code of a module and of all project modules that it imports, at its top or inside
-    functions.
+    """Hash of the code of a module and of all project modules that it imports.
 
-    Of the syntax trees without docstrings: comments, layout and documentation do not count. That of
-    our own modules is kept for the next process, under the content of all our sources.
+    Imports count at its top and inside functions. The hash is that of the syntax trees without
+    docstrings: comments, layout and documentation do not count. For rockcheck's own modules it is
+    cached for later processes, under a hash of all our sources.
     """
     kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
     if kept is not None and (known := _text_of(kept)):
@@ -89,7 +90,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
 
 def _kept(module: str) -> Path:
-    """The file for the digest of a module of ours, named after the content of all our sources."""
+    """The cache file for the digest of one of our modules, named by a hash of all our sources."""
     spec = find_spec(OWN_PACKAGE)
     content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
     for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
@@ -101,7 +102,7 @@ def _kept(module: str) -> Path:
 
 
 def _text_of(path: Path) -> str:
-    """A digest that was kept, empty where there is none."""
+    """A cached digest, empty where there is none."""
     try:
         found = read_text(path).strip()
     except InputError:
@@ -110,7 +111,7 @@ def _text_of(path: Path) -> str:
 
 
 def _keep(path: Path, found: str) -> None:
-    """Keep a digest where that can be done, and forget those of a month ago."""
+    """Cache a digest if possible, and remove digests older than `_KEPT`."""
     with contextlib.suppress(OSError):
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         write_whole(path, found + "\n")
@@ -122,7 +123,7 @@ def _keep(path: Path, found: str) -> None:
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
     """Names and files of the project modules that `module` can import, itself included.
 
-    The packages that a module lies in count themselves, but not what else they import.
+    The packages that contain a module count, but not the other modules that they import.
     """
     found: dict[str, Path] = {}
     packages = {OWN_PACKAGE, module.split(".")[0]}
@@ -178,8 +179,10 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
 def _imports(
     path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]
 ) -> Iterable[str]:
-    """Names of the modules that a file of `package` imports; of a package only where something that
-    is no module is taken from it.
+    """Names of the modules that a file of `package` imports.
+
+    `from base import name` gives the submodule `base.name` of a project package if there is one,
+    else `base`.
     """
     for node in _source_of(path)[0]:
         if isinstance(node, ast.Import):
@@ -230,7 +233,7 @@ def versions() -> dict[str, str]:
 
 
 def hardware() -> dict[str, str]:
-    """What ran it: processor, cores, memory, system."""
+    """Processor, cores, memory and system of this machine."""
     facts = {
         "system": f"{platform.system()} {platform.release()}",
         "processor": _processor(),

@@ -1,16 +1,16 @@
-"""The folder where results wait for the next run: written whole or not at all, read only if nothing
-they depend on changed.
+"""The folder that keeps results for the next run: written whole, read only if still valid.
+
+A result is valid if nothing that it depends on has changed.
 
 | folder | a result |
 |---|---|
 | `histories/` | `.csv.gz`, `.events.csv.gz` (`History.save`); last `.json`, with their hashes |
 | `comparisons/` | `.json`: a cell's comparisons, a batch's peaks, a horizon of predictability |
-| `records/` | `.json`: what a task of a study gave |
+| `records/` | `.json`: the result of a study's task |
 
 A name contains the hash of everything that the content depends on. So runs that share a folder can
 only ever write the same thing, and a reader never meets a half-written or outdated result. Each
-record holds the hash of its own name and content: one that was damaged, edited or exchanged is as
-good as none.
+record holds the hash of its own name and content: a damaged, edited or exchanged record is ignored.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ from rockcheck.scenes.writing import made, write_whole
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
 RECORDS = "records"
-#: What a history's files are called after its name.
+#: Endings of a history's files.
 TABLE = ".csv.gz"
 SUFFIXES = {TABLE, f".events{TABLE}"}
-#: So many histories are held in memory: a scene's are compared with each other.
+#: Number of histories held in memory: a scene's are compared with each other.
 RECENT = 16
-#: A result that no run has used for so long is removed, s.
+#: Time (s) after which a result that no run has used is removed.
 KEEP = 14 * 86400.0
 
 
@@ -73,8 +73,9 @@ class Store:
         record: Mapping[str, Any],
         history: History | None = None,
     ) -> None:
-        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record;
-        `history` is what the files hold.
+        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record.
+
+        `history` is the content of the files; if given, it stays in memory.
         """
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
@@ -86,8 +87,9 @@ class Store:
             self._remember(name, history)
 
     def load(self, name: str) -> History:
-        """The history of that name: from memory where it was put or loaded lately, else from its
-        file. Raises `InputError`.
+        """The history of that name, from memory if put or loaded lately, else from its file.
+
+        Raises `InputError`.
         """
         found = self._recent.get(name)
         if found is None:
@@ -129,7 +131,7 @@ class Store:
         write_whole(self.folder / kind / f"{name}.json", _sealed(name, content))
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
-        """A result that is one record, or None."""
+        """The content of a result that is one record; None where it is missing or damaged."""
         try:
             path = within(self.folder, kind, f"{name}.json")
             found = read_json(path)
@@ -143,9 +145,7 @@ class Store:
         return content if whole else None
 
     def prune(self, now: float | None = None) -> None:
-        """Remove results that no run has used for two weeks, and the leavings of killed runs after
-        a day.
-        """
+        """Remove results unused for two weeks, and temporary files of killed runs after a day."""
         now = time.time() if now is None else now
         for path in [
             *(path for kind in self.kinds for path in (self.folder / kind).iterdir()),
@@ -159,7 +159,7 @@ class Store:
             used = record if record.is_file() else path
             with contextlib.suppress(
                 OSError
-            ):  # another run was quicker, or it is a folder, which is nothing of ours
+            ):  # another run was quicker, or it is a folder, which is not ours
                 if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
                     path.unlink()
 

@@ -1,4 +1,4 @@
-"""What a worker anywhere does with a cell, and cells in processes of this machine."""
+"""How a worker plays a cell or a batch of scenes."""
 
 from __future__ import annotations
 
@@ -20,10 +20,9 @@ from rockcheck.validation.uncertainty.numerical import failed, numerical_uncerta
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
-    """What a worker anywhere needs to know of the model: its label in the suite, the name of its
-    family, its settings.
+    """The model that a worker plays: its label in the suite, the name of its family, its settings.
 
-    `search_path` holds folders in which a model of the user's own may lie.
+    `search_path` holds folders in which a user-defined model may lie.
     """
 
     label: str
@@ -34,7 +33,7 @@ class Work:
 
 @dataclass(frozen=True, kw_only=True)
 class Task(Work):
-    """One scene, whose history counts; `uncertainty` asks for its numerical error, too."""
+    """One scene, whose history is kept; `uncertainty` asks for its numerical error, too."""
 
     scene: Scene
     uncertainty: bool = False
@@ -42,17 +41,17 @@ class Task(Work):
 
 @dataclass(frozen=True, kw_only=True)
 class BatchTask(Work):
-    """Many scenes, of which only peak rotation and outcome count."""
+    """Many scenes, of which only peak rotation and outcome are kept."""
 
     scenes: tuple[Scene, ...]
 
 
 @dataclass(frozen=True)
 class Played:
-    """What a worker gives back: the history's files by suffix, and the record.
+    """The result of a worker: the record, and the history's files by suffix.
 
-    `history` is the history itself, where it is sure to be the one that the files hold: a model of
-    the user's own may give anything. `traceback` is that of an exception in a scene of a batch.
+    `history` is the content of the files, None for a batch and for a user-defined model, which may
+    return anything. `traceback` is that of an exception in a scene of a batch.
     """
 
     record: dict[str, Any]
@@ -62,7 +61,7 @@ class Played:
 
 
 def play(task: Task | BatchTask) -> Played:
-    """Simulate. Raises what goes wrong in the model; in a batch it is told of the scene."""
+    """Simulate. Raises the model's errors; in a batch they are recorded by scene."""
     began = time.perf_counter()
     sys.path.extend(path for path in task.search_path if path not in sys.path)
     if isinstance(task, BatchTask):
@@ -114,8 +113,9 @@ def _simulate(task: Work, scene: Scene) -> History:
 
 
 def _numerical(task: Task, history: History) -> dict[str, Any] | None:
-    """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails
-    is not converged.
+    """Numerical uncertainty of a run; None for a model without a step.
+
+    If a coarser run fails, the result is not converged.
     """
     try:
         found = numerical_uncertainty(build_own(task.family, task.settings), task.scene, history)
@@ -135,7 +135,7 @@ def _not_finite(history: History) -> str:
 
 
 def _plain(settings: Any) -> dict[str, Any]:
-    """Settings as JSON has them, in the order in which the store gives them back."""
+    """Settings as plain JSON values, sorted as the store returns them."""
     plain = {
         str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
         for key, value in settings.items()

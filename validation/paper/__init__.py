@@ -27,9 +27,7 @@ KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """One spectrum to be played: its scene, and the paper's figure that shows it, None for one's
-    own.
-    """
+    """One spectrum to be played; `figure` is the paper's figure that shows it, or None."""
 
     name: str
     title: str
@@ -43,14 +41,15 @@ class Panel:
 
 
 def title_of(figure: int) -> str:
-    """What the paper's figure shows."""
+    """Title of the paper's figure: the wall's side and the friction."""
     side, friction = FIGURES[figure]
     return f"Fig. {figure}: Wall on the {side}, μ = {friction:g}"
 
 
 def paper_panels(*figures: int) -> tuple[Panel, ...]:
-    """The seven spectra of each of these figures, by default all: unobstructed, then gap by gap
-    with e = 0 and e = 1.
+    """The seven spectra of each of these figures, by default of all.
+
+    Unobstructed, then gap by gap with e = 0 and e = 1.
     """
     places = [None, *itertools.product(GAPS, RESTITUTIONS)]
     return tuple(_panel(n, place) for n in figures or FIGURES for place in places)

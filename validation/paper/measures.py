@@ -1,8 +1,7 @@
-"""The paper's sentences about its 28 spectra with their verdicts, and what it does not say:
-`data/paper/sentences.toml`, evaluated.
+"""The paper's sentences about its 28 spectra with their verdicts, and further findings.
 
-The measures that it names come first. Each takes the spectra and its arguments, and returns rows of
-figures and what the finding says.
+Evaluates `data/paper/sentences.toml`. The measures that it names come first. Each takes the spectra
+and its arguments, and returns rows of figures and the values for the finding's text.
 """
 
 from __future__ import annotations
@@ -44,12 +43,12 @@ AXES: dict[str, tuple[Any, ...]] = {
 SIZES = tuple(map(len, AXES.values()))
 WALLS: list[Place] = list(np.ndindex(*SIZES))
 SAID = ("{} wall", "μ {:g}", "{:g} mm", "e {:g}")
-#: A change of the safe area of less than this share of the nodes is no change: a band one node wide
+#: A change of the safe area by less than this share of the nodes is ignored: a band one node wide
 #: along the boundary.
 SMALL = 0.01
-#: Where the paper's example of overturning with one impact lies, omega_p/p.
+#: Range of omega_p/p of the paper's example of overturning with one impact.
 ONE_IMPACT = (2.0, 3.0)
-#: The amplitudes that are scanned, beyond the spectra's own range, and at which omega_p/p; and of
+#: The scanned amplitudes, beyond the spectra's own range, and the omega_p/p of the scan; and for
 #: which spectra: gap and e, None without a wall.
 SCANNED, SCANNED_AT = np.arange(AMPLITUDES[0], 20.005, 0.01), 6.0
 SCANNED_WALLS: dict[str, tuple[float, float] | None] = {
@@ -71,8 +70,7 @@ Measured = tuple[list[Row], dict[str, Any]]
 
 
 class Paper:
-    """The 28 spectra on one grid: outcomes and safe nodes by place, and those without a wall by
-    friction; and what is known beyond them.
+    """The 28 spectra on one grid: outcomes and safe nodes by place, and by friction without a wall.
 
     `least`: the lowest overturning amplitude of `SCANNED` by (gap, e) of a right wall, None without
     one; infinite where none overturns. `tongues`: by friction, the nodes of `near_one_impact` at
@@ -104,17 +102,17 @@ class Paper:
 
     @property
     def falls(self) -> Mask:
-        """Which nodes overturn; one whose run failed is neither safe nor overturned."""
+        """Nodes that overturn, by place; a node whose run failed is neither safe nor overturned."""
         return self.outcomes != SAFE
 
     @property
     def falls_alone(self) -> Mask:
-        """The same without a wall."""
+        """Nodes that overturn without a wall, by friction."""
         return self.alone != SAFE
 
 
 def about(place: Sequence[int | None]) -> str:
-    """The wall and friction of a place in words, without what is None."""
+    """The wall and friction of a place in words, without those that are None."""
     values = zip(SAID, AXES.values(), place, strict=True)
     return ", ".join(said.format(axis[n]) for said, axis, n in values if n is not None)
 
@@ -125,7 +123,7 @@ def share(mask: Mask | float) -> str:
 
 
 def _along(axis: str) -> Iterator[tuple[Place, int]]:
-    """The places at the beginning of an axis, and which axis it is."""
+    """The places at the beginning of an axis, each with the axis's number."""
     k = list(AXES).index(axis)
     return ((place, k) for place in WALLS if place[k] == 0)
 
@@ -135,7 +133,7 @@ def _at(place: Sequence[int | None], k: int, n: int | None) -> Any:
 
 
 def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
-    """Each value of a parameter, said to be safer, against the next."""
+    """Compare each value of a parameter, which the paper calls safer, with the next one."""
     rows = [_pair(paper, "no wall", *paper.safe_alone)] if free else []
     for place, k in _along(axis):
         for n, (one, other) in enumerate(pairwise(AXES[axis])):
@@ -164,9 +162,9 @@ def against_none(
 ) -> Measured:
     """Safe areas with walls against none, at omega_p/p > `above`.
 
-    A part has parameters of walls, and a bound: with the wall it is `below`, or `beyond`, so many
-    times the area without one, and so much (shares of the nodes). With `examples` some walls must
-    help, and some harm.
+    A part has parameters of walls, and a bound (factor, share of the nodes): with the wall, the
+    area is `below`, or `beyond`, the factor times the area without one plus the share. With
+    `examples` some walls must help, and some harm.
     """
     rows, gains, ratios = [], [], []
     high = paper.frequencies > above
@@ -204,14 +202,15 @@ def against_none(
 
 
 def towards_the_wall(paper: Paper) -> Measured:
-    """Nodes that overturn towards the wall: none."""
+    """Count the nodes that overturn towards the wall: there must be none."""
     counts = [(place, np.sum(paper.outcomes[place] == (LEFT, RIGHT)[place[0]])) for place in WALLS]
     return [Row(about(place), f"{n} nodes", bool(n == 0)) for place, n in counts], {}
 
 
 def matters_most(paper: Paper, most: str) -> Measured:
-    """Nodes that are safe in one of two spectra only which differ in one parameter alone, mean over
-    all such pairs.
+    """Nodes safe in only one of two spectra that differ in one parameter: mean over all pairs.
+
+    By parameter; the one called `most` must have the largest mean.
     """
     means = {}
     for k, axis in enumerate(AXES):
@@ -234,7 +233,7 @@ def side_decides(paper: Paper) -> Measured:
 
 
 def one_impact(paper: Paper) -> Measured:
-    """Of the nodes that overturn with one impact without the wall, those that it makes safe."""
+    """Share of the nodes overturning with one impact without the wall that the wall makes safe."""
     rows, shares = [], []
     for mu, tongue in sorted(paper.tongues.items()):
         safe, f = paper.safe[0, AXES["friction"].index(mu), 0, 0], paper.frequencies
@@ -250,7 +249,7 @@ def one_impact(paper: Paper) -> Measured:
 
 
 def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
-    """Pairs of walls that differ in one parameter alone: one helps, one harms."""
+    """Count pairs of walls that differ in one parameter alone, of which one helps and one harms."""
     areas, alone = (np.mean(safe, axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
     gains = (areas - alone[None, :, None, None])[AXES["side"].index(side)]
     rows = []
@@ -278,7 +277,7 @@ def least_amplitude(paper: Paper) -> Measured:
 
 
 def restitution_rules(paper: Paper) -> Measured:
-    """The most nodes that differ between two gaps against the most between e, at mu = 0.6."""
+    """Largest share of nodes that differ between two gaps, against that between e, at mu = 0.6."""
     rows, most = [], []
     for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
@@ -297,8 +296,9 @@ def restitution_rules(paper: Paper) -> Measured:
 
 
 def likelier_side(paper: Paper) -> Measured:
-    """Nodes that overturn clockwise against counterclockwise without a wall: up to an amplitude, up
-    to a frequency, and in all.
+    """Nodes that overturn clockwise against counterclockwise without a wall.
+
+    Up to an amplitude, up to a frequency, and in all.
     """
     rows, ends, whole = [], [], []
     a = paper.amplitudes
@@ -324,8 +324,9 @@ def likelier_side(paper: Paper) -> Measured:
 
 
 def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
-    """At how many frequencies the lowest overturning is clockwise, up to the one at which that side
-    leads by most.
+    """At how many frequencies the lowest overturning is clockwise.
+
+    Counted up to the frequency at which the lead of that side is largest.
     """
     falls = outcomes != SAFE
     some = np.flatnonzero(falls.any(axis=0))
@@ -346,13 +347,15 @@ def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.i
     return np.nonzero((spectrum.outcomes == RIGHT) & near)  # type: ignore[return-value]
 
 
-# What the paper does not say: nodes that are gained, lost and safe besides, by place.
+# Findings beyond the paper: nodes that are gained, lost and otherwise safe, by place.
 
 
 @dataclass(frozen=True)
 class Shown:
-    """The case that shows a finding best: its place or friction, in words, and the nodes that its
-    map marks; then rows and what the finding says, as of any measure.
+    """The case that shows a finding best, and the nodes that its map marks.
+
+    `case` is its place or friction in words, `figure` the paper's figure; `safe` excludes marked
+    nodes. `rows` and `says` are as of any measure.
     """
 
     case: str
@@ -375,7 +378,7 @@ def _case(place: Place) -> str:
 
 
 def exchange(paper: Paper) -> Shown:
-    """The wall that changes the safe area least, and what it changes."""
+    """The wall that changes the safe area least, with the nodes that it saves and overturns."""
     alone, falls_alone = (
         mask[None, :, None, None] for mask in (paper.safe_alone, paper.falls_alone)
     )
@@ -402,7 +405,7 @@ def exchange(paper: Paper) -> Shown:
 
 
 def either_side(paper: Paper) -> Shown:
-    """Nodes at which the block stands alone and falls beside a wall on either side."""
+    """Nodes at which the block stands alone, but falls beside a wall on either side."""
     alone, falls_alone = (mask[:, None, None] for mask in (paper.safe_alone, paper.falls_alone))
     harmed, helped = alone & paper.falls.all(axis=0), falls_alone & paper.safe.all(axis=0)
     places = list(np.ndindex(*SIZES[1:]))
@@ -456,7 +459,7 @@ SENTENCES = tomllib.loads(
 )
 #: "Generally": in more than this share of the cases.
 GENERALLY = 0.75
-#: So many exceptions from a sentence are named beside its verdict.
+#: Most exceptions from a sentence that are named beside its verdict.
 MOST_NAMED = 3
 VERDICTS: dict[str, Verdict] = {
     "holds": "pass",
@@ -470,7 +473,7 @@ FALLEN, STANDS, GAINED, LOST = "FTGX"
 
 @dataclass(frozen=True)
 class Claim:
-    """A sentence of the paper, what was computed for it, and the verdict."""
+    """A sentence of the paper, the figures computed for it, and the verdict."""
 
     about: Mapping[str, Any]
     verdict: str
@@ -480,7 +483,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Beyond:
-    """A finding that the paper does not tell of, and the case that shows it best."""
+    """A finding that is not in the paper, and the case that shows it best."""
 
     about: Mapping[str, Any]
     words: str
@@ -488,8 +491,10 @@ class Beyond:
 
 
 def claims_of(paper: Paper) -> list[Claim]:
-    """The paper's sentences, judged: a sentence holds where all rows do, or, of what is said to be
-    so generally, most of them.
+    """The paper's sentences with their verdicts.
+
+    A sentence holds if all its rows hold, or, where it says "generally", more than `GENERALLY` of
+    them.
     """
     found = []
     for about in SENTENCES["claim"]:
@@ -507,7 +512,7 @@ def claims_of(paper: Paper) -> list[Claim]:
 
 
 def findings_of(paper: Paper) -> list[Beyond]:
-    """What the spectra show and the paper does not say."""
+    """Findings from the spectra that are not in the paper."""
     found = []
     for about in SENTENCES["finding"]:
         shown: Shown = globals()[about["measure"]](paper)

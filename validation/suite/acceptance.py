@@ -1,5 +1,6 @@
-"""`accept`: the figures of a run become the expected ones of the suite's tolerance file, which
-keeps its remarks and order.
+"""`accept`: make the figures of a run the expected ones in the suite's tolerance file.
+
+The file keeps its comments and order.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, Windowed, judge
 
-#: Of a new line: limit and drift band, as shares of a difference from the perfect value, and of a
+#: Limit and drift band of a new line: multiples of a difference from the perfect value, and of a
 #: cell's own figure.
 ROOM, DRIFT = 2.0, 0.2
 OWN_ROOM, OWN_DRIFT = 0.02, 0.002
@@ -33,10 +34,10 @@ def accept(
 ) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
-    Returns the changes and what was refused, a line each. A change is new, tightened (to what is
-    better), loosened (a wider limit) or moved (another expected value); the last two need a
+    Returns the changes and the refusals, a line each. A change is new, tightened (to a better
+    value), loosened (a wider limit) or moved (another expected value); the last two need a
     `reason`, which goes into the file. A check without a figure, and a line that would not pass
-    now, is always refused; a figure that is not defined asks for no line. Without `write` the file
+    now, is always refused; a figure that is not defined needs no line. Without `write` the file
     stays as it is.
     """
     changes: list[str] = []

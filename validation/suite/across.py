@@ -1,6 +1,8 @@
-"""What runs of suites say beside each other: what changed between two (`rockcheck compare`) and
-over many (`rockcheck validate --history FILE`), and what they have found about each model: bias and
-scatter of its figures, and the domain that the scenes cover.
+"""Comparison of runs: changes between two, trends over many, and experience with each model.
+
+Changes between two runs (`rockcheck compare`), figures over a history of runs (`rockcheck validate
+--history FILE`), and, over several suites, bias and scatter of each model's figures and the domain
+that the scenes cover.
 
 A history of runs is a file of JSON lines, one a run: `Moment`. Bias and scatter as in the FDS
 validation guide (McGrattan and Toman 2011). With M a model's figure and E the reference's,
@@ -49,19 +51,18 @@ from rockcheck.validation.suite.tables import title, title_of
 from rockcheck.validation.suite.tolerances import MEASURES
 
 T = TypeVar("T")
-#: A figure has moved where it differs by more than this share, and by more than its measure's
+#: A figure has moved if it differs by more than this share, and by more than its measure's
 #: resolution.
 ROUNDING = 1e-9
-#: Where a continuous integration says which commit it runs.
+#: Environment variables in which continuous integration gives its commit.
 COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
 
 
 class Change(Stored):
-    """One thing that differs: a cell that is in one run only, an outcome, a figure, or the verdict
-    on a check, a cell or the run.
+    """A difference between two runs: a cell in one run only, an outcome, a figure or a verdict.
 
-    `name` is the figure or check as tolerances name it; `before` and `after` are None where there
-    is nothing.
+    Verdicts are on a check, a cell or the run. `name` is the figure or check as tolerances name it;
+    `before` and `after` are None where it is missing.
     """
 
     scene: str = ""
@@ -73,14 +74,14 @@ class Change(Stored):
 
     @property
     def size(self) -> float:
-        """How far a figure moved, relative to the larger of the two; infinite for all else."""
+        """Change of a figure relative to the larger magnitude; infinite for other changes."""
         if not isinstance(self.before, float) or not isinstance(self.after, float):
             return math.inf
         return abs(self.after - self.before) / max(abs(self.before), abs(self.after))
 
 
 def changes(before: Run, after: Run) -> list[Change]:
-    """All that differs, verdicts first, then figures, the one that moved most first.
+    """All differences: verdicts, cells, outcomes, then figures, the largest change first.
 
     Raises `InputError` for runs of two suites.
     """
@@ -105,9 +106,10 @@ def changes(before: Run, after: Run) -> list[Change]:
 
 
 def difference(before: Run, after: Run, most: int | None = None) -> Finding:
-    """What changed between two finished runs of a suite, with at most so many of the figures that
-    moved in its table; exit 1 where a verdict changed or a cell is in one of them only. Raises
-    `InputError` for runs of two suites.
+    """The finding on the changes between two finished runs of a suite.
+
+    Its table has at most `most` of the figures that moved. Exit code 1 if a verdict changed or a
+    cell is in one of the runs only. Raises `InputError` for runs of two suites.
     """
     found = changes(before, after)
     counts = Counter(change.what for change in found)
@@ -172,7 +174,7 @@ def _pairs(old: Mapping[Any, T], new: Mapping[Any, T]) -> Iterator[tuple[Any, T 
 
 
 def _moved(name: str, was: float | None, now: float | None) -> bool:
-    """Whether a measure's value has moved, by more than rounding and its resolution."""
+    """Whether a measure's value has moved by more than rounding and its resolution."""
     if was is None or now is None:
         return was is not now
     measure = MEASURES.get(name)
@@ -181,8 +183,9 @@ def _moved(name: str, was: float | None, now: float | None) -> bool:
 
 
 class Moment(Stored):
-    """One run in a history: when, of which commit and version, its verdict, and every judged figure
-    by "scene, model: check".
+    """One run in a history: time, commit, version, verdict, and every judged figure.
+
+    Figures are named "scene, model: check".
     """
 
     created: str
@@ -196,7 +199,7 @@ class Moment(Stored):
 
 
 def moment_of(run: Run, folder: Path) -> Moment:
-    """What a history keeps of a run, whose suite lies in `folder`."""
+    """A run as a line of a history; the suite lies in `folder`."""
     names = [(f"{cell.scene}, {cell.model}: {title(check)}", check) for cell, check in run.checks()]
     return Moment(
         created=run.created,
@@ -213,8 +216,9 @@ def moment_of(run: Run, folder: Path) -> Moment:
 
 
 def commit_of(folder: Path) -> str:
-    """The commit that is checked out, with "-dirty" where files have changed since; "" outside of a
-    repository.
+    """The commit that is checked out in `folder`, "-dirty" appended if files have changed.
+
+    Outside of a repository the continuous integration's commit, "" without one.
     """
     git = shutil.which("git")
     if git:
@@ -238,7 +242,7 @@ def commit_of(folder: Path) -> str:
 
 
 def remember(path: Path, moment: Moment) -> list[Moment]:
-    """Append a line to the history; returns all its moments of the same suite, the oldest first.
+    """Append a run to the history; returns all its runs of the same suite, the oldest first.
 
     Raises `InputError`.
     """
@@ -252,7 +256,7 @@ def remember(path: Path, moment: Moment) -> list[Moment]:
 
 
 def read_history(path: Path) -> list[Moment]:
-    """The moments of a history. Raises `InputError`, naming the line, where one is none."""
+    """The runs of a history. Raises `InputError`, naming the line, for an unusable line."""
     found = []
     for n, line in enumerate(read_text(path).splitlines(), 1):
         if not line.strip():
@@ -269,16 +273,14 @@ def read_history(path: Path) -> list[Moment]:
 
 
 class Trend(Stored):
-    """One figure over the runs of a history: its values, None where it was not there."""
+    """One figure over the runs of a history: its values, None where it is missing."""
 
     name: str
     values: tuple[float | None, ...]
 
     @property
     def spread(self) -> float:
-        """Largest less smallest value, relative to the largest size; 0 where fewer than two are
-        known.
-        """
+        """Largest less smallest value over the largest magnitude; 0 if fewer than two are known."""
         known = [value for value in self.values if value is not None]
         most = max(map(abs, known), default=0.0)
         return (max(known) - min(known)) / most if most > 0.0 else 0.0
@@ -293,7 +295,7 @@ class Trend(Stored):
 
 
 def trends(moments: Sequence[Moment]) -> list[Trend]:
-    """Every figure of the last run over all runs, the one that varied most first."""
+    """Every figure of the last run over all runs, the largest spread first."""
     last = moments[-1].figures if moments else {}
     found = [
         Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments))
@@ -302,14 +304,16 @@ def trends(moments: Sequence[Moment]) -> list[Trend]:
     return sorted(found, key=lambda trend: -trend.spread)
 
 
-#: So many figures are drawn, those that varied most, and so many that moved are told; the table has
+#: Most figures drawn (those that varied most), and most moved figures listed; the table has
 #: all that varied.
 DRAWN, MOST_MOVED = 12, 10
 
 
 def trend_of(moments: Sequence[Moment]) -> Finding:
-    """The figures of a suite over its runs: those that moved since the one before, those that
-    varied, drawn and in a table; the runs.
+    """The finding on a suite's figures over its runs.
+
+    Lists the figures that moved since the run before, draws and tabulates those that varied, and
+    lists the runs.
     """
     every, last = trends(moments), moments[-1]
     found = [trend for trend in every if trend.spread > 0.0]
@@ -350,16 +354,16 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     return Finding("trend", f"{last.suite} over {len(moments)} runs", answer, blocks)
 
 
-#: The size (alpha) of a peak below which a ratio means nothing, and the fewest pairs from which a
+#: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
 #: scatter is computed.
 LEAST, FEWEST = 1e-3, 5
 
 
 def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
-    """(reference's, model's) peak rotations of all scenes by model, where both are finite and large
-    enough for a ratio.
+    """Peak rotations (reference's, model's) of all scenes by model, if both allow a ratio.
 
-    Blocks that fall have no peak: they are left out, as are cells of the reference itself.
+    Both must be finite and larger than `LEAST`. Blocks that fall have no peak: they are left out,
+    as are cells of the reference itself.
     """
     found: dict[str, list[tuple[float, float]]] = {}
     for run in runs:
@@ -371,7 +375,7 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
 
 
 def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str]]]:
-    """By model, of each scene: peak rotation and outcome of the reference and of the model."""
+    """For each model and scene: peak rotations and outcomes of the reference and the model."""
     cells = {(cell.scene, cell.model): cell for cell in run.cells if cell.status == "done"}
     for (scene, model), cell in cells.items():
         if (scene, run.reference) in cells and model != run.reference:
@@ -388,8 +392,9 @@ def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str
 
 
 def experience_of(runs: Sequence[Run]) -> Experience:
-    """Bias and scatter a model and figure, and the domain of the scenes (the range of each axis,
-    `scenes.experience.axes_of`), over some runs of suites.
+    """Bias and scatter by model and figure, and the domain of the scenes, over some runs.
+
+    The domain is the range of each axis, `scenes.experience.axes_of`.
     """
     trust: dict[str, dict[str, Trust]] = {}
     for model, found in sorted(pairs_of(runs).items()):

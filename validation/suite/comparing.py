@@ -1,7 +1,8 @@
-"""A suite's cells as they are planned, their figures against references under any law of impacts,
-what else is worked out once and kept (the horizon, the landing at which laws part, what a spread of
-inputs makes of figures), and how sure figures are: a cell's difference from each reference against
-u_num, u_input and u_D (ASME V&V 20).
+"""A suite's planned cells, their comparisons and the uncertainty of their figures.
+
+Figures are taken against references under any law of impacts. Computed once and kept: the horizon,
+the landing at which laws part, and the effect of a spread of inputs on figures. The uncertainty
+sets a cell's difference from each reference against u_num, u_input and u_D (ASME V&V 20).
 """
 
 from __future__ import annotations
@@ -34,15 +35,17 @@ from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
-#: What is judged by the nearest law. Histories are judged up to the horizon, which ends where the
+#: Measures judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.
 BY_ANY = ("outcome_agrees", "peak_ratio")
 
 
 @dataclass(frozen=True)
 class Planned(Task):
-    """A cell that is to be played: a scene by a model, or the scenes `numbers` of an `ensemble`,
-    which are drawn from `scene`. Its key is of all that it depends on.
+    """A cell to be played: a scene, or the scenes `numbers` of an `ensemble`, by a model.
+
+    An ensemble's scenes are drawn from `scene`. `key` is the hash of all that the result depends
+    on.
     """
 
     scene: Scene = field(compare=False)
@@ -72,7 +75,7 @@ class Planned(Task):
 
     @property
     def work(self) -> workers.Task | workers.BatchTask:
-        """What a worker needs to know."""
+        """The work for a worker."""
         model: dict[str, Any] = {
             "label": self.variant.label,
             "family": self.variant.family_name,
@@ -93,7 +96,7 @@ FigureRow = tuple[str, str, float | None, str, float | None, str]
 
 
 class CellRecord(Stored):
-    """What is kept of a cell beside its history."""
+    """The kept record of a cell, beside its history."""
 
     outcome: str
     notes: tuple[str, ...]
@@ -104,11 +107,11 @@ class CellRecord(Stored):
 
 
 class ComparisonRecord(Stored):
-    """The figures of a comparison; by window, what could not be compared, and whether because one
-    block fell.
+    """The figures of a comparison, and its gaps by window.
 
-    What could not be compared is given by measure and window where a measure has its own.
-    `impact_law` and `overturned_at` are those of a cell's own figures.
+    A gap says what could not be compared, and whether because one block fell; its key is measure
+    and window where the measure has a gap of its own. `impact_law` and `overturned_at` are given
+    with a cell's own figures.
     """
 
     figures: tuple[FigureRow, ...]
@@ -142,9 +145,7 @@ class ComparisonRecord(Stored):
 
 
 def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
-    """What the store has under that name, a value of the type `kind`; computed and kept where there
-    is none that has the fields it must have.
-    """
+    """The store's value of type `kind` under that name; computed and kept if missing or invalid."""
     adapter = TypeAdapter(kind)
     with suppress(KeyError, TypeError, ValueError):
         return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
@@ -154,13 +155,13 @@ def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
 
 
 def _of_scene(scene: Scene, what: str, module: str, **more: Any) -> str:
-    """The name of what is kept of a scene, which depends on the code of a module."""
+    """The name of a kept result of a scene that depends on the code of a module."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
     return name_of(scene.name, what, provenance.cell_key(scene, "ebm-unilateral", depends))
 
 
 def inputs_of(store: Store, given: UncertainScene) -> Inputs:
-    """What the spread of a scene's inputs makes of its figures; kept in the store."""
+    """The effect of the spread of a scene's inputs on its figures; kept in the store."""
     spreads = {name: spread.model_dump() for name, spread in given.spreads.items()}
     more = {"spreads": spreads, "correlation": given.correlation.tolist()}
     name = _of_scene(given.scene, "inputs", "validation.uncertainty.population", **more)
@@ -185,16 +186,18 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
 
 
 def horizon_of(store: Store, scene: Scene) -> float:
-    """The time up to which histories of this scene can be compared point by point (`ebm.horizon`),
-    s; kept in the store.
+    """The horizon of predictability of a scene, s (`ebm.horizon`); kept in the store.
+
+    Up to this time, histories can be compared point by point.
     """
     name = _of_scene(scene, HORIZON, "ebm.horizon")
     return float(kept(store, name, float, lambda: predictability_horizon(scene)))
 
 
 def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
-    """What a reference does under the other laws, by law; those under which it fails, or has no law
-    to choose, are left out.
+    """A reference's histories under the other laws of impacts, by law.
+
+    Laws under which it fails are left out. Empty for a model without a choice of law.
     """
     model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
     found: dict[str, History] = {}
@@ -213,11 +216,11 @@ def by_any(
     until: float | None,
     measures: Iterable[str],
 ) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
-    """The figures of a comparison, those of BY_ANY against the nearest of its reference and the
-    `references` under other laws.
+    """The figures of a comparison, those of BY_ANY against the reference under the nearest law.
 
-    A figure says so if its nearest law is another one. The second value says, by measure, what
-    could not be compared under that law, and whether the reason is that one block fell.
+    `references` are the reference's histories under other laws. The note of a figure names the law
+    if it is another one. The second value says, by measure, what could not be compared under that
+    law, and whether the reason is that one block fell.
     """
     figures = {figure.measure: figure for figure in found.figures}
     gaps: dict[str, tuple[str, bool]] = {}
@@ -236,7 +239,7 @@ def by_any(
 
 
 def _away(figure: Figure) -> float:
-    """How far a figure is from its ideal; infinity where it has no value."""
+    """Distance of a figure from its ideal; infinity where it has no value."""
     ideal = DIFFERENCES[figure.measure].ideal
     return float("inf") if figure.value is None or ideal is None else abs(figure.value - ideal)
 
@@ -244,10 +247,9 @@ def _away(figure: Figure) -> float:
 def compared(
     store: Store, scene: Scene, planned: Planned, asked: Mapping[str, Asked]
 ) -> dict[str, ComparisonRecord]:
-    """The comparisons that are asked of a cell, by name of the reference, and by OWN_FIGURES its
-    own figures; kept in the store.
+    """The comparisons of a cell by name of the reference, OWN_FIGURES for its own figures.
 
-    Each has all figures over the whole time, and those asked for over a window.
+    Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
     horizon = (
         horizon_of(store, scene)
@@ -273,7 +275,7 @@ def compared(
             for one, (reference, extra) in asked.items()
         },
     )
-    return found
+    return {one: found[one] for one in asked}  # what is kept is in order of the alphabet
 
 
 def _compute(
@@ -284,9 +286,7 @@ def _compute(
     windowed: Sequence[Windowed],
     horizon: float | None,
 ) -> ComparisonRecord:
-    """The figures of the cell itself where `reference` is None, with the law of impacts that it
-    followed.
-    """
+    """The comparison with `reference`; without one, the cell's own figures and impact law."""
     candidate = store.load(planned.name)
     yardstick = store.load(reference.name) if reference else None
     figures: list[Figure] = []
@@ -321,7 +321,7 @@ def _compute(
     )
 
 
-#: Quantities that are explained, with their units.
+#: Quantities whose differences are explained, with their units.
 QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 
@@ -332,10 +332,11 @@ def explanations(
     references: Mapping[str, tuple[Sequence[Figure], CellRecord]],
     inputs: Inputs | None,
 ) -> Iterator[Explanation]:
-    """The verdict on each quantity of a cell (its figures and record) against each reference, by
-    name.
+    """The verdict on each quantity of a cell against each reference, by name.
 
-    There is no verdict for a model whose numerical error is unknown, nor for a block that falls.
+    `figures` and `own` are the cell's figures and record. There is no verdict for a model whose
+    numerical error is unknown. Where the outcomes differ and a block falls, the only verdict is on
+    the outcome.
     """
     if own.numerical is None:
         return
@@ -361,9 +362,7 @@ def explanations(
 def _other_outcome(
     against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
 ) -> Explanation:
-    """What two different outcomes say: the peaks and slips of a block that falls have nothing to be
-    compared with.
-    """
+    """The verdict on two different outcomes; a falling block's peaks and slips do not compare."""
     reasons = [reason for found in (mine, other) if found for reason in found.reasons]
     if reasons:
         return explain("outcome", "", None, None, reason="; ".join(reasons), against=against)
@@ -375,7 +374,7 @@ def _other_outcome(
 
 
 def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | None, str]:
-    """The numerical uncertainties of both runs together, or why it is not known."""
+    """The combined numerical uncertainty of both runs; None and the reason if one is unknown."""
     total = 0.0
     for found in (mine, other):
         if found is None:

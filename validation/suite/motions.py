@@ -58,11 +58,10 @@ _Path = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class RecordSet(Reading):
-    """A table `[[records]]`: files, the factor of their accelerations, the scenes that they shake,
-    and the options of a reader.
+    """A table `[[records]]`: files, scale of their accelerations, scenes and reading options.
 
-    With `vertical` the base also moves up and down, as the same file says, or one of the set that
-    is named alike.
+    With `vertical` the base also moves vertically, as recorded in the same file or in the one of
+    the set with the same name.
     """
 
     files: Annotated[tuple[_Path, ...], Field(min_length=1)]
@@ -72,18 +71,17 @@ class RecordSet(Reading):
 
     @property
     def reading(self) -> Reading:
-        """What the files do not say of themselves."""
+        """The reading options, for what the files do not state."""
         return Reading(**{name: getattr(self, name) for name in Reading.model_fields})
 
 
 def under_records(
     scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
 ) -> tuple[dict[str, UncertainScene], list[str]]:
-    """The scenes, those that a set names once for each of its motions; and the vertical components
-    that are left out.
+    """The scenes, with those of a set once per motion; and the vertical components left out.
 
     A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read,
-    and scenes that there are not.
+    and for unknown scenes.
     """
     found: dict[str, UncertainScene] = {}
     left_out: list[str] = []
@@ -115,8 +113,9 @@ def under_records(
 def _shaken(
     base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float
 ) -> UncertainScene:
-    """A scene under one motion, horizontal and perhaps vertical; what is not known of the
-    excitation that it replaces goes with that.
+    """A scene under one motion, horizontal and perhaps vertical.
+
+    Spreads of the excitation that it replaces are dropped.
     """
     scene = base.scene
     horizontal, vertical = motion
@@ -143,9 +142,7 @@ def _record(motion: Recording, label: str, scale: float) -> Record:
 
 
 def _labels(names: Sequence[str]) -> list[str]:
-    """Names of records as names of scenes may have them: without their endings, where these do not
-    tell two apart.
-    """
+    """Names of records as allowed in names of scenes; endings only where names would be equal."""
     short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
     return [
         _allowed(one if short.count(one) == 1 else name)
@@ -157,14 +154,12 @@ def _allowed(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name)[-_LONGEST_RECORD:].strip() or "record"
 
 
-#: Of the generated records, s.
+#: Time step of the generated records, s.
 RECORD_STEP = 0.002
 
 
 class Distribution(Frozen):
-    """`uniform` between two values, or `lognormal` with a median and the standard deviation of the
-    logarithm.
-    """
+    """`uniform` between two values, or `lognormal`: median and sigma of the logarithm."""
 
     uniform: tuple[Finite, Finite] | None = None
     lognormal: tuple[Positive, NonNegative] | None = None
@@ -250,7 +245,7 @@ class Ensemble(Frozen):
         return self
 
     def drawn(self, base: Scene, number: int) -> Scene:
-        """Scene number 0, 1, ... of the ensemble, the same whatever `count` is and whoever asks."""
+        """Scene number 0, 1, ... of the ensemble; it does not depend on `count`."""
         chance = np.random.default_rng([self.seed, number])
         change: dict[str, Any] = {"name": f"{self.name} {number + 1}"}
         motion = self.pulse or self.noise

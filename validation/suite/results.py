@@ -1,7 +1,6 @@
-"""A finished run as data: what `rockcheck validate` writes to `run.json` and what reports, CI and
-`rockcheck accept` read.
+"""A finished run as data: the `run.json` that `rockcheck validate` writes.
 
-A run's folder holds
+Reports, CI and `rockcheck accept` read it. A run's folder holds
 
     run.json
         one `Run` (this module), a line a field, a scene or a cell; run.schema.json beside it
@@ -11,7 +10,7 @@ A run's folder holds
     histories/<scene>--<model>--<key>.events.csv.gz
         its events
 
-Nothing here knows how a cell is simulated, compared or shown.
+This module does not know how a cell is simulated, compared or shown.
 """
 
 from __future__ import annotations
@@ -35,17 +34,17 @@ from rockcheck.validation.uncertainty.population import Inputs
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
 FORMAT = 1
-#: Exit code of a fault of rockcheck's own, EX_SOFTWARE of sysexits: no verdict has it.
+#: Exit code of a fault in rockcheck itself, EX_SOFTWARE of sysexits: no verdict has it.
 FAULT = 70
 
-#: Verdict on one check: as expected; nearer to what is perfect; a ratio to nothing; inside the
+#: Verdict on one check: as expected; nearer to the perfect value; a ratio to zero; inside the
 #: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
 CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
 #: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed,
 #: or "error" where one failed.
 Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
-#: What fails beside what is out of a limit: nothing; what changed and a model that is not
-#: installed; "both": what got better, too.
+#: What fails besides figures out of a limit: nothing; changed figures and a model that is not
+#: installed; "both": better figures, too.
 Strict = bool | Literal["both"]
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
@@ -57,14 +56,14 @@ Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
 
 
 class Check(Stored):
-    """A figure with the tolerance that it was held against.
+    """A figure and the tolerance that it was judged by.
 
     The figure's distance from `ideal` (0 for differences, 1 for ratios, `expected` for absolute
     figures) may be at most `limit`; a value further than `drift` from `expected` is "better" or
-    "changed". `limit` is None where no tolerance is written down, which never passes. `reason` says
-    why a check is no plain pass, one line; `gap` what part of the window could not be compared. A
-    value below `floor` means nothing; `beside` is the reference's figure, where that says which
-    value is better.
+    "changed". `limit` is None where the file has no tolerance; such a check never passes. `reason`
+    says in one line why a check is no plain pass, `gap` what part of the window could not be
+    compared. A value below `floor` means nothing; `beside` is the reference's figure, where that
+    says which value is better.
     """
 
     figure: Figure
@@ -82,17 +81,17 @@ class Check(Stored):
 
     @property
     def weighs(self) -> Literal["pass", "changed", "fail"]:
-        """What the verdict makes of the cell's."""
+        """The check's weight in the cell's verdict: "better" and "not defined" count as "pass"."""
         return "pass" if self.verdict == "better" or self.verdict == "not defined" else self.verdict
 
     def fails(self, strict: Strict) -> bool:
-        """Whether the check is out of tolerance for a run that is so strict."""
+        """Whether the check is out of tolerance in a run of that strictness."""
         fails = ("fail", "changed", "better") if strict == "both" else ("fail", "changed")
         return self.verdict in (fails if strict else ("fail",))
 
     @property
     def words(self) -> str:
-        """The verdict for people: a figure that waits for its tolerance has not failed."""
+        """The verdict for people: a figure without a tolerance has not failed."""
         return (
             "no tolerance yet"
             if self.limit is None and not self.gap and self.figure.value is not None
@@ -101,8 +100,9 @@ class Check(Stored):
 
 
 class CostRecord(Stored):
-    """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up,
-    simulation, writing).
+    """The cost of a cell's run: `scenes.Cost`, and the worker's wall time.
+
+    `worker_seconds` covers set-up, simulation and writing.
     """
 
     wall_seconds: float = 0.0
@@ -120,17 +120,19 @@ class CostRecord(Stored):
 class Cell(Stored):
     """One scene played by one model.
 
-    `status` "failed" means no history (`reason` says why: a model's failure, a crash, a hang,
-    memory), "absent" that the model is not installed (`reason` says what to install), "unavailable"
-    that it is not and has no wheel for this Python, which weighs nothing in the run. `history` is
-    the path of its CSV relative to the run's folder. `read_back` is true where nothing that the
-    cell depends on had changed. `figures` are all measures, judged or not; `checks` those with a
-    tolerance or in need of one. `numerical` is the run's numerical uncertainty, where the suite
-    asks for it, and `explanations` what it says of the differences. `impact_law` is the law of
-    impacts that the history followed at the scene's first landing where laws part, which nothing
-    judges. `overturned_at` is the time (s) at which the block lay, None for one that stays.
-    `traceback` is the path of a file beside them: of an exception that no model may raise, which is
-    `unexpected` where the model is one of rockcheck's own.
+    `status` "failed": no history (`reason` says why: a model's failure, a crash, a hang, memory);
+    "absent": the model is not installed (`reason` says what to install); "unavailable": it has no
+    wheel for this Python, either, which does not count in the run. `history` is the path of its CSV
+    relative to the run's folder. `read_back`: nothing that the cell depends on had changed, so that
+    it was not run. `figures` are all measures, judged or not; `checks` those with a tolerance or in
+    need of one.
+
+    `numerical` is the run's numerical uncertainty, if the suite asks for it; `explanations` are the
+    verdicts on the differences that follow from it. `impact_law` is the law of impacts that the
+    history followed at the scene's first landing where laws part; it is not judged. `overturned_at`
+    is the time (s) at which the block lay, None for one that stays. `traceback` is the path of a
+    file in the run's folder, for an exception that no model may raise; it is `unexpected` in one of
+    rockcheck's own models.
     """
 
     scene: str
@@ -177,25 +179,19 @@ class Cell(Stored):
 
     @property
     def converged(self) -> bool | None:
-        """Whether the run's numerical error is known; None where it was not asked for or the model
-        has no step.
-        """
+        """Whether the numerical error is known; None if not asked for, or the model has no step."""
         return None if self.numerical is None else self.numerical.converged
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not
-        installed.
-        """
+        """The worst of the cell's checks; "error" if the model failed, "incomplete" if missing."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
         return worst(check.weighs for check in self.checks)
 
     @property
     def words(self) -> str:
-        """The verdict for people; "no tolerance yet" where nothing else keeps the cell from
-        passing.
-        """
+        """The verdict for people; "no tolerance yet" if only that keeps the cell from passing."""
         waits = self.status == "done" and any(
             check.words == "no tolerance yet" for check in self.checks
         )
@@ -204,11 +200,11 @@ class Cell(Stored):
 
 
 class EnsembleRecord(Stored):
-    """What each model made of an ensemble: by model, peak |theta| in alpha and outcome of each
-    scene (None and why it failed).
+    """The results of an ensemble: by model, peak |theta| in alpha and outcome of each scene.
 
-    The statistics are in the figures of the ensemble's cells, whose `scene` is the ensemble's name.
-    `definition` is the table that the scenes are drawn from.
+    None and the reason where the model failed. The statistics are in the figures of the ensemble's
+    cells, whose `scene` is the ensemble's name. `definition` is the table that the scenes are drawn
+    from.
     """
 
     name: str
@@ -224,8 +220,7 @@ class Run(Stored):
     `scenes` holds each scene's `model_dump(mode="json")` by name, in the suite's order, `models`
     the models' names in order; a cell's `scene` may also be one of `ensembles`. `reference` is the
     model that judges numerical differences, `model_form` the one whose missing physics is shown
-    beside it. `faults` are checks that belong to no cell of the run (a tolerance whose cell is
-    missing).
+    beside it. `faults` are checks without a cell in the run (a tolerance whose cell is missing).
     """
 
     format: int = FORMAT
@@ -247,7 +242,7 @@ class Run(Stored):
     judged: bool = True
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()
-    #: By scene, what the spread of its inputs makes of its figures.
+    #: By scene, the effect of the spread of its inputs on its figures.
     inputs: dict[str, Inputs] = Field(default_factory=dict)
     #: Scenes whose figure for a paper is drawn.
     printed: tuple[str, ...] = ()
@@ -265,8 +260,9 @@ class Run(Stored):
 
     @property
     def words(self) -> str:
-        """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing,
-        "not judged" where nothing was.
+        """The verdict for people; "not judged" if a run without judgement passes.
+
+        "no tolerance yet" if only missing tolerances keep the run from passing.
         """
         if not self.judged and self.verdict == "pass":
             return "not judged"
@@ -305,9 +301,7 @@ class Run(Stored):
         return tuple(self.by_scene())
 
     def by_scene(self) -> dict[str, dict[str, Cell]]:
-        """All cells by scene or ensemble, and by model, in order: for whoever goes through all of
-        them.
-        """
+        """All cells by scene or ensemble, and by model, in order; for loops over all cells."""
         found: dict[str, dict[str, Cell]] = {}
         for cell in self.cells:
             found.setdefault(cell.scene, {})[cell.model] = cell
@@ -319,7 +313,7 @@ class Run(Stored):
 
     @property
     def without_tolerance(self) -> int:
-        """How many figures are asked for but have no tolerance yet, which none of them passes."""
+        """Number of figures that need a tolerance and have none yet; none of them passes."""
         return sum(
             check.limit is None and check.verdict != "not defined" for _, check in self.checks()
         )
@@ -335,8 +329,9 @@ class Run(Stored):
         return Scene(**self.scenes[name])
 
     def save(self, folder: Path) -> Path:
-        """Write `run.json` and its schema into `folder` (made if need be), each whole or not at
-        all; returns run.json's path.
+        """Write `run.json` and its schema into `folder`, each whole or not at all.
+
+        Makes the folder if need be. Returns the path of `run.json`.
         """
         write_whole(
             made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n"
@@ -345,9 +340,7 @@ class Run(Stored):
 
     @classmethod
     def load(cls, folder: str | Path) -> Run:
-        """The run in `folder`; raises `InputError` where there is none or it was written by another
-        format.
-        """
+        """The run in `folder`; raises `InputError` if there is none, or it has another format."""
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
@@ -391,8 +384,9 @@ def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
 
 
 def _by_line(data: Mapping[str, Any]) -> str:
-    """JSON with a line for each value, and for each of those in a list or an object: two thirds of
-    what indented JSON takes.
+    """JSON with a line per value, and per element of a list or object.
+
+    It takes two thirds of the size of indented JSON.
     """
     fields = []
     for name, value in data.items():

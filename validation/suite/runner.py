@@ -49,8 +49,9 @@ from rockcheck.validation.uncertainty.population import Inputs
 
 
 class BatchRecord(Stored):
-    """What is kept of a batch: peak |theta| in alpha and outcome of each scene, None and the reason
-    where the model failed.
+    """The kept record of a batch: peak |theta| in alpha and outcome of each scene.
+
+    None and the reason where the model failed.
     """
 
     peaks: tuple[float | None, ...]
@@ -71,7 +72,7 @@ def run_suite(
     """Play, compare and judge every cell of a suite; see `validation.study.run`.
 
     A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where
-    `folder` cannot be used, and `KeyboardInterrupt` once what was played is kept.
+    `folder` cannot be used, and, when interrupted, `KeyboardInterrupt` after all results are kept.
     """
     study = SuiteStudy(suite, folder)
     found = run(study, folder, jobs=jobs, force=force, scheduler=scheduler, on_progress=on_progress)
@@ -166,14 +167,14 @@ class SuiteStudy(Study):
         return workers.play(task.work)
 
     def file(self, task: Any) -> str:
-        """As the files of the cell are named."""
+        """Name of the cell's files."""
         return str(task.name)
 
     def find(self, store: Store, task: Any) -> workers.Played | None:
-        """A cell's record where its history is whole, a batch's."""
+        """The kept record of a batch, or of a cell whose history is whole; else None."""
         whole = task.ensemble is None
         found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
-        # what is kept is not trusted to have the fields that it must have
+        # a kept record may lack fields that it must have
         with suppress(ValueError):
             if found is not None:
                 self.records[task] = _record_of(task).model_validate(found)
@@ -182,11 +183,12 @@ class SuiteStudy(Study):
         return None
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
-        """Keep a history or a batch, and compare its scene where that is the last of it: while
-        others play.
+        """Keep a history or a batch; compare a scene's cells once the last of them is kept.
+
+        So scenes are compared while others are still played.
         """
         self.records[task] = _record_of(task).model_validate(record.record)
-        if record.traceback:  # some scenes of a batch: not to be read back
+        if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
         elif task.ensemble is None:
@@ -196,7 +198,7 @@ class SuiteStudy(Study):
             self.store.put_record(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
-        """The cells of a scene, once all are there."""
+        """Compare the cells of a scene, once all are there."""
         cells = self.by_scene[scene]
         if all(cell in self.records or cell in self.failures for cell in cells):
             for cell in cells:
@@ -347,11 +349,10 @@ class SuiteStudy(Study):
         )
 
     def _judged_beside(self, cell: Cell, cells: Sequence[Cell]) -> Cell:
-        """The cell with its own figures judged beside the reference's, where one is not as
-        expected.
+        """The cell with its own figures judged beside the reference's, if one is not as expected.
 
-        Both must solve the same equations. A figure of the reference that is itself not as expected
-        is no yardstick.
+        Only if both solve the same equations. A figure of the reference that is itself not as
+        expected is no yardstick.
         """
         own = self.suite.suite_of(cell.scene)
         moved = next(
@@ -381,8 +382,10 @@ class SuiteStudy(Study):
         return cell.model_copy(update={"checks": tuple(checks)})
 
     def _explained(self, cell: Cell, cells: Sequence[Cell], inputs: Inputs | None) -> Cell:
-        """The cell with the verdicts on its differences from the references among `cells`, of its
-        scene, that finished; unchanged where nothing is known.
+        """The cell with the verdicts on its differences from the references.
+
+        These are among `cells`, the scene's cells, if they finished. Unchanged if its numerical
+        error is unknown.
         """
         own = self.suite.suite_of(cell.scene)
         if cell.numerical is None:
@@ -481,8 +484,9 @@ class SuiteStudy(Study):
 def in_order(items: Sequence[Planned]) -> list[Planned]:
     """The order in which cells begin.
 
-    One of each package that compiles goes first, since the others of it wait for that one; then
-    what is not compiled, which takes longest; the quick rest fills the processes up to the end.
+    First one cell for each compiled code, since the others with that code wait for it; then the
+    cells that are not compiled, which take longest; the quick rest fills the processes up to the
+    end.
     """
     first = {item.compiles: n for n, item in reversed(list(enumerate(items)))}
     turn = [
@@ -497,9 +501,7 @@ def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
 
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:
-    """The figure that a check is about; one without value where it is missing, so that the check
-    cannot pass.
-    """
+    """The figure of a check; if missing, one without a value, so that the check cannot pass."""
     against = "" if place.against == OWN_FIGURES else place.against
     for figure in figures:
         if (figure.measure, figure.against, figure.window) == (

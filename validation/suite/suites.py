@@ -1,11 +1,10 @@
-"""Suites: which scenes, which models with which settings, and which figures must be within
-tolerance.
+"""Suites: scenes, models with their settings, and the figures to be within tolerance.
 
 A suite is a TOML file that a user can write:
 
     description = "my shelf on my record"
     reference = "ebm-unilateral"                 # judges numerical differences
-    model_form = "ebm"                           # optional: shown beside it, with a band of its own
+    model_form = "ebm"                           # optional: shown beside it, with its own band
     # each scene's figure for a paper (SVG, PNG, PDF); without it `rockcheck report` draws one
     print_figures = true
     scenes = ["fig4a", "shelf.toml"]             # names, or scene files beside this one
@@ -42,9 +41,9 @@ A suite is a TOML file that a user can write:
     ]
 
 Scenes under recorded motions are `[[records]]` tables (validation.suite.motions). Ensembles are
-`[[ensemble]]` tables (validation.suite.motions), judged by what `require.ensemble` names. Scenes
-can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a table
-`[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
+`[[ensemble]]` tables (validation.suite.motions), judged by the measures of `require.ensemble`.
+Scenes can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a
+table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
 "walls"]` joins other suites instead.
 """
 
@@ -88,13 +87,13 @@ from rockcheck.validation.suite.tolerances import (
 
 #: The fair reference for engines, and the model that forbids flight.
 REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
-#: What a simulation may take where no suite says so, s.
+#: Time limit (s) of a simulation without a suite.
 UNJUDGED_SECONDS = 900.0
 DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
 
 
 class Limits(Frozen):
-    """What one cell may take, of wall time (s) and of memory (MB)."""
+    """Limits of one cell, of wall time (s) and of memory (MB)."""
 
     seconds: Positive = 120.0
     memory_mb: Positive = 4096.0
@@ -115,8 +114,9 @@ class Require(Frozen):
 
 
 class Grid(Frozen):
-    """Scenes by combination: one alternative of each axis merged into `scene`, their names joined
-    to the scene's.
+    """Scenes by combination: one alternative of each axis merged into `scene`.
+
+    The names of the alternatives are appended to the scene's.
     """
 
     scene: dict[str, Any] = Field(default_factory=dict)
@@ -150,7 +150,7 @@ class ModelVariant:
     label: str
     family_name: str
     settings: Mapping[str, Any]
-    #: Folders in which a model of the user's own may lie: that of the suite.
+    #: Folders in which a user-defined model may lie: the suite's.
     search_path: tuple[str, ...] = ()
 
     @property
@@ -180,7 +180,7 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is asked for (three coarser runs a cell), and scenes
+    #: Whether the numerical error of each cell is estimated (three coarser runs a cell), and scenes
     #: with uncertain numbers, by name.
     uncertainty: bool = False
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
@@ -219,7 +219,7 @@ class Suite:
                     yield ensemble, base, model
 
     def only(self, scene: str, model: str) -> Suite:
-        """The suite with one cell, and the references that it is held against."""
+        """The suite with one cell, and the references that it is compared with."""
         own = self.suite_of(scene)
         if scene not in own.scenes:
             raise unknown_name("scene of the suite", scene, self.scenes)
@@ -240,9 +240,7 @@ class Suite:
         )
 
     def required(self, scene: str, model: str) -> dict[Place, Kind]:
-        """What must be judged in a cell, and as what: what the suite requires and whatever has a
-        tolerance.
-        """
+        """The checks of a cell, with their kinds: those required or given a tolerance."""
         own = self.suite_of(scene)
         require = own.require
         if scene in own.ensembles:
@@ -260,7 +258,9 @@ class Suite:
         return {place: own.kind(place) for place in places}
 
     def kind(self, place: Place) -> Kind:
-        """What a check means: with a wall (or a bounce), a model that cannot fly differs in form
+        """The kind of a check.
+
+        With a wall, a bouncing floor or an initial height, a model that cannot fly differs in form
         from one that can.
         """
         if place.against == OWN_FIGURES:
@@ -293,7 +293,7 @@ def describe_suite(path: Path) -> str:
 def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     """A suite from a TOML file, or by the name of one that comes with the package.
 
-    Nothing is run or imported that the file names: a model "module:Class" must be in `allow_code`,
+    Nothing that the file names is run or imported: a model "module:Class" must be in `allow_code`,
     and is imported only by the processes that play it. Raises `InputError` naming the file, the
     key, the value and what is allowed.
     """
@@ -367,11 +367,11 @@ def scene_suite(
     records: Sequence[RecordSet] = (),
     allow_code: Container[str] = (),
 ) -> Suite:
-    """One scene (a name or a .toml file) by some models, each with its settings, perhaps under
-    records: nothing is judged.
+    """One scene (a name or a .toml file) by some models, perhaps under records: nothing is judged.
 
-    Differences are from `ebm-unilateral`, or the first model where that is not among them. Models
-    of one's own are looked for in the working folder. Raises `InputError` as `load_suite`.
+    `models` gives the settings of each. Differences are from `ebm-unilateral`, or from the first
+    model without it. User-defined models are looked for in the working folder. Raises `InputError`
+    as `load_suite`.
     """
     known = named_scenes()
     path = Path(f"{source}.toml" if source in known else source)
@@ -396,7 +396,7 @@ def scene_suite(
 
 
 def is_scene(source: str) -> bool:
-    """Whether that is the name or the file of a scene, where a suite could be meant.
+    """Whether `source` is the name or file of a scene, rather than of a suite.
 
     Raises `InputError` for a file that is no TOML.
     """
@@ -411,7 +411,7 @@ def is_scene(source: str) -> bool:
 def _check_names(
     given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]
 ) -> None:
-    """Raises `InputError` where something is missing, named twice, or not known."""
+    """Raise `InputError` where something is missing, named twice, or unknown."""
     for key, label in (("reference", given.reference), ("model_form", given.model_form)):
         if label and label not in models:
             raise InputError(
@@ -450,9 +450,7 @@ def _tolerances(
 
 
 def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
-    """Names of scenes and models that make a cell: all, but a measured history belongs to the
-    scenes that it names.
-    """
+    """Names of scene and model of each cell; a measured history plays only its own scenes."""
     for scene in scenes:
         yield from (
             (scene, label)

@@ -35,8 +35,7 @@ OUTCOMES = (
 
 
 def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
-    """The scenes and ensembles that are shown one by one, in the suite's order: all, of a large run
-    the worst `most`.
+    """The scenes and ensembles shown one by one, in the suite's order: the worst `most`, or all.
 
     The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are
     always shown.
@@ -57,16 +56,14 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
 
 
 def not_shown(run: Run) -> list[str]:
-    """A line that says how many scenes are not `shown`, where some are not."""
+    """A line with the number of scenes that are not `shown`; empty if there are none."""
     more = len(run.places) - len(shown(run))
     said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
     return [said] if more else []
 
 
 def finding_of(run: Run) -> Finding:
-    """What a run says on a terminal: the verdicts, or the outcomes where nothing is judged, and the
-    reasons of what is no pass.
-    """
+    """A run on a terminal: verdicts, or outcomes if nothing is judged, and why it does not pass."""
     wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
     if not run.judged:
         told = Text(OUTCOMES)
@@ -88,8 +85,9 @@ def finding_of(run: Run) -> Finding:
 
 
 def verdict_table(run: Run) -> Table:
-    """A row a cell: the check that is nearest to its limit, how much of that it uses, and the
-    verdict. Of a large run, the scenes that are `shown`.
+    """A row per cell: the check nearest to its limit, the used share of the limit, the verdict.
+
+    Of a large run, the scenes that are `shown`.
     """
     places, before, rows = set(shown(run)), "", []
     for cell in run.cells:
@@ -114,9 +112,7 @@ def verdict_table(run: Run) -> Table:
 
 
 def outcome_tables(run: Run) -> Iterator[Table]:
-    """Each scene with a row a model: what becomes of the block, its peak rotation, and how far from
-    the reference.
-    """
+    """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
     names = ("peak_rotation_alpha", "apart_alpha")
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
@@ -137,7 +133,7 @@ def outcome_tables(run: Run) -> Iterator[Table]:
 
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
-    """What a cell came to, in plain values; `peak_rotation_alpha` is None for a block that fell."""
+    """The result of a cell in plain values; `peak_rotation_alpha` is None for a block that fell."""
     fell = cell.outcome.startswith("overturned")
     return {
         "scene": cell.scene,
@@ -152,8 +148,9 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
 
 
 def summary(run: Run) -> dict[str, Any]:
-    """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass;
-    where nothing is judged, what became of each cell.
+    """The verdicts of the run and its cells in plain values, with the reasons of each non-pass.
+
+    Where nothing is judged, the outcome of each cell.
     """
     common = {
         "suite": run.suite,
@@ -202,7 +199,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
 
 
 def improvements(run: Run) -> Iterator[str]:
-    """The figures that are better than was expected, a line each."""
+    """The figures that are better than expected, a line each."""
     yield from (
         f"{place(cell)}: {title(check)}: {check.reason}"
         for cell, check in run.checks()
@@ -211,7 +208,7 @@ def improvements(run: Run) -> Iterator[str]:
 
 
 def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
-    """Why a cell is not a pass for a run that is so strict, a line each."""
+    """Why a cell does not pass in a run of that strictness, a line each."""
     if cell.status != "done":
         yield f"{place(cell)}: {cell.reason}"
     yield from (
@@ -227,7 +224,7 @@ def place(cell: Cell) -> str:
 
 
 def title(check: Check) -> str:
-    """The check as tolerances name it: measure, window, and what it is held against."""
+    """The check as tolerances name it: measure, window, and its reference."""
     return title_of(check.figure)
 
 
@@ -238,15 +235,15 @@ def title_of(figure: Figure) -> str:
 
 
 def windowed(check: Check) -> str:
-    """What is checked, as tolerances name it: measure and window."""
+    """Measure and window of a check, as tolerances name them."""
     return title_of(check.figure).partition(" ")[0]
 
 
 def used(check: Check) -> float:
-    """Share of its limit that a check uses up, 0 to 1 within it; infinite where it cannot be
-    judged.
+    """Share of its limit that a check uses, 0 to 1 within it; infinite if it fails or has none.
 
-    0 where nothing is asked, and where the limit lies around a value that is no longer wanted.
+    0 for a check that is not defined or of a yes-or-no measure, and for a better figure whose limit
+    lies around the outdated expected value.
     """
     value, limit = check.figure.value, check.limit
     if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
@@ -255,7 +252,7 @@ def used(check: Check) -> float:
         return math.inf
     if asks(check):
         return 0.0
-    if check.ideal is None:  # an "at least" measure: what is there of what is needed
+    if check.ideal is None:  # an "at least" measure: the needed share of the value
         return limit / value if value > 0.0 else 0.0
     measure = MEASURES.get(check.figure.measure)
     floor = 0.0 if measure is None or measure.role == "error" else check.floor
@@ -330,25 +327,24 @@ MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "
 
 
 def junit(run: Run) -> str:
-    """JUnit XML: a test suite a scene, a test case a check and one for each cell's run, which is an
-    error where it failed.
+    """JUnit XML: a test suite per scene, a test case per check and one for each cell's run.
 
-    A figure that changed within its limit, and a model that is not installed, are failures only in
-    a strict run, one that is better in a run that is strict both ways. What is not defined is
-    skipped.
+    A failed run is an error. A figure that changed within its limit, and a model that is not
+    installed, are failures only in a strict run; a better figure only if the run is strict both
+    ways. A check that is not defined is skipped.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
     for scene, cells in run.by_scene().items():
         suite = TestSuite(scene)
         suite.extend([case for cell in cells.values() for case in _cases(cell, run.strict)])
-        document.append(suite)  # `add_testsuite` looks through all that are there
+        document.append(suite)  # `add_testsuite` searches all suites added before
     if run.faults:
         suite = TestSuite("tolerances")
         for fault in run.faults:
             suite.add_testcase(_case("tolerances", fault, Failure(fault)))
         document.append(suite)
     document.update_statistics()
-    return inert(bytes(document.tostring()).decode()) + "\n"  # XML knows no control characters
+    return inert(bytes(document.tostring()).decode()) + "\n"  # XML allows no control characters
 
 
 def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
@@ -384,9 +380,7 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 
 
 def markdown(run: Run) -> str:
-    """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by
-    models.
-    """
+    """A summary for a job's page: the verdict, the reasons, and a table of scenes by models."""
     count = f"{len(run.cells)} simulations, {run.up_to_date} up to date"
     parts = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
@@ -410,8 +404,9 @@ def markdown(run: Run) -> str:
 
 
 def _laws(run: Run, places: Container[str]) -> Iterator[str]:
-    """Which law of impacts each model followed, where these scenes have a landing that tells; it is
-    no verdict.
+    """The law of impacts that each model followed, for scenes with a landing at which laws part.
+
+    It is not judged.
     """
     found = {(cell.scene, cell.model): cell.impact_law for cell in run.cells if cell.impact_law}
     told = {scene: law.t for (scene, _), law in found.items() if scene in places}
@@ -441,9 +436,7 @@ def _entry(cell: Cell | None, judged: bool) -> str:
 
 
 def _plain(text: str) -> str:
-    """Text that somebody else may have chosen, as Markdown that shows it and does nothing: no tag,
-    link, picture or new line.
-    """
+    """Untrusted text as inert Markdown: no tag, link, picture or new line."""
     return (
         re.sub(r"([\\`*\[\]!#~])", r"\\\1", printable(text, 1000))
         .replace("&", "&amp;")

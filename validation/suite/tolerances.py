@@ -1,5 +1,4 @@
-"""Tolerances: what each figure was expected to be, how far it may go, and the verdict on what it
-is.
+"""Tolerances: the expected value of each figure, its limits, and the verdict on its value.
 
 A tolerance file is TOML; a table a scene, model and reference, a line a measure:
 
@@ -8,7 +7,7 @@ A tolerance file is TOML; a table a scene, model and reference, a line a measure
 
 The third name is the reference model, or "figures" for a figure of the cell itself, its distance
 from a closed form among them. The first may be "*", every scene that the model plays: such a line
-holds where a scene has none of its own, and gives what a scene's own line leaves out:
+holds where a scene has no line for the measure, and completes a scene's own line:
 
     ["*".mujoco.ebm-unilateral]
     outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the same outcome" }
@@ -18,7 +17,7 @@ holds where a scene has none of its own, and gives what a scene's own line leave
 (from `expected` for figures of the cell itself; for "at least" measures the value itself). All in
 the measure's unit.
 
-What a figure is judged by depends on its measure's role:
+The judgement of a figure depends on its measure's role:
 
 | role | distance within `limit` | better, where it moved by more than `drift` |
 |---|---|---|
@@ -26,11 +25,12 @@ What a figure is judged by depends on its measure's role:
 | quantity | from `expected`, beyond its floor | it came nearer to the reference's by more |
 | count | from `expected` | as a quantity |
 
-A figure has moved by what it and `expected` differ beyond their floor (`floor_of`), so two values
-below it are the same: nothing. The limit of an error holds as it is written. What moved is
-*better*, else *changed*; better passes, a quantity or count beyond its limit too. A quantity has a
-better only where the reference solves the same equations and is itself as expected (`runner`). A
-ratio to nothing is *not defined*.
+The move of a figure is its difference from `expected`, counting only the parts beyond their floor
+(`floor_of`): two values below it do not differ. The limit of an error is not changed by the floor.
+A figure that moved by more than `drift` is *better* if the last column holds, else *changed*;
+better passes, even for a quantity or count beyond its limit. A quantity is better only where the
+reference solves the same equations and is itself as expected (`runner`). A ratio to zero is *not
+defined*.
 """
 
 from __future__ import annotations
@@ -52,12 +52,12 @@ from rockcheck.validation.suite.results import Check, CheckVerdict, Kind
 from rockcheck.validation.uncertainty.numerical import Numerical
 
 MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
-#: The third name of a table that is not a reference model.
+#: The third name of a table of a cell's own figures, in place of a reference model.
 OWN_FIGURES = "figures"
 HORIZON = "horizon"
 #: The first name of a table that holds for every scene.
 EVERY = "*"
-#: The quantity whose numerical uncertainty stands for that of others in its unit.
+#: By unit, the quantity whose numerical uncertainty is used for the others.
 STANDS_FOR = {"angle": "theta_rms", "m": "last_slip", "s": "end_time"}
 
 
@@ -70,9 +70,7 @@ class Windowed:
 
     @classmethod
     def parse(cls, text: str) -> Windowed:
-        """Read "measure@window"; raises `InputError` for an unknown measure or a window that is
-        none.
-        """
+        """Read "measure@window"; raises `InputError` for an unknown measure or bad window."""
         name, at, window = text.partition("@")
         if name not in MEASURES:
             raise unknown_name("measure", name, MEASURES)
@@ -107,7 +105,7 @@ class Tolerance(Frozen):
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """Where a tolerance belongs: scene, model, what it is held against, windowed measure."""
+    """The place of a tolerance: scene, model, reference or "figures", and windowed measure."""
 
     scene: str
     model: str
@@ -125,10 +123,10 @@ _Path = tuple[str, ...]
 def parse_tolerances(
     tables: Mapping[str, Any], cells: Iterable[tuple[str, str]] = ()
 ) -> Tolerances:
-    """The tolerances in the tables of a file; a line for every scene becomes one for each of
-    `cells` (scene, model).
+    """The tolerances in the tables of a file, by place.
 
-    Raises `InputError` naming the place of whatever is not usable.
+    A line for every scene becomes one for each of `cells` (scene, model). Raises `InputError`
+    naming the place of an unusable line.
     """
     found: Tolerances = {}
     for (scene, model, against, key), line in _spread(dict(_lines(tables, depth=4)), cells):
@@ -154,8 +152,9 @@ def parse_tolerances(
 def _spread(
     lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]
 ) -> Iterator[tuple[_Path, Any]]:
-    """The lines with those for every scene at each of the model's cells, below what the scene
-    itself says.
+    """The lines, with those for every scene repeated for each cell of the model.
+
+    A scene's own line takes precedence; what it leaves out comes from the line for every scene.
     """
     played = list(cells)
     common = {path: line for path, line in lines.items() if path[0] == EVERY}
@@ -173,7 +172,7 @@ def _spread(
         completes = any(path[0] != EVERY and path[1:] == tuple(rest) for path in lines)
         if completes and isinstance(line, Mapping) and "limit" not in line:
             continue
-        # Where no cell is run it stays as it is, and is reported as a tolerance without a cell.
+        # Without a cell the line stays as it is, and is reported as a tolerance without a cell.
         yield from (
             ((scene, *rest), line)
             for scene in scenes or [EVERY]
@@ -195,10 +194,11 @@ def _lines(
 
 
 def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> float:
-    """The size below which a figure of a cell means nothing, in the measure's unit; 0 of a count.
+    """Smallest meaningful value of a cell's figure, in the measure's unit; 0 for a count.
 
-    The largest of the measure's resolution, the run's numerical uncertainty where it is known, and,
-    of a quantity, what the rows cannot tell from nothing. An error is read at the rows' own times.
+    The largest of the measure's resolution, the run's numerical uncertainty if known, and, for a
+    quantity, the error of a chord between rows (`between_rows`). An error is read at the rows' own
+    times.
     """
     if not measure.resolution:
         return 0.0
@@ -222,7 +222,7 @@ def judge(
     floor: float | None = None,
     beside: float | None = None,
 ) -> Check:
-    """The verdict on a figure. What is missing, not finite or not wholly compared never passes.
+    """The verdict on a figure: a missing, infinite or incompletely compared one never passes.
 
     `floor` is the figure's (None: its measure's resolution), `beside` the reference's same figure,
     where that is a yardstick.
@@ -258,7 +258,10 @@ def judge(
 
 
 def judged_beside(check: Check, beside: float | None) -> Check:
-    """The same check with the reference's figure as a yardstick, where there are both."""
+    """The check judged again with the reference's figure as a yardstick.
+
+    Unchanged without that figure or a tolerance.
+    """
     if check.limit is None or beside is None:
         return check
     line = Tolerance(limit=check.limit, expected=check.expected, drift=check.drift, why=check.why)
@@ -275,7 +278,10 @@ def judged_beside(check: Check, beside: float | None) -> Check:
 
 
 def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None:
-    """The value that a better one is nearer to; None for another model form, no yardstick."""
+    """The perfect value, to which a better one is nearer.
+
+    None for another model form, or for a quantity or count without the reference's figure.
+    """
     if kind == "model form":
         return None
     return (
@@ -295,7 +301,7 @@ def _verdict(
     floor: float,
     perfect: float | None,
 ) -> tuple[CheckVerdict, str]:
-    """The table at the top of this module; and why the figure is no plain pass."""
+    """The verdict by the table at the top of this module, and why the figure is no plain pass."""
     expected, drift = line.expected, math.inf if line.drift is None else line.drift
     moved = 0.0 if expected is None else apart(value, expected, floor, measure.ideal or 0.0)
     outside = _outside(figure, value, line, measure, moved)
@@ -315,14 +321,14 @@ def _verdict(
 
 
 def _nearer(value: float, expected: float, perfect: float | None) -> float:
-    """How much nearer to a perfect value it is than the expected one; 0 where there is none."""
+    """How much nearer the value is to a perfect one than the expected value; 0 without one."""
     if perfect is None or math.isinf(perfect):
         return 0.0 if perfect is None else value - expected
     return abs(expected - perfect) - abs(value - perfect)
 
 
 def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
-    """How a figure is beyond its limit, empty where not; `moved` is its distance from expected."""
+    """Why a figure is beyond its limit, empty if not; `moved` is its distance from `expected`."""
     limit = line.limit
     if measure.sense == "at least":
         return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}"
@@ -336,7 +342,10 @@ def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, mo
 
 
 def apart(value: float, expected: float, floor: float, zero: float = 0.0) -> float:
-    """The distance of two values by what each has beyond a `floor` on either side of `zero`."""
+    """Distance of two values, counting of each only the part beyond `floor` around `zero`.
+
+    The full distance if both are beyond the floor on the same side.
+    """
     one, other = value - zero, expected - zero
     if min(abs(one), abs(other)) > floor and one * other > 0.0:
         return abs(value - expected)

@@ -95,6 +95,12 @@ def run(suite_file: Path) -> Run:
     return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
 
 
+def test_what_is_read_back_is_in_the_same_order(run: Run, suite_file: Path) -> None:
+    again = run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
+    assert again.up_to_date == len(again.cells)
+    assert [cell.figures for cell in again.cells] == [cell.figures for cell in run.cells]
+
+
 def cell_of(run: Run, scene: str, model: str) -> Cell:
     found = run.cell(scene, model)
     assert found is not None
