@@ -1,12 +1,11 @@
-"""Adaptive stepping: an engine's contact solver inside an integrator of third order whose steps end
-at the events.
+"""Adaptive stepping: an engine's contact solver in a third-order integrator with event location.
 
-With a fixed step, the error of an engine is the time of its impacts and a drift along the arcs of
-its contacts, both of first order in the step. Here the engine only turns velocities into
-velocities, at the mean pose of a step (drift, kick, drift); step ends are placed where gaps close,
-where slip stops and where a block at rest may start to move; an impact has a step of its own, so
-short that nothing else happens in it. Between events, where the acceleration changes smoothly from
-step to step, that change corrects the drift, which is then of third order.
+With a fixed step, an engine's error has two sources: the time of its impacts and a drift along the
+arcs of its contacts. Both are of first order in the step. Here the engine only turns velocities
+into velocities, at the mean pose of a step (drift, kick, drift). Step ends are placed where gaps
+close, where slip stops and where a block at rest may start to move. An impact has a separate step,
+so short that nothing else happens in it. Between events the acceleration changes smoothly from step
+to step; that change corrects the drift, which is then of third order.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
 def march_adaptively(
     scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times (n) and states (n, 6) at step ends, and the accelerations (n-1, 2) felt in the steps,
-    until |theta| = pi/2.
+    """Times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2), until |theta| = pi/2.
 
     The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base
-    motion. No step is longer than `longest` s; those at impacts and after events are `short` times
-    the usual. Raises `ModelFailure` if the motion blows up or needs very many steps.
+    motion. No step is longer than `longest` s; the steps at impacts and after events are `short`
+    times their usual length. Raises `ModelFailure` if the motion blows up or needs more than
+    100,000 + 20 end / `longest` steps, `end` the scene's last output time.
     """
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of

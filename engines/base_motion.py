@@ -1,6 +1,4 @@
-"""The shaking base as its velocity: a difference of velocities is the exact mean of an acceleration
-over a step.
-"""
+"""The base motion as a velocity: its differences are exact mean accelerations over a step."""
 
 from __future__ import annotations
 
@@ -49,8 +47,9 @@ class BaseVelocity:
 
 
 def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
-    """`last` after all `pieces`, polynomials in the time since their start, which follow each other
-    after `interval` s.
+    """Velocity at the time `t`; after all `pieces` it is `last`.
+
+    The pieces are polynomials in the time since their start; each lasts `interval` s.
     """
     index = int(t / interval)
     if index >= len(pieces):
@@ -63,8 +62,9 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
 
 
 class BaseMotion:
-    """The base motion of a scene along both axes; `starts` are times at which it may set a resting
-    block in motion.
+    """The base motion of a scene along both axes.
+
+    `starts` are the times at which it may set a resting block in motion.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -82,18 +82,18 @@ class BaseMotion:
         return self.across(t), self.up(t)
 
     def felt_acceleration(self, edges: FloatArray) -> FloatArray:
-        """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the
-        times `edges`; shape (steps, 2).
+        """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).
+
+        The steps lie between the times `edges`.
         """
         gained = np.diff([self.velocity(t) for t in edges.tolist()], axis=0)
         return -gained / np.diff(edges)[:, None] - np.array([0.0, self.gravity])
 
 
 def _starts_of_motion(scene: Scene, times: FloatArray) -> list[float]:
-    """Times in order at which a block at rest, flat on the floor, may start or stop to slide or to
-    tip, s.
+    """Sorted times at which a block at rest on the floor may start or stop to slide or tip, s.
 
-    There |u| passes mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear
+    There |u| crosses mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear
     between `times`.
     """
     pushing = np.abs(scene.excitation.acceleration(times))

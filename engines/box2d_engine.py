@@ -84,8 +84,10 @@ class _RigidBox2DWorld(_Box2DWorld):
 
 
 class Box2D(Engine):
-    """Box2D v3; at its best with contacts as stiff as the step allows, that bounce however slow,
-    and a block that never sleeps.
+    """Box2D v3.
+
+    Its best settings: contacts as stiff as the step allows, which bounce at any speed, and a block
+    that never sleeps.
     """
 
     name: ClassVar[str] = "box2d"

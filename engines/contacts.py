@@ -1,5 +1,4 @@
-"""Which corners of the block can touch which surface of a scene, and the kinematics of those
-contacts.
+"""The contacts of a scene, each a corner of the block and a surface, and their kinematics.
 
 All functions take scalars or arrays, SI units, relative to the base, counterclockwise positive.
 """
@@ -44,16 +43,15 @@ class Contact(Surface):
 
 
 def arm_of(bx: Any, bz: Any, cos: Any, sin: Any) -> Arm:
-    """From the mass's centre to the corner (bx, bz) of the block turned by theta, given its cosine
-    and sine: right, up, m.
+    """Vector from the centre of mass to the corner (bx, bz), right and up, m.
+
+    `cos` and `sin` are those of the block's rotation theta.
     """
     return bx * cos - bz * sin, bx * sin + bz * cos
 
 
 def gap_of(nx: Any, nz: Any, distance: Any, x: Any, y: Any, arm: Arm) -> Any:
-    """Clear distance between a corner and a surface with the normal (nx, nz), m; negative is a
-    penetration.
-    """
+    """Gap between a corner and a surface with normal (nx, nz), m; negative is a penetration."""
     return nx * (x + arm[0]) + nz * (y + arm[1]) + distance
 
 
@@ -97,9 +95,7 @@ def surfaces_of(scene: Scene) -> tuple[Surface, ...]:
 
 
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
-    """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the
-    corners of that side.
-    """
+    """The contacts of a scene: lower corners with the floor, corners of a side with its wall."""
     b, h = scene.block.half_width, scene.block.half_height
     dx, dz = scene.block.offset
     return tuple(

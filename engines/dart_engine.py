@@ -24,8 +24,9 @@ SWEEPS, TOLERANCE = 100, 1e-8
 
 
 class _DartWorld(World):
-    """A world with a box in its plane, floor and walls, and DART's default parameters; `scale` of
-    its lengths are one of the scene's.
+    """A planar box, floor and walls, with DART's default parameters.
+
+    `scale`: lengths in this world per length in the scene.
     """
 
     def __init__(self, scene: Scene, scale: float = 1.0) -> None:
@@ -112,8 +113,9 @@ class _RigidDartWorld(_DartWorld):
 
 
 class Dart(Engine):
-    """DART, with FCL's collision detection; at its best penetration is corrected apart from
-    velocity, and nothing sleeps.
+    """DART, with FCL's collision detection.
+
+    Its best settings: penetration is corrected apart from velocity, and nothing sleeps.
     """
 
     name: ClassVar[str] = "dart"

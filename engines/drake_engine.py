@@ -26,8 +26,9 @@ SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 
 class _DrakeWorld(World):
-    """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when
-    the step is known.
+    """A plant with a planar box, floor and walls, with Drake's default parameters.
+
+    The plant is made at the first step, when the step's length is known.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -123,8 +124,10 @@ class _RigidDrakeWorld(_DrakeWorld):
         self.coarser: _RigidDrakeWorld | None = None
 
     def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
-        """The one step with a larger stiction speed, which smooths the turn from stick to slip that
-        TAMSI stumbles over.
+        """Repeat the step with a stiction speed ten times as large.
+
+        This smooths the transition from stick to slip at which TAMSI fails to converge. Raises
+        `failure` where the stiction speed has reached `COARSEST_STICTION`.
         """
         if self.stiction >= COARSEST_STICTION:
             raise failure
@@ -166,8 +169,10 @@ class _RigidDrakeWorld(_DrakeWorld):
 
 
 class Drake(Engine):
-    """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI,
-    whose friction does not lift.
+    """Drake's discrete plant.
+
+    Its best settings: tiny spheres as corners, stiff contacts, and TAMSI, whose friction does not
+    lift.
     """
 
     name: ClassVar[str] = "drake"
@@ -178,8 +183,9 @@ class Drake(Engine):
     worlds: ClassVar[Worlds] = (_RigidDrakeWorld, _DrakeWorld)
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
-        and Crossley's dissipation.
+        """Corners on slabs, so soft that an impact lasts for some steps.
+
+        `restitution` is Hunt and Crossley's dissipation.
         """
         return _RigidDrakeWorld(
             scene.replace(floor=Floor(friction=parameters["friction"])),

@@ -1,6 +1,4 @@
-"""The door that every engine stands behind: its settings, what it is asked for, and the history
-that comes out.
-"""
+"""The interface of every engine: its settings, its methods and the history it returns."""
 
 from __future__ import annotations
 
@@ -129,15 +127,17 @@ class Engine(Frozen):
         return f"no wheel for Python {this}: pip install {package} compiles it"
 
     def coarser(self, factor: float) -> Self:
-        """The same engine with all steps `factor` times as long; of adaptive ones those at the
-        events, too.
+        """The same engine with all steps `factor` times as long.
+
+        For adaptive steps this includes those at the events.
         """
         longer = {knob: factor * getattr(self, knob) for knob in self.steps.knobs}
         return self.model_copy(update=longer)
 
     def rigid_world(self, scene: Scene) -> World:
-        """The scene as this engine holds it at its best: contacts stop or bounce within one step,
-        whatever the step.
+        """The scene with this engine's best settings.
+
+        Contacts stop or bounce within one step, whatever the step.
         """
         return self.worlds[0](scene)
 
@@ -146,8 +146,9 @@ class Engine(Frozen):
         return self.worlds[1](scene)
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """The scene with the engine's own parameters of contact, by default "restitution" and
-        "friction" of its floor.
+        """The scene with the engine's native contact parameters.
+
+        By default these are "restitution" and "friction" of its floor.
         """
         floor = Floor.model_construct(
             friction=parameters["friction"], restitution=parameters["restitution"]

@@ -1,6 +1,4 @@
-"""Events of a motion that was computed with contacts instead of modes, read off the states at the
-step ends.
-"""
+"""Events of a motion computed with contacts instead of modes, read off the states at step ends."""
 
 from __future__ import annotations
 
@@ -31,8 +29,10 @@ TURNING = 1e-3  # rad/s
 def events_of(
     scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray
 ) -> list[Event]:
-    """Events in order of time; `t` (n) and `states` (n, 6) of the mass's centre at step ends,
-    `felt` (n-1 or more, 2) accelerations.
+    """Events in order of time.
+
+    `t` (n) and `states` (n, 6) are those of the mass's centre at step ends, `felt` (n-1 or more, 2)
+    the accelerations.
 
     "floor impact" and "wall impact": the onset of a contact that had been open for more than 2 ms,
     with its normal impulse in the first 2 ms; "uplift": one lower corner opens after both were
@@ -141,11 +141,10 @@ class _Motion:
         return min(int(np.searchsorted(self.t, self.t[index] + HOLD)), len(self.t) - 1)
 
     def impulse(self, contact: Contact, index: int) -> float:
-        """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s, from the
-        balance of momentum.
+        """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s.
 
-        Engines report forces differently, and some dearly; what the contacts gave is what the free
-        fall does not explain.
+        It follows from the balance of momentum: the change of velocity that free fall does not
+        explain. Engines report forces differently, some at a high cost.
         """
         from scipy.optimize import nnls
 
@@ -197,8 +196,9 @@ def _falls(flags: NDArray[np.bool_]) -> list[int]:
 
 
 def _start(values: FloatArray, index: int, noise: float) -> int:
-    """Where the rise of `values` above `noise` began that goes on at `index`: what grows slowly is
-    noticed late.
+    """Index where the rise of `values` above `noise` began that reaches `index`.
+
+    A slow rise is detected late.
     """
     while index > 0 and values[index] > max(values[index - 1], noise):
         index -= 1

@@ -19,8 +19,9 @@ ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num
 
 
 class _JoltWorld(World):
-    """A world with a box, floor and walls, and Jolt's default parameters; `scale` of its lengths
-    are one of the scene's. Its y axis points up.
+    """A box, floor and walls, with Jolt's default parameters; the y axis points up.
+
+    `scale`: lengths in this world per length in the scene.
     """
 
     def __init__(self, scene: Scene, scale: float = 1.0, planar: bool = False) -> None:
@@ -68,8 +69,9 @@ class _JoltWorld(World):
 
 
 class _RigidJoltWorld(_JoltWorld):
-    """A block that stays in its plane, in units in which slow contacts bounce, with Jolt's damping
-    taken out again.
+    """A block that stays in its plane, in units in which slow contacts bounce.
+
+    Jolt's damping is compensated.
     """
 
     def __init__(self, scene: Scene) -> None:

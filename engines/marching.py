@@ -1,6 +1,4 @@
-"""What stands around the march of any engine: its unit of length, fixed steps, and the states on a
-scene's output grid.
-"""
+"""Common parts of every engine's march: unit of length, fixed steps, states at output times."""
 
 from __future__ import annotations
 
@@ -22,8 +20,9 @@ BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 
 def in_units_of(length: float, scene: Scene) -> Scene:
-    """The scene with all lengths in units of `length` m, so that the absolute tolerances of an
-    engine fit any block.
+    """The scene with all lengths in units of `length` m.
+
+    An engine's absolute tolerances then fit any block.
     """
     block, (dx, dz) = scene.block, scene.block.offset
     return scene.replace(
@@ -45,10 +44,10 @@ def in_units_of(length: float, scene: Scene) -> Scene:
 
 
 def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
-    """Times, states of the mass's centre at all step ends and felt accelerations, up to the first
-    state in which the block lies.
+    """Times, states of the mass's centre at step ends, felt accelerations, until the block lies.
 
-    Raises `ModelFailure` if the motion blows up or the block falls through the floor.
+    The first state in which the block lies is the last one returned. Raises `ModelFailure` if the
+    motion blows up or the block falls through the floor.
     """
     dt = float(times[1]) if len(times) > 1 else 0.0
     pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
@@ -77,8 +76,7 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
 
 
 def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
-    """States on the scene's output grid: positions by cubic Hermite interpolation between steps,
-    velocities linear.
+    """States on the output grid: positions by cubic Hermite interpolation, velocities linear.
 
     Velocities jump at impacts, where a cubic would overshoot.
     """

@@ -28,8 +28,9 @@ MOST_CORRECTIONS = 20
 
 
 class _RigidMuJoCoWorld(MuJoCoWorld):
-    """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's
-    cone if corrected.
+    """Contacts that end a step with -e times their initial normal velocity.
+
+    Friction obeys Coulomb's cone if corrected.
     """
 
     def __init__(
@@ -93,9 +94,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         return velocity[0] + dt * ax, velocity[1] + dt * ay, velocity[2] + dt * spin
 
     def _slipping_rows(self) -> list[int]:
-        """The first constraint row of each floor contact, if one of them has reached the edge of
-        its cone.
-        """
+        """First constraint row of each floor contact if one is at its cone's edge, else none."""
         forces = self.data.efc_force.tolist()
         # Three rows for each contact with friction, which come first, and one for each without.
         rows = range(0, 3 * ((len(forces) - self.data.ncon) // 2), 3)
@@ -105,11 +104,11 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         return []
 
     def _correct_cone(self, rows: list[int], dt: float) -> None:
-        """Solve again with the normal target of each floor contact lowered by mu times its slip
-        rate, until that is consistent.
+        """Solve again, with floor contacts' normal targets lowered by mu times their slip rates.
 
-        The fixed point obeys Coulomb's law with the contact neither parting nor closing (De Saxce &
-        Feng 1998). Found by the secant method, from the slip rate before the step.
+        Repeated until targets and slip rates agree. The fixed point obeys Coulomb's law with the
+        contact neither parting nor closing (De Saxce & Feng 1998). Found by the secant method, from
+        the slip rate before the step.
         """
         model, data, count = self.model, self.data, len(rows)
         original, tangents = (
@@ -134,9 +133,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
 
 
 def _point_contact_model(scene: Scene) -> str:
-    """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in
-    their order.
-    """
+    """Corners as tiny spheres, and one contact pair per contact of the scene, in their order."""
     off = 'contype="0" conaffinity="0"'
     corners = {corner: f"corner {number}" for number, corner in enumerate(corners_of(scene))}
     spheres = "".join(
@@ -164,13 +161,13 @@ iterations="100" tolerance="1e-15"
 
 
 class MuJoCo(Engine):
-    """MuJoCo, with contacts that remove the approach within one step (Euler, elliptic cone, Newton
-    solver).
+    """MuJoCo.
 
-    `cone_correction` applies De Saxce's correction to the floor's contacts. MuJoCo's friction is
-    associated: a sliding contact lifts off at mu times its slip rate, whatever the step; the
-    correction takes just that out. It belongs to the "best" settings; the stock engine ("default")
-    has none.
+    Its best settings: contacts that remove the approach within one step (Euler, elliptic cone,
+    Newton solver). `cone_correction` applies De Saxce's correction to the floor's contacts.
+    MuJoCo's friction is associated: a sliding contact lifts off at mu times its slip rate, whatever
+    the step; the correction removes exactly this. It belongs to the "best" settings; the stock
+    engine ("default") has none.
     """
 
     name: ClassVar[str] = "mujoco"
@@ -187,8 +184,9 @@ class MuJoCo(Engine):
         return MuJoCoWorld(stock_model(scene))
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
-        """A box on a plane whose contacts stop within a step, with `restitution` in steps of
-        damping.
+        """A box on a plane whose contacts stop within a step.
+
+        The parameter `restitution` is MuJoCo's damping times the step.
         """
         sliding = scene.model_copy(update={"floor": Floor(friction=parameters["friction"])})
         solref = f"{-PUSHED_OUT / step**2!r} {-parameters['restitution'] / step!r}"

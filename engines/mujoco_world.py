@@ -60,8 +60,9 @@ class MuJoCoWorld(World):
 
 
 def model_of(scene: Scene, planes: str, geoms: str, settings: str = "", raised: float = 0.0) -> str:
-    """A model of planes, and of a body of unit mass that moves in the plane x, z and turns
-    counterclockwise, its origin `raised` m above that of the floor.
+    """A MuJoCo model (XML) of planes and a planar body of unit mass, counterclockwise positive.
+
+    The body moves in the plane x, z; its origin is `raised` m above the floor's.
     """
     inertia = scene.block.gyration_squared
     body = f"""
@@ -88,8 +89,9 @@ def plane_of(surface: Surface, inset: float, attributes: str) -> str:
 
 
 def stock_model(scene: Scene, settings: str = "") -> str:
-    """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters,
-    solver and cone.
+    """A MuJoCo model (XML) of a box on a plane, with planes for the walls.
+
+    Without `settings`, MuJoCo's default contact parameters, solver and cone apply.
     """
     block, mu = scene.block, scene.floor.friction
     planes = "".join(

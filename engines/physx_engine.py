@@ -118,8 +118,10 @@ class _RigidPhysXWorld(_PhysXWorld):
 
 
 class PhysX(Engine):
-    """PhysX 5; at its best with tiny spheres as corners, materials that add up to those of a
-    contact, and a block that never sleeps.
+    """PhysX 5.
+
+    Its best settings: tiny spheres as corners, materials that add up to a contact's parameters, and
+    a block that never sleeps.
     """
 
     name: ClassVar[str] = "physx"

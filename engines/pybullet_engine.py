@@ -137,8 +137,9 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         )
 
     def make_block(self, scene: Scene) -> int:
-        """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in
-        its plane.
+        """The block as tiny spheres at its corners.
+
+        A huge inertia about the other axes keeps it in its plane.
         """
         places = [[bx, 0.0, bz] for bx, bz in corners_of(scene)]
         shape = self.bullet.createCollisionShapeArray(
@@ -192,8 +193,9 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
 
 class PyBullet(Engine):
-    """PyBullet, with its default solver iterated until it has converged, without slop, damping and
-    sleeping.
+    """PyBullet, with its default solver.
+
+    Its best settings: iterated to convergence, without slop, damping and sleeping.
     """
 
     name: ClassVar[str] = "pybullet"

@@ -1,9 +1,8 @@
-"""The step of `engines.adaptive`, compiled: what is asked of the engine next, and what its answer
-makes of the block.
+"""The compiled step of `engines.adaptive`: plans the engine's next step and applies its result.
 
-Lengths are in R. A contact is a row of `corners`, first those of the floor's two, then those of
-walls: the corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A base
-motion is its pieces, their interval and the last velocity.
+Lengths are in R. A contact is a row of `corners`, first the floor's two, then the walls': the
+corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A base motion is its
+pieces, their interval and the last velocity.
 """
 
 from __future__ import annotations
@@ -59,8 +58,9 @@ POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 
 class Limits(NamedTuple):
-    """What counts as near, short, long and slow in a scene, in R, s and R/s; its gravity; its
-    block's height, standing.
+    """Thresholds for near, short, long and slow in a scene, in R, s and R/s.
+
+    `gravity` is the scene's; `standing` is the block's height when it stands.
     """
 
     longest: float
@@ -75,8 +75,10 @@ class Limits(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What a run is given: contacts, times at which the base may set a resting block in motion, the
-    base motion to the right and up, and when it ends, s.
+    """The input of a run.
+
+    Contacts, times at which the base may set a resting block in motion, the base motion to the
+    right and up, and the end of the run in s.
     """
 
     corners: Floats
@@ -87,8 +89,10 @@ class Course(NamedTuple):
 
 
 class March(NamedTuple):
-    """What a run keeps from step to step; which contacts are closed in this step and were in the
-    one before; what it asks for.
+    """The state of a run between steps.
+
+    It holds the contacts closed in this step (`closed`) and in the step before (`before`), and the
+    request to the engine (`asked`).
     """
 
     state: Floats
@@ -277,9 +281,7 @@ def drift(run: March, corners: Floats, dt: float) -> None:
 
 @inner_kernel
 def smooth(run: March) -> tuple[float, float, float, bool]:
-    """The acceleration of the step before where the same contacts were closed in it, else zero; and
-    whether they were.
-    """
+    """Last step's acceleration and True if the closed contacts are unchanged, else 0 and False."""
     z = run.state
     if z[KNOWN] == 0.0:
         return 0.0, 0.0, 0.0, False
@@ -313,8 +315,9 @@ def plan(run: March, course: Course, limits: Limits) -> int:
 
 @kernel
 def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floats) -> int:
-    """Ends the step with the velocity `kicked` that the engine gave, writes its `row`, and plans
-    the next one; LOST where it has blown up.
+    """End the step with the engine's velocity `kicked`, write its `row` and plan the next step.
+
+    Returns LOST where the motion has blown up.
     """
     z, dt, corners = run.state, run.asked[DT], course.corners
     known = z[KNOWN] != 0.0
@@ -335,12 +338,11 @@ def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floa
 
 @inner_kernel
 def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
-    """Pose, velocity and mean acceleration at the step's end, where the block has the velocity (vx,
-    vy, w).
+    """Update pose, velocity and mean acceleration to the step's end, with velocity (vx, vy, w).
 
     Where the same contacts were closed in the step before, the acceleration is taken to be linear
-    over both steps, for the mean pose (there the last one will do) and for the drift: dt/2 (v +
-    v_new) - dt^2/12 (change of the acceleration over the step).
+    over both steps. The drift is then dt/2 (v + v_new) - dt^2/12 (change of the acceleration over
+    the step); for the mean pose the last acceleration suffices.
     """
     z, (ax, ay, spin, same) = run.state, smooth(run)
     bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if same else 0.0
@@ -370,9 +372,7 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
 
 @inner_kernel
 def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
-    """Whether both lower corners are on the floor, or so near and slow that they are back on it at
-    once.
-    """
+    """Whether both lower corners are on the floor, or so near and slow that they return at once."""
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
         arm, gap, rate = seen(corners[i], z, cos, sin)

@@ -38,8 +38,9 @@ class FixedStep:
 
 @dataclass(frozen=True)
 class AdaptiveStep:
-    """Steps that end at the events and are at most `largest` s long; those at impacts and just
-    after events are `short` times their usual length.
+    """Steps that end at the events and are at most `largest` s long.
+
+    Steps at impacts and just after events are `short` times their usual length.
     """
 
     largest: float = 5e-4

@@ -24,9 +24,7 @@ class World(ABC):
 
     @abstractmethod
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        """One step of `dt` s with the `felt` acceleration, to the right and up, in units of length
-        a s^2.
-        """
+        """One step of `dt` s under the acceleration `felt`, right and up, in lengths / s^2."""
 
     @abstractmethod
     def state(self) -> State:
