@@ -1,5 +1,6 @@
 """The shaking base as its velocity: a difference of velocities is the exact mean of an acceleration
-over a step."""
+over a step.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ class BaseVelocity:
 
 def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
     """`last` after all `pieces`, polynomials in the time since their start, which follow each other
-    after `interval` s."""
+    after `interval` s.
+    """
     index = int(t / interval)
     if index >= len(pieces):
         return last
@@ -62,7 +64,8 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
 
 class BaseMotion:
     """The base motion of a scene along both axes; `starts` are times at which it may set a resting
-    block in motion."""
+    block in motion.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self.across, self.up, self.gravity = (
@@ -80,7 +83,8 @@ class BaseMotion:
 
     def felt_acceleration(self, edges: FloatArray) -> FloatArray:
         """What the block feels, -u and -(g + vg) in m/s^2, as means over the steps between the
-        times `edges`; shape (steps, 2)."""
+        times `edges`; shape (steps, 2).
+        """
         gained = np.diff([self.velocity(t) for t in edges.tolist()], axis=0)
         return -gained / np.diff(edges)[:, None] - np.array([0.0, self.gravity])
 

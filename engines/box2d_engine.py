@@ -68,8 +68,7 @@ class _Box2DWorld(World):
 
 
 class _RigidBox2DWorld(_Box2DWorld):
-    """Contacts as stiff as a step allows, that bounce however slow, and a block that never
-    sleeps."""
+    """Contacts as stiff as a step allows, bouncing at any speed; a block that never sleeps."""
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -86,7 +85,8 @@ class _RigidBox2DWorld(_Box2DWorld):
 
 class Box2D(Engine):
     """Box2D v3; at its best with contacts as stiff as the step allows, that bounce however slow,
-    and a block that never sleeps."""
+    and a block that never sleeps.
+    """
 
     name: ClassVar[str] = "box2d"
     module: ClassVar[str] = "pyb2d3"

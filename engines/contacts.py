@@ -45,13 +45,15 @@ class Contact(Surface):
 
 def arm_of(bx: Any, bz: Any, cos: Any, sin: Any) -> Arm:
     """From the mass's centre to the corner (bx, bz) of the block turned by theta, given its cosine
-    and sine: right, up, m."""
+    and sine: right, up, m.
+    """
     return bx * cos - bz * sin, bx * sin + bz * cos
 
 
 def gap_of(nx: Any, nz: Any, distance: Any, x: Any, y: Any, arm: Arm) -> Any:
     """Clear distance between a corner and a surface with the normal (nx, nz), m; negative is a
-    penetration."""
+    penetration.
+    """
     return nx * (x + arm[0]) + nz * (y + arm[1]) + distance
 
 
@@ -96,7 +98,8 @@ def surfaces_of(scene: Scene) -> tuple[Surface, ...]:
 
 def contacts_of(scene: Scene) -> tuple[Contact, ...]:
     """The contacts a scene can use: its lower corners on the floor and, where there is a wall, the
-    corners of that side."""
+    corners of that side.
+    """
     b, h = scene.block.half_width, scene.block.half_height
     dx, dz = scene.block.offset
     return tuple(

@@ -25,7 +25,8 @@ SWEEPS, TOLERANCE = 100, 1e-8
 
 class _DartWorld(World):
     """A world with a box in its plane, floor and walls, and DART's default parameters; `scale` of
-    its lengths are one of the scene's."""
+    its lengths are one of the scene's.
+    """
 
     def __init__(self, scene: Scene, scale: float = 1.0) -> None:
         import dartpy
@@ -112,7 +113,8 @@ class _RigidDartWorld(_DartWorld):
 
 class Dart(Engine):
     """DART, with FCL's collision detection; at its best penetration is corrected apart from
-    velocity, and nothing sleeps."""
+    velocity, and nothing sleeps.
+    """
 
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"

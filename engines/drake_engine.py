@@ -27,7 +27,8 @@ SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 class _DrakeWorld(World):
     """A plant with a box in its plane, floor and walls, and Drake's default parameters; made when
-    the step is known."""
+    the step is known.
+    """
 
     def __init__(self, scene: Scene) -> None:
         from pydrake import geometry, math
@@ -123,7 +124,8 @@ class _RigidDrakeWorld(_DrakeWorld):
 
     def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
         """The one step with a larger stiction speed, which smooths the turn from stick to slip that
-        TAMSI stumbles over."""
+        TAMSI stumbles over.
+        """
         if self.stiction >= COARSEST_STICTION:
             raise failure
         if self.coarser is None:
@@ -165,7 +167,8 @@ class _RigidDrakeWorld(_DrakeWorld):
 
 class Drake(Engine):
     """Drake's discrete plant; at its best with tiny spheres as corners, stiff contacts, and TAMSI,
-    whose friction does not lift."""
+    whose friction does not lift.
+    """
 
     name: ClassVar[str] = "drake"
     module: ClassVar[str] = "pydrake"
@@ -176,7 +179,8 @@ class Drake(Engine):
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """Corners on slabs, so soft that an impact lasts for some steps, with `restitution` as Hunt
-        and Crossley's dissipation."""
+        and Crossley's dissipation.
+        """
         return _RigidDrakeWorld(
             scene.replace(floor=Floor(friction=parameters["friction"])),
             self.tuned(step)["stiffness"],

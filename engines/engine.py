@@ -1,5 +1,6 @@
 """The door that every engine stands behind: its settings, what it is asked for, and the history
-that comes out."""
+that comes out.
+"""
 
 from __future__ import annotations
 
@@ -129,13 +130,15 @@ class Engine(Frozen):
 
     def coarser(self, factor: float) -> Self:
         """The same engine with all steps `factor` times as long; of adaptive ones those at the
-        events, too."""
+        events, too.
+        """
         longer = {knob: factor * getattr(self, knob) for knob in self.steps.knobs}
         return self.model_copy(update=longer)
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene as this engine holds it at its best: contacts stop or bounce within one step,
-        whatever the step."""
+        whatever the step.
+        """
         return self.worlds[0](scene)
 
     def stock_world(self, scene: Scene) -> World:
@@ -144,7 +147,8 @@ class Engine(Frozen):
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """The scene with the engine's own parameters of contact, by default "restitution" and
-        "friction" of its floor."""
+        "friction" of its floor.
+        """
         floor = Floor.model_construct(
             friction=parameters["friction"], restitution=parameters["restitution"]
         )

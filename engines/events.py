@@ -1,5 +1,6 @@
 """Events of a motion that was computed with contacts instead of modes, read off the states at the
-step ends."""
+step ends.
+"""
 
 from __future__ import annotations
 
@@ -197,7 +198,8 @@ def _falls(flags: NDArray[np.bool_]) -> list[int]:
 
 def _start(values: FloatArray, index: int, noise: float) -> int:
     """Where the rise of `values` above `noise` began that goes on at `index`: what grows slowly is
-    noticed late."""
+    noticed late.
+    """
     while index > 0 and values[index] > max(values[index - 1], noise):
         index -= 1
     return index

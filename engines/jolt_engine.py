@@ -20,7 +20,8 @@ ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num
 
 class _JoltWorld(World):
     """A world with a box, floor and walls, and Jolt's default parameters; `scale` of its lengths
-    are one of the scene's. Its y axis points up."""
+    are one of the scene's. Its y axis points up.
+    """
 
     def __init__(self, scene: Scene, scale: float = 1.0, planar: bool = False) -> None:
         import culverin
@@ -68,7 +69,8 @@ class _JoltWorld(World):
 
 class _RigidJoltWorld(_JoltWorld):
     """A block that stays in its plane, in units in which slow contacts bounce, with Jolt's damping
-    taken out again."""
+    taken out again.
+    """
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene, SCALE, planar=True)

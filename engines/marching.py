@@ -1,5 +1,6 @@
 """What stands around the march of any engine: its unit of length, fixed steps, and the states on a
-scene's output grid."""
+scene's output grid.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 def in_units_of(length: float, scene: Scene) -> Scene:
     """The scene with all lengths in units of `length` m, so that the absolute tolerances of an
-    engine fit any block."""
+    engine fit any block.
+    """
     block, (dx, dz) = scene.block, scene.block.offset
     return scene.replace(
         block=Block(  # of 1 kg

@@ -29,7 +29,8 @@ MOST_CORRECTIONS = 20
 
 class _RigidMuJoCoWorld(MuJoCoWorld):
     """Contacts that end a step with -e times the normal velocity they began it with, and Coulomb's
-    cone if corrected."""
+    cone if corrected.
+    """
 
     def __init__(
         self, model_text: str, contacts: Sequence[Contact], corrected_friction: float
@@ -93,7 +94,8 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
 
     def _slipping_rows(self) -> list[int]:
         """The first constraint row of each floor contact, if one of them has reached the edge of
-        its cone."""
+        its cone.
+        """
         forces = self.data.efc_force.tolist()
         # Three rows for each contact with friction, which come first, and one for each without.
         rows = range(0, 3 * ((len(forces) - self.data.ncon) // 2), 3)
@@ -133,7 +135,8 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
 
 def _point_contact_model(scene: Scene) -> str:
     """Corners as tiny spheres, and one contact pair for each contact that the scene can use, in
-    their order."""
+    their order.
+    """
     off = 'contype="0" conaffinity="0"'
     corners = {corner: f"corner {number}" for number, corner in enumerate(corners_of(scene))}
     spheres = "".join(
@@ -185,7 +188,8 @@ class MuJoCo(Engine):
 
     def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
         """A box on a plane whose contacts stop within a step, with `restitution` in steps of
-        damping."""
+        damping.
+        """
         sliding = scene.model_copy(update={"floor": Floor(friction=parameters["friction"])})
         solref = f"{-PUSHED_OUT / step**2!r} {-parameters['restitution'] / step!r}"
         stops = f'<default><geom solref="{solref}" {SOLIMP}/></default>'

@@ -47,8 +47,7 @@ class MuJoCoWorld(World):
         return states
 
     def check(self) -> None:
-        """Raise `ModelFailure` if MuJoCo met a state or an acceleration that is huge or not
-        finite."""
+        """Raise `ModelFailure` if MuJoCo met a huge or non-finite state or acceleration."""
         if self.warnings:
             kinds = self.mujoco.mjtWarning
             bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
@@ -62,7 +61,8 @@ class MuJoCoWorld(World):
 
 def model_of(scene: Scene, planes: str, geoms: str, settings: str = "", raised: float = 0.0) -> str:
     """A model of planes, and of a body of unit mass that moves in the plane x, z and turns
-    counterclockwise, its origin `raised` m above that of the floor."""
+    counterclockwise, its origin `raised` m above that of the floor.
+    """
     inertia = scene.block.gyration_squared
     body = f"""
 <body pos="0 0 {raised!r}">
@@ -89,7 +89,8 @@ def plane_of(surface: Surface, inset: float, attributes: str) -> str:
 
 def stock_model(scene: Scene, settings: str = "") -> str:
     """A box on a plane, beside planes; without `settings` with MuJoCo's default contact parameters,
-    solver and cone."""
+    solver and cone.
+    """
     block, mu = scene.block, scene.floor.friction
     planes = "".join(
         plane_of(

@@ -119,7 +119,8 @@ class _RigidPhysXWorld(_PhysXWorld):
 
 class PhysX(Engine):
     """PhysX 5; at its best with tiny spheres as corners, materials that add up to those of a
-    contact, and a block that never sleeps."""
+    contact, and a block that never sleeps.
+    """
 
     name: ClassVar[str] = "physx"
     module: ClassVar[str] = "sapien"

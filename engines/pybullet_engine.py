@@ -37,8 +37,7 @@ def _bullet() -> Any:
 
 
 class _PyBulletWorld(World):
-    """A physics server of its own with block, floor and walls, and PyBullet's default
-    parameters."""
+    """A physics server with block, floor and walls, at PyBullet's default parameters."""
 
     def __init__(self, scene: Scene) -> None:
         self.bullet = pybullet = _bullet()
@@ -56,8 +55,11 @@ class _PyBulletWorld(World):
             pybullet.changeDynamics(body, -1, **contact, **self.options)
 
     def make_block(self, scene: Scene) -> int:
-        """A box. Friction and restitution of two bodies multiply: the block's are 1, so that those
-        of floor and walls count."""
+        """A box.
+
+        Friction and restitution of two bodies multiply: the block's are 1, so that those of floor
+        and walls count.
+        """
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
         dx, dz = scene.block.offset
         placed = {} if scene.block.homogeneous else {"collisionFramePosition": [-dx, 0.0, -dz]}
@@ -136,7 +138,8 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
     def make_block(self, scene: Scene) -> int:
         """The block as tiny spheres at its corners; a huge inertia about the other axes keeps it in
-        its plane."""
+        its plane.
+        """
         places = [[bx, 0.0, bz] for bx, bz in corners_of(scene)]
         shape = self.bullet.createCollisionShapeArray(
             shapeTypes=[self.bullet.GEOM_SPHERE] * len(places),
@@ -190,7 +193,8 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
 class PyBullet(Engine):
     """PyBullet, with its default solver iterated until it has converged, without slop, damping and
-    sleeping."""
+    sleeping.
+    """
 
     name: ClassVar[str] = "pybullet"
     module: ClassVar[str] = "pybullet"

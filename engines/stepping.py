@@ -60,7 +60,8 @@ POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 class Limits(NamedTuple):
     """What counts as near, short, long and slow in a scene, in R, s and R/s; its gravity; its
-    block's height, standing."""
+    block's height, standing.
+    """
 
     longest: float
     closed: float
@@ -75,7 +76,8 @@ class Limits(NamedTuple):
 
 class Course(NamedTuple):
     """What a run is given: contacts, times at which the base may set a resting block in motion, the
-    base motion to the right and up, and when it ends, s."""
+    base motion to the right and up, and when it ends, s.
+    """
 
     corners: Floats
     starts: Floats
@@ -86,7 +88,8 @@ class Course(NamedTuple):
 
 class March(NamedTuple):
     """What a run keeps from step to step; which contacts are closed in this step and were in the
-    one before; what it asks for."""
+    one before; what it asks for.
+    """
 
     state: Floats
     closed: NDArray[np.bool_]
@@ -101,8 +104,7 @@ class March(NamedTuple):
 
 
 def limits_of(scene: Scene, longest: float, short: float) -> Limits:
-    """Those of a scene whose steps are at most `longest` s, and at events `short` times the
-    usual."""
+    """Steps of at most `longest` s, and near events `short` times the usual."""
     moment = short / scene.frequency_parameter
     probe = min(PROBE_STEP * moment, longest)
     return Limits(
@@ -159,8 +161,10 @@ def trusted(predicted: float, limits: Limits) -> float:
 
 @inner_kernel
 def time_to_close(gap: float, rate: float, curvature: float) -> float:
-    """When a gap with this rate and acceleration is zero, s; infinity if never. A gap that opens
-    closes on its way back."""
+    """When a gap with this rate and acceleration is zero, s; infinity if never.
+
+    A gap that opens closes on its way back.
+    """
     discriminant = rate * rate - 2.0 * curvature * gap
     if discriminant < 0.0:
         return math.inf
@@ -274,7 +278,8 @@ def drift(run: March, corners: Floats, dt: float) -> None:
 @inner_kernel
 def smooth(run: March) -> tuple[float, float, float, bool]:
     """The acceleration of the step before where the same contacts were closed in it, else zero; and
-    whether they were."""
+    whether they were.
+    """
     z = run.state
     if z[KNOWN] == 0.0:
         return 0.0, 0.0, 0.0, False
@@ -309,7 +314,8 @@ def plan(run: March, course: Course, limits: Limits) -> int:
 @kernel
 def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floats) -> int:
     """Ends the step with the velocity `kicked` that the engine gave, writes its `row`, and plans
-    the next one; LOST where it has blown up."""
+    the next one; LOST where it has blown up.
+    """
     z, dt, corners = run.state, run.asked[DT], course.corners
     known = z[KNOWN] != 0.0
     move(run, kicked[0] - run.carry[0], kicked[1] - run.carry[1], kicked[2], dt)
@@ -365,7 +371,8 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
 @inner_kernel
 def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
     """Whether both lower corners are on the floor, or so near and slow that they are back on it at
-    once."""
+    once.
+    """
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
         arm, gap, rate = seen(corners[i], z, cos, sin)

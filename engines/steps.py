@@ -39,7 +39,8 @@ class FixedStep:
 @dataclass(frozen=True)
 class AdaptiveStep:
     """Steps that end at the events and are at most `largest` s long; those at impacts and just
-    after events are `short` times their usual length."""
+    after events are `short` times their usual length.
+    """
 
     largest: float = 5e-4
     short: float = 1.0

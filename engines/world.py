@@ -25,7 +25,8 @@ class World(ABC):
     @abstractmethod
     def step(self, felt: tuple[float, float], dt: float) -> None:
         """One step of `dt` s with the `felt` acceleration, to the right and up, in units of length
-        a s^2."""
+        a s^2.
+        """
 
     @abstractmethod
     def state(self) -> State:

@@ -1,5 +1,6 @@
 """A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one
-description. All pages have one look, made of the templates in `data/templates`."""
+description. All pages have one look, made of the templates in `data/templates`.
+"""
 
 from __future__ import annotations
 
@@ -188,7 +189,8 @@ def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
     """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
-    `index.html`; returns the page."""
+    `index.html`; returns the page.
+    """
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for old in (folder / FAILING).glob("*.toml"):
@@ -232,7 +234,8 @@ PAGES = "pages"
 @dataclass(frozen=True)
 class Site:
     """A folder of pages with one look; `links` are its parts for the navigation, (title, address
-    from the index)."""
+    from the index).
+    """
 
     folder: Path
     name: str
@@ -240,7 +243,8 @@ class Site:
 
     def page(self, address: str, template: str, **context: Any) -> Path:
         """Write the page `address` (relative to the folder, with slashes) from a template of
-        `data/templates/`."""
+        `data/templates/`.
+        """
         root = "../" * address.count("/")
         text = (
             _environment()
@@ -266,8 +270,10 @@ class Site:
 
 @cache
 def _environment() -> Environment:
-    """The templates with what they call. Kept, since compiling a page's templates takes longer than
-    drawing its figures."""
+    """The templates with what they call.
+
+    Kept, since compiling a page's templates takes longer than drawing its figures.
+    """
     environment = Environment(
         loader=FileSystemLoader(DATA / "templates"),
         autoescape=True,

@@ -1,5 +1,6 @@
 """How the plots of a finding are drawn: lines over axes, and by `DRAWERS` what needs a drawer of
-its own."""
+its own.
+"""
 
 from __future__ import annotations
 
@@ -107,7 +108,8 @@ def lines(plot: Plot) -> Figure:
 
 def stable_steps(plot: Plot) -> Figure:
     """A panel an axis: the largest stable step of each model with its settings, by colour and
-    number."""
+    number.
+    """
     import numpy as np
     from matplotlib.figure import Figure
 
@@ -218,7 +220,8 @@ def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
 
 def colours(panel: Panel) -> list[tuple[str, str]]:
     """The colours of a panel's series, by day and by night; those of one label, as a line and its
-    fit, share theirs."""
+    fit, share theirs.
+    """
     own: dict[str, tuple[str, str]] = {}
     found = []
     for series in panel.series:
@@ -277,7 +280,8 @@ def _short(values: Any) -> list[float | None]:
 
 def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
     """Do these calls, in `jobs` processes (default: one a core) if they are at least so many: a
-    process takes a second to have what draws."""
+    process takes a second to have what draws.
+    """
     waiting = deque(calls)
     jobs = min(jobs or cores(), len(waiting))
     if jobs < 2 or len(waiting) < least:

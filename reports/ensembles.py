@@ -1,5 +1,6 @@
 """What is shown of an ensemble: the distribution of peak rotation by model, and how models agree
-scene by scene."""
+scene by scene.
+"""
 
 from __future__ import annotations
 
@@ -107,7 +108,8 @@ class EnsembleView:
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
         """By model: the peaks of the blocks that stay, in order, and the share of scenes up to
-        each."""
+        each.
+        """
         found = {}
         for model, sample in self.samples.items():
             peaks = np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])

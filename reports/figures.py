@@ -1,5 +1,6 @@
 """Figures of one scene for a paper: the quantities of its Figs. 4 and 5 for all models, and their
-differences below each."""
+differences below each.
+"""
 
 from __future__ import annotations
 
@@ -125,7 +126,8 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
 
 def write_figures(view: SceneView, folder: Path) -> None:
     """Write the figures of a scene into `folder`: a thumbnail of all rotations, and where the run
-    asks for them those for a paper, one a reference."""
+    asks for them those for a paper, one a reference.
+    """
     known = looks(view.run.models)
     curves = [(view.t, view.drawn[m]["theta"], known[m]) for m in known if m in view.values]
     save(thumbnail(curves), folder / f"{view.slug}-small", ["svg"])
@@ -174,7 +176,8 @@ def _largest(values: np.ndarray) -> float:
 
 def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
     """One channel of all models, the first reference drawn wide below the others; wall impacts on
-    each model's own curve."""
+    each model's own curve.
+    """
     for order, (model, look) in enumerate(looks(view.run.models).items()):
         if model not in view.values:
             continue
@@ -275,7 +278,8 @@ def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> N
 
 def _decades(fine: float, largest: float) -> dict[float, str]:
     """Places and words of at most five ticks of an asinh axis: zero, and plus and minus two
-    decades."""
+    decades.
+    """
     top = math.floor(math.log10(max(largest, fine)))
     low = max(math.ceil(math.log10(fine)), top - 2)
     ticks = {0.0: "0"}

@@ -152,7 +152,8 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
 
 def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Record]]:
     """A scene as the tables of a scene file, what is at its default left out, and its records by
-    file name."""
+    file name.
+    """
     records: dict[str, Record] = {}
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in ("excitation", "vertical"):

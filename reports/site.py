@@ -1,5 +1,6 @@
 """The pages of a finished run: one folder that opens from the file system and asks nothing of any
-other place."""
+other place.
+"""
 
 from __future__ import annotations
 
@@ -130,7 +131,8 @@ def write_site(
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
     """Write these pages, each with its stamp, and last the index, in processes of their own where
-    that is quicker."""
+    that is quicker.
+    """
     work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
     if work < FEW:
         yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
@@ -142,7 +144,8 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
 
 class _Pages:
     """The pages of a finished run, by name of the scene or the ensemble: of those that are shown,
-    and those that are wanted."""
+    and those that are wanted.
+    """
 
     def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
         self.folder = folder
@@ -164,7 +167,8 @@ class _Pages:
 
     def write(self, name: str, stamp: str) -> None:
         """Figures, data, and last the page, which names the stamp of what it shows (`stamp`); or
-        the page to open, `INDEX`."""
+        the page to open, `INDEX`.
+        """
         if name == INDEX:
             self._write_index()
             return
@@ -233,7 +237,8 @@ class _Pages:
 
     def stamp(self, view: View) -> str:
         """Hash of all that a page shows and of the code that draws it; not when the run was, nor
-        what was read back."""
+        what was read back.
+        """
         run = self.run
         shown = {
             "what": view.record.model_dump(mode="json")
@@ -264,8 +269,7 @@ def _address(view: View) -> str:
 
 @cache
 def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
-    """In a process of the pool, which ends with the run: it reads the run once for all its
-    pages."""
+    """Start a process of the pool: it reads the run once for all its pages."""
     return _Pages(folder, wanted)
 
 

@@ -89,7 +89,8 @@ BY_KEY = LOOKS | {look.key: look for look in SPARE}
 
 def looks(models: Iterable[str]) -> dict[str, Look]:
     """The look of each of a run's models; a model without one of its own gets a spare colour, by
-    its place among such."""
+    its place among such.
+    """
     found: dict[str, Look] = {}
     for model in models:
         spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
@@ -145,7 +146,8 @@ def figure_style() -> Iterator[None]:
 
 def log_scales(ax: Axes, *, decades: int = 7) -> None:
     """Logarithmic axes in powers of ten, at most so many, written out: `figure_style` leaves the $
-    of matplotlib's labels as it is."""
+    of matplotlib's labels as it is.
+    """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     for axis in (ax.xaxis, ax.yaxis):
@@ -196,7 +198,8 @@ def save(
 
 def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
     """The `formats` in which there is no `<stem>` yet that shows what `stamp` says; a file of any
-    format is removed where it shows something else."""
+    format is removed where it shows something else.
+    """
     paths = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
     if stamp_in(paths["svg"]) == stamp:
         return [kind for kind in formats if not paths[kind].is_file()]

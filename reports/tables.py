@@ -1,5 +1,6 @@
 """The tables of a run's pages, and first the answer: how far each model lies from the run's
-reference, scene by scene, and over all scenes."""
+reference, scene by scene, and over all scenes.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +81,8 @@ def worst_table(run: Run, links: Mapping[str, str]) -> Table:
 
 def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
     """One check: what was expected, what came out, the limit, how much of it is used, and why it
-    is not a pass."""
+    is not a pass.
+    """
     figure, waits = check.figure, check.words == "no tolerance yet"
     against = f"against {_label(figure.against)}, " if figure.against else ""
     return [
@@ -144,7 +146,8 @@ def use(check: Check) -> float:
 
 def times_table(run: Run) -> Table:
     """Run times relative to the reference in the same scene, and their geometric mean; the seconds
-    below."""
+    below.
+    """
     cells = run.by_scene()
     rows = []
     for model in run.models:
@@ -168,7 +171,8 @@ def times_table(run: Run) -> Table:
 
 def measures_table(view: SceneView, against: str) -> Table:
     """All figures of a scene that are held against `against`, a row a measure and window, a column
-    a model."""
+    a model.
+    """
     found: dict[tuple[str, str], dict[str, tuple[Figure, Check | None]]] = {}
     for cell in view.cells:
         judged = [(check.figure, check) for check in cell.checks]
@@ -203,7 +207,8 @@ def _measured(figure: Figure | None, check: Check | None) -> Any:
 
 def uncertainty_table(view: SceneView) -> Table:
     """The differences of a scene's models from their references, and what is known of their
-    uncertainty."""
+    uncertainty.
+    """
     rows = [
         [
             cell.model,
@@ -234,7 +239,8 @@ def runs_table(
     run: Run, cells: Sequence[Cell], root: str = "", histories: Mapping[str, Any] | None = None
 ) -> Table:
     """Settings, run times and outcomes of a place's cells; of an ensemble (no `histories`) the CPU
-    time of all its scenes. `root` is the way to the run's folder."""
+    time of all its scenes. `root` is the way to the run's folder.
+    """
     of = "cpu_seconds" if histories is None else "wall_seconds"
     base = next((cell for cell in cells if cell.model == run.reference), None)
     gains = {
@@ -316,7 +322,8 @@ class Entry:
     @property
     def why_apart(self) -> str:
         """Why an outcome other than the reference's is within tolerance; "" where it is not, or
-        both are the same."""
+        both are the same.
+        """
         if not self.apart or not self.cell.checks or self.cell.verdict != "pass":
             return ""
         judged = any(check.figure.measure == "outcome_agrees" for check in self.cell.checks)
@@ -345,7 +352,8 @@ class Row:
 class Glance:
     """What most readers ask: the entry farthest from the reference, the scenes whose outcome
     depends on the model, and what is no longer as it was accepted (the farthest first; `judged`
-    were looked at). A figure that is out of a limit but as it was accepted has not changed."""
+    were looked at). A figure that is out of a limit but as it was accepted has not changed.
+    """
 
     farthest: Entry | None
     apart: tuple[Row, ...]
@@ -366,7 +374,8 @@ def matrix(run: Run) -> list[Row]:
 
 def glance(run: Run, rows: Sequence[Row] | None = None) -> Glance:
     """The answers that the index gives first; `rows` are those of the run's `matrix`, where they
-    are known."""
+    are known.
+    """
     rows = matrix(run) if rows is None else rows
     entries = [
         one
@@ -436,7 +445,8 @@ def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
 
 def outcome_of(cell: Cell) -> str:
     """What became of the block; "falling left" or "falling right" where the run ends while it
-    falls."""
+    falls.
+    """
     figures = (*(check.figure for check in cell.checks), *cell.figures)
     last = value_of((f for f in figures if f.unit == "alpha"), "last_rotation")
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:

@@ -1,5 +1,6 @@
 """What is shown of one scene: all histories on one time axis, their differences, tolerances and
-horizon."""
+horizon.
+"""
 
 from __future__ import annotations
 
@@ -68,7 +69,8 @@ PAPER_CHANNELS = CHANNELS[:4]
 @dataclass(frozen=True)
 class Band:
     """A tolerance on the difference of one channel of one model: |d| (or its RMS) at most `limit`
-    from 0 to `until` s."""
+    from 0 to `until` s.
+    """
 
     channel: str
     model: str
@@ -81,7 +83,8 @@ class Band:
 @dataclass(frozen=True)
 class Hop:
     """How the block leaves the floor: its lowest corner's greatest height (m), by which model, and
-    its longest flight (s)."""
+    its longest flight (s).
+    """
 
     height: float
     model: str
@@ -111,7 +114,8 @@ class SceneView:
     @cached_property
     def moved(self) -> list[dict[str, Any]]:
         """Slip, top displacement and speed at the wall by model (label, unit, values), where one is
-        known."""
+        known.
+        """
         motions = {model: motion_of(one, self.scene) for model, one in self.histories.items()}
         rows: list[dict[str, Any]] = [
             {
@@ -150,7 +154,8 @@ class SceneView:
     @cached_property
     def outside(self) -> list[str]:
         """The axes on which the scene lies outside of what the suites cover; empty where nothing is
-        known of them."""
+        known of them.
+        """
         return experience.outside(self.scene) if experience.known().domain else []
 
     @cached_property
@@ -188,7 +193,8 @@ class SceneView:
 
     def _on_axis(self, history: History, name: str) -> Array:
         """A column on `t`, linear between its rows, NaN outside them and where there is no such
-        column."""
+        column.
+        """
         if name not in history.channels:
             return np.full(len(self.t), math.nan)
         times = np.asarray(history.channels["t"], dtype=float)
@@ -230,8 +236,10 @@ class SceneView:
 
     @cached_property
     def active(self) -> tuple[float, float]:
-        """The window of time, s, in which something happens: a model turns or slides. The whole
-        time where that is nearly all."""
+        """The window of time, s, in which something happens: a model turns or slides.
+
+        The whole time where that is nearly all.
+        """
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
             sizes = [np.nan_to_num(np.abs(columns[name])) for columns in self.drawn.values()]
@@ -248,8 +256,10 @@ class SceneView:
 
     @property
     def hop(self) -> Hop | None:
-        """The highest hop, by the most trusted model that may hop. None where no model may hop, or
-        none does."""
+        """The highest hop, by the most trusted model that may hop.
+
+        None where no model may hop, or none does.
+        """
         order = (
             *self.unilateral,
             *(cell.model for cell in self.cells if cell.model not in self.bilateral),
@@ -289,7 +299,8 @@ class SceneView:
     @property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here and that have a history; the run's own reference
-        first."""
+        first.
+        """
         named = [
             self.run.reference,
             self.run.model_form,
@@ -300,12 +311,14 @@ class SceneView:
     @property
     def figure_references(self) -> tuple[str | None, ...]:
         """References that have a figure of their own: all where a wall makes them differ in form,
-        else the first; None without any."""
+        else the first; None without any.
+        """
         return (self.references if self.model_form_matters else self.references[:1]) or (None,)
 
     def differences(self, channel: str, against: str) -> dict[str, Array]:
         """Candidate minus reference by model up to the first fall of the two, in the channel's
-        unit."""
+        unit.
+        """
         reference = self.drawn[against][channel]
         return {
             model: columns[channel] - reference
@@ -315,7 +328,8 @@ class SceneView:
 
     def running_rms(self, band: Band) -> Array:
         """The RMS difference from 0 up to each time, to `band.until`: what its limit holds for at
-        the end. NaN where it is not known."""
+        the end. NaN where it is not known.
+        """
         both = [
             self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)
         ]
@@ -356,8 +370,7 @@ class SceneView:
 
     @property
     def horizon(self) -> float | None:
-        """Horizon of predictability, s, where the run gives one: the end of a window of that
-        name."""
+        """Horizon of predictability, s: the end of the window of that name, where there is one."""
         ends = [
             f.until
             for cell in self.cells
@@ -369,7 +382,8 @@ class SceneView:
     @property
     def agreement(self) -> dict[str, tuple[float, str, str]]:
         """By model: the time up to which its events agree with those of its first reference, what
-        comes then, and that reference."""
+        comes then, and that reference.
+        """
         found: dict[str, tuple[float, str, str]] = {}
         for against in self.references:
             for cell in self.cells:
@@ -397,8 +411,7 @@ class SceneView:
 
     @property
     def model_form_matters(self) -> bool:
-        """Whether a wall can throw the block into the free flight that one of the models
-        forbids."""
+        """Whether a wall can throw the block into free flight that one of the models forbids."""
         return bool(self.scene.walls) and bool(self.bilateral)
 
     @cached_property
@@ -423,8 +436,10 @@ class SceneView:
 def scene_views(
     run: Run, folder: Path, chosen: Container[str] | None = None, *, most_values: int = 2_000_000
 ) -> list[SceneView]:
-    """The views of the chosen scenes of a run, or of all. Where they hold more than `most_values`
-    values, each shows every n-th row."""
+    """The views of the chosen scenes of a run, or of all.
+
+    Where they hold more than `most_values` values, each shows every n-th row.
+    """
     slugs = slugs_of(run.scenes)
     names = [name for name in run.scenes if chosen is None or name in chosen]
     share = most_values / max(1, len(names))
@@ -450,7 +465,8 @@ def scene_views(
 
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
     """A file name for each scene: safe on any system, different for different scenes also where
-    case does not count."""
+    case does not count.
+    """
     slugs: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:

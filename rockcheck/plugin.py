@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     """The ini options `rockcheck_suite` and `rockcheck_allow_code`, and the command line's own
-    `--rockcheck-allow-code`."""
+    `--rockcheck-allow-code`.
+    """
     parser.addini(
         "rockcheck_suite",
         "suite that the fixture `rockcheck_check` takes scenes, models and tolerances from",

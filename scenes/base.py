@@ -41,7 +41,8 @@ Restitution = Annotated[float, Strict(), Field(ge=0.0, le=1.0, allow_inf_nan=Fal
 
 class Frozen(BaseModel):
     """A frozen value whose constructor raises `InputError` for whatever is missing, unknown or out
-    of range."""
+    of range.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -70,7 +71,7 @@ class Shown:
     """Something that a notebook can show, and that has a figure."""
 
     def plot(self) -> Figure:
-        """This object as a matplotlib figure."""
+        """The object as a matplotlib figure."""
         return _view_of(type(self)).figure(self)
 
     def _repr_html_(self) -> str:

@@ -1,5 +1,6 @@
 """The block: a rigid box, homogeneous or with its mass's centre and its moment of inertia given;
-its two pivots."""
+its two pivots.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +24,10 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True, kw_only=True)
 class Pivot:
-    """A lower corner as the pivot of rocking. Lengths in m, from the corner to the mass's
-    centre."""
+    """A lower corner as the pivot of rocking.
+
+    Lengths in m, from the corner to the mass's centre.
+    """
 
     #: Horizontal and vertical distance.
     arm: float
@@ -36,7 +39,8 @@ class Pivot:
     @property
     def alpha(self) -> float:
         """Slenderness angle of this side, rad: tilted by as much, the mass's centre stands above
-        the corner."""
+        the corner.
+        """
         return math.atan2(self.arm, self.height)
 
     @property
@@ -45,14 +49,16 @@ class Pivot:
         return math.hypot(self.arm, self.height)
 
     def frequency_parameter(self, gravity: float) -> float:
-        """p = sqrt(g R/(R^2 + I/m)) in rad/s under `gravity` in m/s^2; sqrt(3 g/(4 R)) where the
-        block is homogeneous."""
+        """P = sqrt(g R/(R^2 + I/m)) in rad/s under `gravity` in m/s^2; sqrt(3 g/(4 R)) where the
+        block is homogeneous.
+        """
         return math.sqrt(self.share * gravity / self.radius)
 
 
 class Block(Frozen):
-    """A rigid rectangular block 2B x 2H; lengths in m. It is homogeneous unless the last two fields
-    say otherwise.
+    """A rigid rectangular block 2B x 2H; lengths in m.
+
+    It is homogeneous unless the last two fields say otherwise.
 
     `mass` (kg) is optional: motion does not depend on it, forces and impulses are given per unit
     mass. `centre_of_mass` is the place (x, z) of the mass's centre from the centre of the box as it
@@ -106,7 +112,8 @@ class Block(Frozen):
     @model_serializer(mode="wrap")
     def _as_written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """What is not given is left out: a homogeneous block is written, and known by its hash, as
-        ever."""
+        ever.
+        """
         return {
             name: value
             for name, value in write(self).items()
@@ -126,7 +133,8 @@ class Block(Frozen):
     @property
     def half_diagonal(self) -> float:
         """Distance of the corners from the box's centre, sqrt(B^2 + H^2), m: R of a homogeneous
-        block."""
+        block.
+        """
         return math.hypot(self.half_width, self.half_height)
 
     @property
@@ -142,8 +150,10 @@ class Block(Frozen):
         return self.moment_of_inertia / (1.0 if self.mass is None else self.mass)
 
     def pivot(self, side: Literal["left", "right"]) -> Pivot:
-        """The lower corner on that side. A block that tilts to the left (theta > 0) rocks on the
-        left one."""
+        """The lower corner on that side.
+
+        A block that tilts to the left (theta > 0) rocks on the left one.
+        """
         x, z = self.offset
         arm, height = self.half_width + (x if side == "left" else -x), self.half_height + z
         square = arm * arm + height * height
@@ -153,7 +163,8 @@ class Block(Frozen):
     @property
     def weaker_pivot(self) -> Pivot:
         """The pivot nearer to the mass's centre, over which the block falls most easily; the left
-        one where neither is."""
+        one where neither is.
+        """
         return self.pivot("right" if self.offset[0] > 0.0 else "left")
 
     @property
@@ -163,27 +174,32 @@ class Block(Frozen):
 
     @property
     def slope(self) -> float:
-        """tan alpha: the base acceleration over g at which the block begins to rock, of the weaker
-        pivot."""
+        """Tan alpha: the base acceleration over g at which the block begins to rock, of the weaker
+        pivot.
+        """
         pivot = self.weaker_pivot
         return pivot.arm / pivot.height
 
     @property
     def radius(self) -> float:
         """Distance R of the pivot from the mass's centre, m: half the diagonal; of the weaker
-        pivot."""
+        pivot.
+        """
         return self.weaker_pivot.radius
 
     @property
     def frequency_parameter(self) -> float:
-        """p = sqrt(3 g / (4 R)), rad/s, on Earth: g = 9.81 m/s^2. `Scene.frequency_parameter` has
-        the scene's own gravity."""
+        """P = sqrt(3 g / (4 R)), rad/s, on Earth: g = 9.81 m/s^2.
+
+        `Scene.frequency_parameter` has the scene's own gravity.
+        """
         return self.weaker_pivot.frequency_parameter(9.81)
 
     @property
     def least_painleve_friction(self) -> float:
         """2 sqrt(j (1 + j)), j = I/(m R^2): with more friction a slipping pivot can jam (Painleve);
-        4/3 where homogeneous."""
+        4/3 where homogeneous.
+        """
         if self.homogeneous:
             return 4.0 / 3.0
         j = self.gyration_squared / max(self.pivot("left").radius, self.pivot("right").radius) ** 2

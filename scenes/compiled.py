@@ -42,8 +42,9 @@ from rockcheck.scenes.writing import write_whole
 
 
 def _import_array_functions() -> None:
-    """Import numba's array functions. They would import scipy.linalg (0.2 s) only to know that it
-    is there.
+    """Import numba's array functions.
+
+    They would import scipy.linalg (0.2 s) only to know that it is there.
 
     It is, since rockcheck needs scipy; what calls BLAS looks for it again when it is compiled.
     """
@@ -124,7 +125,8 @@ register("numba:compile", _Compiling())
 
 def _package(function: Callable[..., Any]) -> Path:
     """The folder of the function's package: that of rockcheck.ebm for one of
-    rockcheck.ebm.core.march."""
+    rockcheck.ebm.core.march.
+    """
     below = max(len(function.__module__.split(".")) - 3, 0)
     return Path(function.__code__.co_filename).parents[below]
 
@@ -167,7 +169,8 @@ def _cache_folder(package: Path) -> Path | None:
 
 def _is_private(folder: Path, owner: int) -> bool:
     """Whether nobody but the user can have written into `folder`, or put it there; `owner` is that
-    of the code itself."""
+    of the code itself.
+    """
     if not hasattr(os, "geteuid"):
         return True  # no owners and modes that could be asked
     me, own, above = os.geteuid(), folder.lstat(), folder.parent.stat()
@@ -183,7 +186,8 @@ def _is_private(folder: Path, owner: int) -> bool:
 
 def _remove_old(folder: Path, package: str) -> None:
     """Remove what was compiled from other sources, unless it is young: another process may be using
-    it."""
+    it.
+    """
     for old in folder.parent.glob(f"{package}-kernels-*"):
         if old != folder and time.time() - old.stat().st_mtime > _KEPT:
             shutil.rmtree(old, ignore_errors=True)
@@ -203,8 +207,10 @@ def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
 
 
 class _Compiler(Compiler):
-    """numba's own compiler, which looks up each kind of call once. Only one thread compiles: it
-    holds numba's lock."""
+    """numba's own compiler, which looks up each kind of call once.
+
+    Only one thread compiles: it holds numba's lock.
+    """
 
     def _compile_core(self) -> Any:
         already = "get_call_type" in vars(types.Function)
@@ -247,8 +253,10 @@ class _Linked(JITCodeLibrary):
 
     @property
     def codegen(self) -> Any:
-        """Where numba leaves the environment of a function: nowhere. It is for what needs Python,
-        which no inner kernel does."""
+        """Where numba leaves the environment of a function: nowhere.
+
+        It is for what needs Python, which no inner kernel does.
+        """
         return self
 
     def set_env(self, env_name: str, env: object) -> None:
@@ -367,14 +375,18 @@ def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
 
 class _Inner(CPUDispatcher):
     """A function that kernels call: compiled once for the types that it is given, whoever calls it.
-    Python calls the plain function."""
+
+    Python calls the plain function.
+    """
 
     def __call__(self, *args: Any, **named: Any) -> Any:
         return self.py_func(*args, **named)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """For numba: a constant is compiled as a number, else each would be a copy of its own.
-        Where the code is placed it is one again."""
+
+        Where the code is placed it is one again.
+        """
         return super().get_call_template(
             [_as_number(a) for a in args], {name: _as_number(a) for name, a in kws.items()}
         )
@@ -412,5 +424,6 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
 
 def called_kernel(function: Callable[..., Any]) -> Any:
     """An inner kernel that is called: for what is long and stands in several places, each of which
-    would be compiled again."""
+    would be compiled again.
+    """
     return _inner(function, forceinline=False)

@@ -1,5 +1,6 @@
 """The exceptions, each with a message of one line: what a user gave cannot be used, or a model
-could not finish."""
+could not finish.
+"""
 
 from __future__ import annotations
 
@@ -31,12 +32,12 @@ class NotInstalled(InputError):
 
 class ModelFailure(RuntimeError):
     """A model could not finish a scene (blow-up, unsupported physics, a cap reached); its cell
-    fails, the run goes on."""
+    fails, the run goes on.
+    """
 
 
 def check_kind(value: object, kind: type, how: str, key: str) -> None:
-    """Raises `InputError` where the argument `key` is no `kind`; `how` says where one comes
-    from."""
+    """Raise `InputError` unless `value` is a `kind`; `how` says where one comes from."""
     if not isinstance(value, kind):
         raise InputError(
             f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key
@@ -54,7 +55,8 @@ def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:
     """What to say after a name that is not among `allowed`: the nearest one, and all of them, or
-    some of very many."""
+    some of very many.
+    """
     names = sorted(allowed)
     near = get_close_matches(name, names, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
@@ -75,14 +77,17 @@ def inert(text: str) -> str:
 
 def printable(value: object, limit: int = 80) -> str:
     """`value` as one short line without control characters, safe to write to a terminal; a path is
-    never shortened."""
+    never shortened.
+    """
     text = "".join(c if c.isprintable() else "?" for c in str(value))
     return text if len(text) <= limit or isinstance(value, PurePath) else text[: limit - 3] + "..."
 
 
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
-    """The first fault that pydantic found, as one line: key, value, what is allowed. `keys` are
-    those that could be given."""
+    """The first fault that pydantic found, as one line: key, value, what is allowed.
+
+    `keys` are those that could be given.
+    """
     faults = error.errors(include_url=False)
     # A key that is misspelt is unknown, and the right one missing: the first says what to mend.
     fault = (

@@ -36,7 +36,8 @@ class Motion(Frozen):
 
     def scaled(self, factor: float) -> Self:
         """The same motion with `factor` times the acceleration; a negative factor also exchanges
-        left and right."""
+        left and right.
+        """
         return self._times(self._size, factor)
 
     def stretched(self, factor: float) -> Self:
@@ -85,7 +86,7 @@ class Ricker(Motion):
 
     @property
     def rate(self) -> float:
-        """b of the Gaussian factor exp(-b tau^2), 1/s^2; tau is the time from the centre."""
+        """B of the Gaussian factor exp(-b tau^2), 1/s^2; tau is the time from the centre."""
         return (
             2.0 * math.pi**2 / (3.0 * self.period**2)
             if not self.symmetric

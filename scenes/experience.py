@@ -93,7 +93,8 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
 
 def outside(scene: Scene, domain: Mapping[str, Range] | None = None) -> list[str]:
     """The axes on which a scene lies outside of the domain that the suites cover, a line each;
-    empty where it lies inside."""
+    empty where it lies inside.
+    """
     domain = known().domain if domain is None else domain
     lines = []
     for axis, values in axes_of(scene).items():

@@ -57,8 +57,10 @@ def load_scene(source: str | Path) -> Scene:
 
 
 def load_uncertain_scene(source: str | Path) -> UncertainScene:
-    """A scene with what its file says of the numbers that are not known exactly (see
-    the module). Raises as `load_scene`."""
+    """A scene with what its file says of the numbers that are not known exactly (see the module).
+
+    Raises as `load_scene`.
+    """
     known = named_scenes()
     path = known.get(str(source), Path(source))
     if path.suffix.lower() != ".toml":
@@ -76,7 +78,8 @@ def uncertain_scene_from(
     data: Mapping[str, Any], *, folder: Path, default_name: str
 ) -> UncertainScene:
     """A scene from the tables of a scene file, with what they say of numbers that are not known
-    exactly."""
+    exactly.
+    """
     plain, spreads, correlations = split(data)
     return uncertain_scene(
         scene_from(plain, folder=folder, default_name=default_name), spreads, correlations
@@ -85,7 +88,8 @@ def uncertain_scene_from(
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
     """A scene from the tables of a scene file; record files are looked up in `folder`, then among
-    the package's records."""
+    the package's records.
+    """
     data = {"name": default_name, **data}
     if isinstance(data.get("walls"), dict):
         raise InputError("must be a list of tables: write [[walls]], not [walls]", "walls")
@@ -119,8 +123,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 class Spread(Frozen):
-    """What is known of a number: its value, and how it is distributed. See the module for the
-    forms."""
+    """What is known of a number: its value, and how it is distributed.
+
+    See the module for the forms.
+    """
 
     value: Finite | None = None
     sd: Positive | None = None
@@ -183,7 +189,8 @@ class Spread(Frozen):
 @dataclass(frozen=True)
 class UncertainScene:
     """A scene and what is not known of it: `spreads` by the place of the number, such as
-    "floor.friction" or "walls.left.gap"."""
+    "floor.friction" or "walls.left.gap".
+    """
 
     scene: Scene
     spreads: Mapping[str, Spread]
@@ -202,7 +209,8 @@ class UncertainScene:
 
     def values(self, uniform: FloatArray) -> FloatArray:
         """Numbers for points of the unit cube (n x count), by a Gaussian copula with the
-        correlation."""
+        correlation.
+        """
         from scipy import stats
 
         if not self.independent:
@@ -214,8 +222,10 @@ class UncertainScene:
         )
 
     def at(self, values: Sequence[float]) -> Scene:
-        """The scene with these values of its uncertain numbers. Raises `InputError` where one is
-        not allowed."""
+        """The scene with these values of its uncertain numbers.
+
+        Raises `InputError` where one is not allowed.
+        """
         try:
             return with_numbers(
                 self.scene, dict(zip(self.names, (float(value) for value in values), strict=True))
@@ -229,7 +239,8 @@ class UncertainScene:
 
 def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], Mapping[str, Any]]:
     """The tables of a scene file with plain numbers, the spread of each uncertain one, and the
-    table of correlations."""
+    table of correlations.
+    """
     spreads: dict[str, Spread] = {}
     tables = {key: value for key, value in data.items() if key != CORRELATION}
     plain = _plain(tables, (), spreads)
@@ -240,7 +251,8 @@ def uncertain_scene(
     scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
 ) -> UncertainScene:
     """A scene with what is not known of it; `correlations` maps "a, b" to a number between -1 and
-    1. Raises `InputError`."""
+    1. Raises `InputError`.
+    """
     names = list(spreads)
     matrix = np.eye(len(names))
     for key, value in correlations.items():
@@ -269,8 +281,10 @@ def uncertain_scene(
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
-    """The scene with some of its numbers changed, by their places; validated. Raises
-    `InputError`."""
+    """The scene with some of its numbers changed, by their places; validated.
+
+    Raises `InputError`.
+    """
     change: dict[str, Any] = {}
     walls = list(scene.walls)
     for place, value in numbers.items():

@@ -48,7 +48,8 @@ MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "ove
 @dataclass(frozen=True, kw_only=True)
 class Event:
     """One change of contact or mode at time `t` (s); `impulse` per unit mass in m/s, 0 where
-    nothing strikes."""
+    nothing strikes.
+    """
 
     t: float
     kind: str
@@ -59,8 +60,11 @@ class Event:
 
 @dataclass(frozen=True, kw_only=True)
 class Cost:
-    """What a run took. `set_up` and `wall_seconds` in s (set-up, such as building an engine's
-    scene, is not in the latter)."""
+    """What a run took.
+
+    `set_up` and `wall_seconds` in s (set-up, such as building an engine's scene, is not in the
+    latter).
+    """
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -153,7 +157,8 @@ class History(Shown):
     @property
     def overturned_at(self) -> float | None:
         """When the block overturned, s: at |theta| = pi/2, or where a history of an overturned
-        block ends; None for one that stays."""
+        block ends; None for one that stays.
+        """
         if not self.outcome.startswith("overturned"):
             return None
         event = next((one.t for one in self.event_list if one.kind == self.outcome), None)
@@ -224,7 +229,8 @@ class History(Shown):
 
     def packed(self) -> dict[str, bytes]:
         """The two files that `save` writes for a name ending in ".csv.gz", by their endings:
-        ".csv.gz", ".events.csv.gz"."""
+        ".csv.gz", ".events.csv.gz".
+        """
         table, events = self._tables(self._about())
         return {".csv.gz": _packed(table), ".events.csv.gz": _packed(events)}
 
@@ -368,7 +374,8 @@ def _mat(
 
 def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> str:
     """The outcome that a table of motion shows at its end; at rest is |theta| and |theta_dot| below
-    `still` (rad, rad/s)."""
+    `still` (rad, rad/s).
+    """
     theta = channels["theta"]
     if abs(theta[-1]) >= LYING:
         return "overturned left" if theta[-1] > 0 else "overturned right"
@@ -380,7 +387,8 @@ def outcome_of(channels: Mapping[str, NDArray[Any]], *, still: float = 1e-4) -> 
 
 def events_path(path: Path) -> Path:
     """The file of the events beside a history's CSV, compressed where that is, or beside its
-    Parquet."""
+    Parquet.
+    """
     if path.suffix.lower() == ".parquet":
         return path.with_name(f"{path.stem}.events.parquet")
     packed = path.suffix if path.name.lower().endswith(".csv.gz") else ""
@@ -405,7 +413,8 @@ def _text(value: object) -> str:
 
 class _About(Frozen):
     """What `save` says of a history in the table's first row; all of it may be missing in a file of
-    another program."""
+    another program.
+    """
 
     model_config = ConfigDict(extra="ignore")
     name: Any = None

@@ -1,5 +1,6 @@
-"""Geometry and energy of the block's state, the same for every model. Arrays or scalars, SI units,
-per unit mass.
+"""Geometry and energy of the block's state, the same for every model.
+
+Arrays or scalars, SI units, per unit mass.
 
 x and y are those of the *box's* centre: where the corners are does not depend on where the mass is.
 Models that need the mass's centre change over with `of_mass` and `of_box`; of a homogeneous block
@@ -41,7 +42,8 @@ def pivot_height(block: Block, y: Any, theta: Any) -> Any:
 
 def clearance(block: Block, side: str, gap: float, x: Any, theta: Any) -> Any:
     """Distance of the block from a place on `side`, `gap` (m) from it as it stands, m: negative is
-    beyond."""
+    beyond.
+    """
     reach = block.half_diagonal * np.sin(block.box_angle + np.abs(theta))
     return OUTWARD[side] * x + block.half_width + gap - reach
 
@@ -67,20 +69,19 @@ def top_corners(block: Block, x: Any, theta: Any) -> Any:
 
 
 def of_mass(block: Block, states: Any) -> Any:
-    """States (..., 6: x, y, theta and rates) of the mass's centre, from those of the box's
-    centre."""
+    """States of the mass's centre, from the box's centre; (..., 6: x, y, theta and rates)."""
     return states if block.centre_of_mass is None else _moved(block, states, 1.0)
 
 
 def of_box(block: Block, states: Any) -> Any:
-    """States (..., 6: x, y, theta and rates) of the box's centre, from those of the mass's
-    centre."""
+    """States of the box's centre, from the mass's centre; (..., 6: x, y, theta and rates)."""
     return states if block.centre_of_mass is None else _moved(block, states, -1.0)
 
 
 def _moved(block: Block, states: Any, sense: float) -> Any:
     """The states of a point that the block carries: by `sense` times the offset of the mass's
-    centre further."""
+    centre further.
+    """
     x, y, theta, x_dot, y_dot, w = np.moveaxis(np.asarray(states, dtype=float), -1, 0)
     (dx, dz), s, c = block.offset, np.sin(theta), np.cos(theta)
     right, up = sense * (dx * c - dz * s), sense * (dx * s + dz * c)
@@ -102,7 +103,8 @@ def energy(
     block: Block, gravity: float, y: Any, theta: Any, x_dot: Any, y_dot: Any, theta_dot: Any
 ) -> Any:
     """Kinetic plus potential energy per unit mass in the base's frame, zero for the block standing
-    still, J/kg."""
+    still, J/kg.
+    """
     y, x_dot, y_dot = mass_motion(block, y, theta, x_dot, y_dot, theta_dot)
     height = block.weaker_pivot.height
     return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (

@@ -87,7 +87,8 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
 
 def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:
     """Modes of motion read off the kinematics, for models that have contacts instead of modes
-    (tolerances in SI units)."""
+    (tolerances in SI units).
+    """
     block = scene.block
     theta, sliding = channels["theta"], np.abs(channels["slip_rate"]) > 1e-3
     flat = (np.abs(theta) < 1e-4 * block.alpha) & (np.abs(channels["theta_dot"]) < 1e-3)
@@ -104,7 +105,8 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
 
 def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
     """The side on which the block fell, from an `overturned left|right` event that the model
-    reported."""
+    reported.
+    """
     told = next((event.kind for event in events if event.kind.startswith("overturned")), None)
     if tipped.size and told is None:
         raise ValueError("a model that lets the block overturn must report the event")

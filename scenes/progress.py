@@ -26,7 +26,8 @@ Result = TypeVar("Result")
 
 class OnProgress(Protocol):
     """Called now and then with the parts done, the parts in all (of any unit), and a few words on
-    what was last."""
+    what was last.
+    """
 
     def __call__(self, done: float, total: float, what: str = "") -> None:
         """See the class."""
@@ -58,8 +59,10 @@ _announcer: Callable[[str], None] | None = None
 
 
 def announce(words: str) -> None:
-    """Says in one line what a user waits for, from any thread. It is silent where no block is
-    `announcing`."""
+    """Says in one line what a user waits for, from any thread.
+
+    It is silent where no block is `announcing`.
+    """
     if _announcer is not None:
         _announcer(words)
 
@@ -163,8 +166,10 @@ def interruptible(call: Callable[[], Result]) -> Result:
 
 @contextmanager
 def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads for kernels. When an exception (Ctrl-C is one) leaves the block, kernels that still
-    run are not waited for."""
+    """Threads for kernels.
+
+    When an exception (Ctrl-C is one) leaves the block, kernels that still run are not waited for.
+    """
     pool = ThreadPoolExecutor(count)
     try:
         yield pool

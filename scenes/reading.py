@@ -1,5 +1,6 @@
 """Reading files that somebody else may have written: only regular files, of bounded size, as UTF-8
-text."""
+text.
+"""
 
 from __future__ import annotations
 
@@ -31,8 +32,10 @@ MOST_COLUMNS, MOST_LINE = 1000, 1_000_000
 
 
 def within(folder: Path, *parts: str) -> Path:
-    """The path of what a folder holds that somebody may have sent. Raises `InputError` where it
-    leads out of the folder, as by a link."""
+    """The path of what a folder holds that somebody may have sent.
+
+    Raises `InputError` where it leads out of the folder, as by a link.
+    """
     path = folder.joinpath(*parts)
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise InputError(f"{printable(path)}: cannot be read: lies outside the run's folder")
@@ -109,8 +112,9 @@ def _inert(value: Any) -> Any:
 
 
 def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:
-    """The text of a file without a byte-order mark. Raises `InputError` where it is no file, too
-    large or not UTF-8.
+    """The text of a file without a byte-order mark.
+
+    Raises `InputError` where it is no file, too large or not UTF-8.
 
     With `latin` a file that is not UTF-8 is read as UTF-16 if it has that byte-order mark, else as
     Latin-1 if it has no control characters.
@@ -130,8 +134,10 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
 
 
 def read_arrays(path: Path, most: int = MOST_BYTES) -> dict[str, np.ndarray]:
-    """The arrays of an NPZ file, by name. Raises `InputError` where it is none, is not whole, is
-    too large or holds objects."""
+    """The arrays of an NPZ file, by name.
+
+    Raises `InputError` where it is none, is not whole, is too large or holds objects.
+    """
     import numpy as np
 
     shown = printable(path)
@@ -159,7 +165,8 @@ _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 @contextmanager
 def open_table(path: Path) -> Iterator[IO[bytes]]:
     """A table's content, open for reading; one that gzip has compressed is decompressed as it is
-    read. Raises `InputError`."""
+    read. Raises `InputError`.
+    """
     with open_regular(path, MOST_TABLE_BYTES) as stream:
         packed = stream.read(len(_GZIP)) == _GZIP
         stream.seek(0)
@@ -171,8 +178,9 @@ def open_table(path: Path) -> Iterator[IO[bytes]]:
 
 
 def read_table(path: Path, **options: Any) -> pd.DataFrame:
-    """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas. Lines that
-    start with # are remarks.
+    """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas.
+
+    Lines that start with # are remarks.
 
     Raises `InputError` where it is no such file, or a line of it is too long for a table of
     histories.
@@ -203,7 +211,8 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:
     """Every row stands on one line, of a bounded number of columns; all of them are no more than a
-    table may hold."""
+    table may hold.
+    """
     number = size = 0
     while line := stream.readline(MOST_LINE + 1):
         number += 1

@@ -1,5 +1,7 @@
-"""A scene: a rigid block on a shaking floor, perhaps beside walls. It knows nothing of the models
-that play it."""
+"""A scene: a rigid block on a shaking floor, perhaps beside walls.
+
+It knows nothing of the models that play it.
+"""
 
 from __future__ import annotations
 
@@ -60,7 +62,8 @@ class Floor(Frozen):
 
 class Wall(Frozen):
     """A rigid frictionless wall; `gap` is the clear distance in m to the block's side as it stands,
-    `restitution` is e."""
+    `restitution` is e.
+    """
 
     side: Literal["left", "right"]
     gap: NonNegative
@@ -143,7 +146,7 @@ class Scene(Shown, Frozen):
 
     @property
     def frequency_parameter(self) -> float:
-        """p = sqrt(3 g / (4 R)) in rad/s with this scene's gravity; of the weaker pivot."""
+        """P = sqrt(3 g / (4 R)) in rad/s with this scene's gravity; of the weaker pivot."""
         return self.block.weaker_pivot.frequency_parameter(self.gravity)
 
     @property
@@ -155,7 +158,8 @@ class Scene(Shown, Frozen):
     @property
     def initial_state(self) -> tuple[float, float, float, float, float, float]:
         """x, y, theta of the box's centre and their rates at t = 0 (SI, relative to the base),
-        turning about the lower corner."""
+        turning about the lower corner.
+        """
         tilt, spin, block = self.initial_rotation, self.initial_angular_velocity, self.block
         radius, alpha = block.half_diagonal, block.box_angle
         pivot = math.copysign(1.0, tilt if tilt != 0.0 else spin)

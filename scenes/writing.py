@@ -19,8 +19,10 @@ from rockcheck.scenes.errors import InputError, inert, printable
 
 
 def made(folder: Path, *parts: str) -> Path:
-    """A folder of results, made if need be, or one within it. Raises `InputError` for a part that
-    is a link."""
+    """A folder of results, made if need be, or one within it.
+
+    Raises `InputError` for a part that is a link.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for part in parts:
         folder = no_link(folder / part)
@@ -30,7 +32,8 @@ def made(folder: Path, *parts: str) -> Path:
 
 def no_link(path: Path) -> Path:
     """`path`; raises `InputError` where it is a link, through which something outside of a folder
-    of results would be written."""
+    of results would be written.
+    """
     if path.is_symlink():
         raise InputError(
             f"{printable(path)}: a link; results are not written through it: remove it"
@@ -39,8 +42,10 @@ def no_link(path: Path) -> Path:
 
 
 def write_whole(path: Path, content: str | bytes, *, named: bool = False) -> Path:
-    """Write a file so that a reader sees the old content or the new, never a part. See
-    `write_together`."""
+    """Write a file so that a reader sees the old content or the new, never a part.
+
+    See `write_together`.
+    """
     write_together({path: content}, named=named)
     return path
 
@@ -82,8 +87,10 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
 
 
 def write_new(path: Path, content: str) -> Path:
-    """Write a text file that must not be there yet, whole or not at all. Raises `FileExistsError`
-    where it is."""
+    """Write a text file that must not be there yet, whole or not at all.
+
+    Raises `FileExistsError` where it is.
+    """
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
     except OSError as error:
@@ -109,8 +116,10 @@ _FORMULA = re.compile(r"[=@＝＠](?!\Z)|[-+－＋](?!(?:inf|nan|\d*+\.?+\d*+(?:
 def table_text(
     columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None
 ) -> str:
-    """A table as CSV; floats with all their digits, or with so many significant ones. None and NaN
-    are empty cells."""
+    """A table as CSV; floats with all their digits, or with so many significant ones.
+
+    None and NaN are empty cells.
+    """
     return _csv(columns, ([_cell(value, digits) for value in row] for row in rows))
 
 
@@ -120,8 +129,11 @@ def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
 
 
 def _cells(values: Sequence[object]) -> Sequence[object]:
-    """A column's cells. Numbers are looked at one by one only where there is a NaN, the one value
-    that does not equal itself."""
+    """A column's cells.
+
+    Numbers are looked at one by one only where there is a NaN, the one value that does not equal
+    itself.
+    """
     if len(values) and isinstance(values[0], str):
         shown = {value: _cell(value, None) for value in set(values)}
         return [shown[value] for value in values]
@@ -173,5 +185,6 @@ def finite(value: Any) -> Any:
 
 def json_text(value: Any) -> str:
     """A value as indented JSON (see `finite`); what JSON does not know, such as a path, is written
-    as text."""
+    as text.
+    """
     return json.dumps(finite(value), indent=1, allow_nan=False, default=str)

@@ -73,7 +73,8 @@ def newmark_slip(velocity: float, acceleration: float, resistance: float) -> flo
 
 def rectangular_pulse_ratio(length: float, frequency_parameter: float) -> float:
     """Acceleration over g tan(alpha) above which a rectangular pulse of `length` (s) overturns a
-    slender block: 1/(1 - exp(-p t)) (Housner 1963)."""
+    slender block: 1/(1 - exp(-p t)) (Housner 1963).
+    """
     return 1.0 / -math.expm1(-frequency_parameter * length)
 
 

@@ -146,7 +146,8 @@ class Series:
 @dataclass(frozen=True)
 class Axis:
     """An axis: what it shows, its scale and limits, and its ticks with their words where they are
-    not the usual ones."""
+    not the usual ones.
+    """
 
     label: str
     log: bool = False
@@ -164,11 +165,12 @@ class Panel:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure. `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
+    """A figure.
+
+    `kind` "lines" draws `panels`; any other is drawn from `data` by its drawer in
     `rockcheck.reports.drawers`. A `live` one of one panel is read under the pointer on the page.
-    Panels have common scales where they are `shared`.
-    `data` of "lines" gives their x axis in another unit, too: `per_unit`, `other_unit`,
-    `other_label`.
+    Panels have common scales where they are `shared`. `data` of "lines" gives their x axis in
+    another unit, too: `per_unit`, `other_unit`, `other_label`.
     """
 
     name: str
@@ -205,8 +207,7 @@ Block = Table | Plot | Text
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """When it was made (UTC, ISO 8601), in how many processes and how long (s), with what, on
-    what."""
+    """When it was made (UTC, ISO 8601), by how many processes, how long (s), with what, on what."""
 
     created: str
     jobs: int

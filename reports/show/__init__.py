@@ -17,8 +17,7 @@ if TYPE_CHECKING:
 
 
 def _later(module: str, name: str) -> Callable[[Any], Figure]:
-    """A function that draws. matplotlib takes a second to import: only what is drawn asks for
-    it."""
+    """A drawing function, imported only when called: matplotlib takes a second."""
 
     def draw(what: Any) -> Figure:
         drawn: Figure = getattr(importlib.import_module(f"{__name__}.{module}"), name)(what)

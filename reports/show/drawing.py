@@ -1,5 +1,7 @@
-"""What `.plot()` draws. Imports matplotlib, and is therefore imported only where something is
-drawn."""
+"""What `.plot()` draws.
+
+Imports matplotlib, and is therefore imported only where something is drawn.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,8 @@ TRACKS = {"wall impact": "v", "floor impact": "^", "slip": "_", "landing": "x", 
 
 class NotebookFigure(Figure):
     """A matplotlib figure that a notebook shows without a display and without pyplot, which would
-    keep it for ever."""
+    keep it for ever.
+    """
 
     def _repr_png_(self) -> bytes:
         png = io.BytesIO()
@@ -130,8 +133,10 @@ def _tracks(axes: Any, history: History) -> None:
 
 
 def discrepancy_figure(found: Discrepancy) -> Figure:
-    """Rotation of both histories, and their difference over the time that was compared. Raises
-    `InputError` where they were not kept."""
+    """Rotation of both histories, and their difference over the time that was compared.
+
+    Raises `InputError` where they were not kept.
+    """
     if found.histories is None:
         raise InputError("this comparison has not kept its histories")
     reference, candidate = found.histories
@@ -152,7 +157,8 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
 
 def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
     """Acceleration (g) and velocity (m/s) of each recording over time, and its spectral
-    acceleration at 5 % damping."""
+    acceleration at 5 % damping.
+    """
     figure = new_figure(9.0, 1.9 * len(recordings) + 0.4)
     for (name, record), (acceleration, velocity, spectrum) in zip(
         recordings,

@@ -95,7 +95,8 @@ def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> 
 
 def axis_labels(record: bool) -> tuple[str, str]:
     """What the axes of a spectrum show, in plain text: frequency and amplitude ratio, or with a
-    record the block's size and the record's scale."""
+    record the block's size and the record's scale.
+    """
     if record:
         return "size of the block / its own", "scale of the record"
     return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
@@ -103,7 +104,8 @@ def axis_labels(record: bool) -> tuple[str, str]:
 
 def figure(plot: Plot) -> Figure:
     """Spectra of a plot of the kind "spectra" (see `validation.studies.spectrum`), each where its
-    `place` is: row, rows and column."""
+    `place` is: row, rows and column.
+    """
     from matplotlib.figure import Figure
 
     data = plot.data
@@ -182,7 +184,8 @@ def _legend(figure: Figure, data: Any) -> None:
 
 def write_scripts(plot: Plot, folder: Path) -> list[str]:
     """Write what the page's script needs to be clicked on: `<name>.nodes.js`, small, which the page
-    reads at once, and `<name>.histories.js`, read when a node is played. Returns the scripts."""
+    reads at once, and `<name>.histories.js`, read when a node is played. Returns the scripts.
+    """
     data = dict(plot.data, stem=plot.name, axes=axis_labels(plot.data["record"]))
     panels = data["panels"]
     data["key"] = outcome_key(panels)

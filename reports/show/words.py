@@ -1,5 +1,6 @@
 """How scenes, histories and whatever else holds figures show themselves in a notebook: escaped
-HTML, and a few words; numbers and names as people read them."""
+HTML, and a few words; numbers and names as people read them.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +24,8 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number for people: a few digits, a true minus sign, powers of ten where it is very large or
-    small."""
+    small.
+    """
     if value is None:
         return "–"
     text = f"{value:.{digits}g}"
@@ -210,8 +212,10 @@ def duration(seconds: float) -> str:
 
 
 def moment(created: str) -> str:
-    """An ISO 8601 time to the minute. Any other text, as a run from elsewhere may hold, is returned
-    unchanged."""
+    """An ISO 8601 time to the minute.
+
+    Any other text, as a run from elsewhere may hold, is returned unchanged.
+    """
     try:
         return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
     except ValueError:

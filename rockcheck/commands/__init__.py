@@ -1,5 +1,6 @@
 """The commands of `rockcheck`, a module each, and what they share: options, tables on stdout,
-progress on stderr, JSON."""
+progress on stderr, JSON.
+"""
 
 from __future__ import annotations
 
@@ -102,7 +103,8 @@ def speaking(voice: Voice) -> Iterator[None]:
 
 class _Screen(Console):
     """A console whose text steers no terminal: paths, and names in files that somebody sent, may
-    hold any characters."""
+    hold any characters.
+    """
 
     def print(self, *objects: Any, **options: Any) -> None:
         super().print(*(inert(one) if isinstance(one, str) else one for one in objects), **options)
@@ -110,7 +112,8 @@ class _Screen(Console):
 
 def console() -> Console:
     """Where tables go: stdout, at most as wide as the terminal, 80 columns where there is none;
-    coloured on a terminal only."""
+    coloured on a terminal only.
+    """
     return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
 
 
@@ -131,7 +134,8 @@ def tell_notes(history: History, of: str = "") -> None:
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:
     """Names what of a set of records is not played: vertical components (`hint`: what plays them),
-    and files that are no records."""
+    and files that are no records.
+    """
     vertical = [name for name in names if not isinstance(name, Odd)]
     said = f"vertical; {hint}" if hint else "vertical"
     lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
@@ -141,7 +145,8 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
 
 def answer(value: Any) -> None:
     """The command's result as JSON on stdout, where `--json` asks for it; numbers that are not
-    finite become null."""
+    finite become null.
+    """
     if _voice.get() == "json":
         print(json_text(value))
 
@@ -154,7 +159,8 @@ EVERY, EARLY = 10.0, 2.0
 @contextmanager
 def progress(title: str) -> Iterator[OnProgress]:
     """How far the work is and the time left, on stderr: a bar on a terminal, elsewhere lines;
-    nothing where a command is quiet."""
+    nothing where a command is quiet.
+    """
     screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
@@ -188,7 +194,8 @@ def progress(title: str) -> Iterator[OnProgress]:
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
     """Lines for a log or whoever reads no terminal, until it is `over`; none on a work of a few
-    seconds."""
+    seconds.
+    """
     wait = EARLY
     while not over.wait(wait):
         left = task.time_remaining
@@ -205,7 +212,8 @@ def studied(
     study: Study, options: Played, formats: Sequence[str] = FORMATS, **how: Any
 ) -> NoReturn:
     """Run a study with progress, write its page with figures in these formats, say what it found;
-    ends with its exit code."""
+    ends with its exit code.
+    """
     from rockcheck.validation.study import run
 
     folder = usable_folder(options.out)
@@ -237,7 +245,8 @@ def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FO
 
 def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
     """The choice that was `given`; raises `InputError` naming its `kind` and suggesting the
-    nearest."""
+    nearest.
+    """
     known = tuple(choices)
     for choice in known:
         if choice == given:
@@ -276,7 +285,8 @@ def save_picture(figure: Figure, path: Path) -> None:
 
 def report_file(text: str) -> str:
     """Write a traceback into a file that only the user can read; returns its path, "" where that
-    cannot be done."""
+    cannot be done.
+    """
     try:
         handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
@@ -288,7 +298,8 @@ def report_file(text: str) -> str:
 
 def usable_folder(folder: Path, *parts: str) -> Path:
     """A folder, or one within it, made if need be; raises `InputError` where it cannot be written,
-    or lies behind a link in `folder`."""
+    or lies behind a link in `folder`.
+    """
     path = folder.joinpath(*parts)
     try:
         made(folder, *parts)

@@ -1,5 +1,6 @@
 """The command `rockcheck`: one module a command under rockcheck.commands; here they meet, and
-errors become one line."""
+errors become one line.
+"""
 
 from __future__ import annotations
 
@@ -91,9 +92,11 @@ JsonOption = Annotated[
 
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
-    """A command with the options that all of them have, --quiet and --json. A parameter that is a
-    dataclass is a group of options, its fields. One that is `timed` says last how long it took in
-    all, whatever its verdict: its user waits for more than the simulations."""
+    """A command with the options that all of them have, --quiet and --json.
+
+    A parameter that is a dataclass is a group of options, its fields. One that is `timed` says last
+    how long it took in all, whatever its verdict: its user waits for more than the simulations.
+    """
     own = inspect.signature(does, eval_str=True).parameters.values()
     groups: dict[str, Any] = {
         one.name: one.annotation for one in own if is_dataclass(one.annotation)
@@ -178,8 +181,10 @@ def _loaded(name: str) -> Any:
 
 
 class _Commands(typer.core.TyperGroup):
-    """The commands by name. Only that which is asked for is imported: half of them need the
-    compiler, or what draws."""
+    """The commands by name.
+
+    Only that which is asked for is imported: half of them need the compiler, or what draws.
+    """
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -220,12 +225,15 @@ def common(
     ] = False,
 ) -> None:
     """Simulate a rigid block on a shaking floor with several models, compare them, and judge them
-    against tolerances."""
+    against tolerances.
+    """
 
 
 def main(arguments: Sequence[str] | None = None, *, began: float | None = None) -> int:
-    """Run the command line; returns the exit code, one of `EXIT_CODES`. The program `began` then
-    (of `time.perf_counter`; None: now)."""
+    """Run the command line; returns the exit code, one of `EXIT_CODES`.
+
+    The program `began` then (of `time.perf_counter`; None: now).
+    """
     with _readers_may_go():
         try:
             code = app(
@@ -272,7 +280,8 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
 
 class _Pipe:
     """A text stream whose reader may go, as that of `rockcheck scenes | head -1` does: the rest is
-    then written to nobody."""
+    then written to nobody.
+    """
 
     def __init__(self, stream: Any) -> None:
         self._stream = stream

@@ -141,7 +141,8 @@ def run(
 
 def headline(found: Discrepancy) -> str:
     """The comparison in one sentence: whether the outcomes agree, and how far the rotations are
-    apart."""
+    apart.
+    """
     assert found.histories is not None
     reference, candidate = (history.fate for history in found.histories)
     same = found["outcome_agrees"] == 1.0

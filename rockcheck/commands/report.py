@@ -1,5 +1,6 @@
 """`rockcheck report`: render a finished run again, or one figure of it for a paper; and how any
-command writes a finished run into its folder: run.json, tables, pages."""
+command writes a finished run into its folder: run.json, tables, pages.
+"""
 
 from __future__ import annotations
 
@@ -82,8 +83,10 @@ SILENT, PATIENCE = 2.0, 600.0
 
 @contextmanager
 def _turn(folder: Path) -> Iterator[None]:
-    """Within this block no other run writes into `folder`. A run that waits says for which one, and
-    gives up after `PATIENCE` s."""
+    """Within this block no other run writes into `folder`.
+
+    A run that waits says for which one, and gives up after `PATIENCE` s.
+    """
     lock, holder = FileLock(no_link(folder / LOCK)), folder / HOLDER
     try:
         lock.acquire(timeout=SILENT)
@@ -110,7 +113,8 @@ def _turn(folder: Path) -> Iterator[None]:
 
 def keep(run: Run, folder: Path) -> Path:
     """Write run.json, its schema and the tables (the histories are there already); returns
-    run.json. Two runs take turns."""
+    run.json. Two runs take turns.
+    """
     from rockcheck.reports.document import csv
 
     with _turn(folder):

@@ -201,8 +201,10 @@ def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
 
 
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
-    """The models by name, each with its settings; of all, those that are installed. Raises
-    `InputError` for an unknown one."""
+    """The models by name, each with its settings; of all, those that are installed.
+
+    Raises `InputError` for an unknown one.
+    """
     if names == ALL:
         found: dict[str, dict[str, Any]] = {
             name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
@@ -240,7 +242,8 @@ def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
 
 def tell_faults(finished: Run, folder: Path) -> None:
     """A line on stderr for each exception that no model may raise: of rockcheck's own models to
-    report, of one's own to mend."""
+    report, of one's own to mend.
+    """
     for cell in finished.cells:
         if not cell.traceback:
             continue

@@ -1,5 +1,6 @@
 """`rockcheck warm`: fills the cache of compiled code ahead, in processes side by side: a user then
-waits for no compiler."""
+waits for no compiler.
+"""
 
 from __future__ import annotations
 

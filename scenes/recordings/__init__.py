@@ -64,8 +64,10 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
 
 
 def read_record(path: Path, reading: Reading | None = None) -> Recording:
-    """The one component of a record file, or the one that `reading` names. Raises as
-    `read_components`."""
+    """The one component of a record file, or the one that `reading` names.
+
+    Raises as `read_components`.
+    """
     found = read_components(path, reading)
     if len(found) > 1:
         raise fault(

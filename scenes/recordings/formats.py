@@ -67,8 +67,7 @@ _UP = {400: "up", 401: "down"}
 
 
 def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
-    """PEER: header lines, one of which says the units and one NPTS and DT, then accelerations in
-    g."""
+    """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
     only_for_tables(path, reading, "a PEER file")
     header = match = None
     for index, line in enumerate(lines[:20]):
@@ -106,8 +105,7 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
 
 
 def _at2_component(lines: list[str]) -> str:
-    """What the second line ends in: event, date, station, component; "" where it is another
-    line."""
+    """Event, date, station, component: the end of the second line; "" where it is another."""
     fields = lines[1].split(",") if len(lines) > 1 else []
     name = fields[-1].strip()[:10] if len(fields) > 2 else ""
     return printable(name) if re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
@@ -226,7 +224,8 @@ class _Channel:
 @dataclass(frozen=True)
 class _Block:
     """What the headers say of a block of accelerations: how many, the line and the value (s) of the
-    time step, the unit, and that numbers stand `across` on a line, each `width` wide."""
+    time step, the unit, and that numbers stand `across` on a line, each `width` wide.
+    """
 
     count: str
     step: tuple[int, float]
@@ -347,7 +346,8 @@ def _recording(
 
 def _check_seconds(path: Path, index: int, stated: str | None, record: Recording) -> None:
     """The whole seconds that a block states must be those of its samples: a time step of another
-    record would be a silent fault."""
+    record would be a silent fault.
+    """
     length = len(record.samples) * record.time_step
     if stated and abs(length - int(stated[:9])) > 1.0 + 0.01 * length:
         raise fault(

@@ -22,7 +22,8 @@ def peak_acceleration(record: Recording) -> float:
 
 def velocity(record: Recording) -> NDArray[np.float64]:
     """Ground velocity at the samples in m/s, from rest, exact for straight lines between samples;
-    no baseline correction."""
+    no baseline correction.
+    """
     means = (record.samples[1:] + record.samples[:-1]) / 2.0
     return np.concatenate([[0.0], np.cumsum(record.time_step * means)])
 

@@ -102,8 +102,10 @@ def option(name: str, value: str | float) -> str:
 
 
 def number(path: Path, line: int, word: str) -> float:
-    """The finite number that `word` is, in Fortran's notation or C's. Raises `InputError` where it
-    is none."""
+    """The finite number that `word` is, in Fortran's notation or C's.
+
+    Raises `InputError` where it is none.
+    """
     if _NUMBER.fullmatch(word):
         value = float(word.translate(_EXPONENT))
         if abs(value) <= MOST:
@@ -120,7 +122,8 @@ def is_number(word: str) -> bool:
 
 def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
     """All numbers of numbered lines, between blanks; where some have run together and there are
-    `count`, in columns of one width."""
+    `count`, in columns of one width.
+    """
     rows = [(n, line.rstrip()) for n, line in lines if not line.isspace() and line]
     cells = [(n, word) for n, line in rows for word in line.split()]
     if count and not all(is_number(word) for _, word in cells):
@@ -130,7 +133,8 @@ def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> lis
 
 def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
     """The cells of so many numbers in columns of one width, as Fortran writes them; [] where the
-    lines are not cut so."""
+    lines are not cut so.
+    """
     width, rest = divmod(sum(len(line) for _, line in rows), count)
     uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(
         len(line) % width for _, line in rows if width
@@ -150,7 +154,8 @@ def known_unit(text: str) -> str:
 
 def settled_unit(path: Path, stated: str, reading: Reading) -> str:
     """The unit that the file states or the reader was told; raises `InputError` where neither is,
-    or both and they differ."""
+    or both and they differ.
+    """
     if not stated and reading.unit is None:
         raise fault(
             path,
@@ -167,7 +172,8 @@ def settled_unit(path: Path, stated: str, reading: Reading) -> str:
 
 def settled_step(path: Path, stated: float, reading: Reading) -> float:
     """The time step in s that a header states; raises `InputError` where the reader was told
-    another."""
+    another.
+    """
     if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
         raise fault(
             path,
@@ -179,7 +185,8 @@ def settled_step(path: Path, stated: float, reading: Reading) -> float:
 
 def only_for_tables(path: Path, reading: Reading, form: str) -> None:
     """Raises `InputError` where an option is given that means nothing to a format with a header of
-    its own."""
+    its own.
+    """
     for name in ("column", "header_lines", "decimal"):
         if getattr(reading, name) is not None:
             raise fault(

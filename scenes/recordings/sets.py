@@ -1,5 +1,6 @@
 """Sets of recorded motions: which files are meant, and which of their components shake a block from
-side to side."""
+side to side.
+"""
 
 from __future__ import annotations
 
@@ -98,8 +99,10 @@ def motions_of(
 
 
 def _read(paths: Iterable[Path], reading: Reading) -> tuple[dict[Path, list[Recording]], list[Odd]]:
-    """The components of each file, and why others have none. Raises `InputError` where that is one
-    that was named, or all of them."""
+    """The components of each file, and why others have none.
+
+    Raises `InputError` where that is one that was named, or all of them.
+    """
     read: dict[Path, list[Recording]] = {}
     faults: list[InputError] = []
     for path in paths:
@@ -153,7 +156,8 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
     """The file with the vertical component of `path`: the one whose name agrees in most letters
-    around the component."""
+    around the component.
+    """
     fits: dict[int, list[Path]] = {}
     for other in alone:
         for said in _UPWARD.finditer(other.name):

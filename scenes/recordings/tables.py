@@ -41,7 +41,8 @@ NumberedLines = list[tuple[int, str]]
 @dataclass(frozen=True)
 class _Layout:
     """How the lines of a table are cut: at `separator` (None: at blanks), with a comma before the
-    decimals or not."""
+    decimals or not.
+    """
 
     separator: str | None
     decimal_comma: bool
@@ -69,7 +70,8 @@ class _Layout:
 
 def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
     """A column of times and one of accelerations, or accelerations alone; lines that start with #
-    or % are remarks."""
+    or % are remarks.
+    """
     if reading.component is not None:
         raise fault(path, "a table has columns; give the option column in place of component")
     skipped = reading.header_lines or 0
@@ -214,7 +216,8 @@ def _names_of(
 
 def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, str]]:
     """The column of times, None where there is none, and that of accelerations with the unit that
-    its name states."""
+    its name states.
+    """
     names = cells.names
     times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
     time: int | None = times[0] if len(times) == 1 else None

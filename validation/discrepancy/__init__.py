@@ -1,5 +1,4 @@
-"""How far two histories differ: measures, `compare`, statistics, closed forms, measured
-histories."""
+"""How far two histories differ: measures, `compare`, closed forms, measured histories."""
 
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 

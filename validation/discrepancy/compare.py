@@ -159,7 +159,8 @@ def describe(
     measures: Collection[str] | None = None,
 ) -> tuple[Figure, ...]:
     """The figures of one history: peak rotation, last place, impacts, hop, penetration and so on;
-    up to `until` (s)."""
+    up to `until` (s).
+    """
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
     window = "" if until is None else f"{until:g}s"
     chosen = (
@@ -204,7 +205,8 @@ def evaluate(
 
 def too_short(history: History, until: float | None) -> str:
     """What is missing of a history up to `until`, empty where nothing is: one that ended by falling
-    is whole."""
+    is whole.
+    """
     end = float(history.channels["t"][-1])
     if until is None or history.outcome in TURNS or end >= until - 1.5 * _step(history):
         return ""

@@ -31,7 +31,8 @@ class Stored(Frozen):
 
 def value_words(value: float | None, *, yes_no: bool) -> str:
     """A figure's value for people: "-" where there is none, yes or no where the measure asks a
-    question."""
+    question.
+    """
     if value is None:
         return "-"
     return ("yes" if value else "no") if yes_no else f"{value:.6g}"
@@ -73,7 +74,8 @@ class Figure(Stored):
     @property
     def of_a_fall(self) -> bool:
         """Whether it is the peak rotation of a block that has fallen, which is no peak: the
-        measure's note says so."""
+        measure's note says so.
+        """
         return self.measure == "peak_rotation" and bool(self.note)
 
 
@@ -152,7 +154,8 @@ def between_rows(unit: str, frequency_parameter: float, gravity: float, step: fl
 @dataclass(frozen=True)
 class WindowedHistory:
     """One history as the figures see it: cut to a window, with the scene's gravity and walls where
-    they are known."""
+    they are known.
+    """
 
     history: History
     scene: Scene | None = None
@@ -184,8 +187,10 @@ class WindowedHistory:
         return np.asarray(self.history.channels[name][self.inside], dtype=float)
 
     def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
-        """Events of these kinds within the window, from `start` (s) on. A landing that strikes is a
-        floor impact, whichever name the model has for it."""
+        """Events of these kinds within the window, from `start` (s) on.
+
+        A landing that strikes is a floor impact, whichever name the model has for it.
+        """
         return [
             event
             for event in map(_impact, self.history.event_list)
@@ -263,7 +268,7 @@ class Pair:
 
     @property
     def theta(self) -> tuple[Array, Array]:
-        """theta of both, in alpha (in rad where the block is unknown)."""
+        """Theta of both, in alpha (in rad where the block is unknown)."""
         scale = self.alpha or 1.0
         reference, candidate = self.channels("theta")
         return reference / scale, candidate / scale
@@ -277,8 +282,7 @@ class Pair:
 
     @property
     def rocking(self) -> tuple[Array, Array]:
-        """`theta` where there is something to have a ratio to: the reference's peak is no
-        nothing."""
+        """`theta`, where the reference's peak is large enough to divide by."""
         floor = Measure.resolution
         if self.alpha is not None and len(self.time) > 1:
             g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
@@ -310,7 +314,7 @@ class Pair:
         return float(np.sum(steps * 0.5 * (values[1:] + values[:-1])) / np.sum(steps))
 
     def rms(self, columns: tuple[Array, Array]) -> float:
-        """sqrt <d^2>."""
+        """Sqrt <d^2>."""
         return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
 
     @cached_property
@@ -329,7 +333,8 @@ class Pair:
     @cached_property
     def impacts(self) -> MatchedImpacts:
         """The impacts of both within the common time, matched; a history without any event, unlike
-        the other's, does not know them."""
+        the other's, does not know them.
+        """
         both = [
             WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
             for one in (self.reference, self.candidate)
@@ -343,7 +348,8 @@ class Pair:
 @dataclass(frozen=True)
 class MatchedImpacts:
     """Impacts of two histories: pairs (reference, candidate), and those of either that have no
-    counterpart."""
+    counterpart.
+    """
 
     pairs: Sequence[tuple[Event, Event]]
     only_reference: Sequence[Event]

@@ -64,7 +64,8 @@ class Landing(Stored):
 
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
         """The law that a history of the scene followed; None where it ends before, or was on its
-        own way before."""
+        own way before.
+        """
         first = self.parts - self.start
         rows = min(
             len(history.channels["theta"]) - self.start,

@@ -64,8 +64,10 @@ class Measured(Frozen):
     align: bool = False
 
     def simulate(self, scene: Scene) -> History:
-        """The measured history of the scene, from its t = 0 to its end. Raises `InputError` for a
-        file that is not usable."""
+        """The measured history of the scene, from its t = 0 to its end.
+
+        Raises `InputError` for a file that is not usable.
+        """
         if scene.name not in self.files:
             raise InputError(f"no measured history of scene {scene.name!r}", "files")
         given = self.files[scene.name]

@@ -65,8 +65,7 @@ class Motion(Stored):
 
 
 def motion_of(history: History, scene: Scene | None = None) -> Motion:
-    """The figures of a history; `scene` tells of its walls, and of the block where a file does
-    not."""
+    """The figures of a history; `scene` gives the walls, and the block where the file has none."""
     block, channels = scene.block if scene else history.block, history.channels
     theta = np.asarray(channels["theta"], dtype=float)
     stands = not history.outcome.startswith("overturned")
@@ -89,7 +88,8 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
 
 def largest_slip(history: History) -> float:
     """Largest |slip|, m, also of a block that falls; 0 where it is no more than rounding of the
-    pivot's place."""
+    pivot's place.
+    """
     largest = float(np.max(np.abs(history.channels["slip"])))
     height = history.half_height or 0.0
     return largest if largest > ROUNDING * height else 0.0
@@ -130,7 +130,8 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
 
 def largest_reach(history: History, scene: Scene, side: str) -> float:
     """How far (m) the block reaches beyond its first place on `side`: the clear distance without
-    which it would strike a wall there."""
+    which it would strike a wall there.
+    """
     x, theta = history.channels["x"], history.channels["theta"]
     return float(np.max(-kinematics.clearance(scene.block, side, 0.0, x, theta)))
 

@@ -1,5 +1,6 @@
 """How far two samples of an ensemble are apart: distributions of the peaks, agreement on
-overturning, bias and scatter."""
+overturning, bias and scatter.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ FEW = "fewer than two scenes in which both rock and neither falls"
 @dataclass(frozen=True)
 class Sample:
     """What one model made of an ensemble: peak rotation (alpha) and outcome of each scene; NaN and
-    "" where it failed."""
+    "" where it failed.
+    """
 
     peaks: Array
     outcomes: Sequence[str]

@@ -1,5 +1,6 @@
 """The models by the names that suites and the command line use; what each is built from and depends
-on."""
+on.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ class Model(Protocol):
 @dataclass(frozen=True)
 class Family:
     """A named kind of model: a class of a package, the settings that the name fixes, and the
-    libraries its results depend on."""
+    libraries its results depend on.
+    """
 
     module: str
     class_name: str
@@ -114,7 +116,8 @@ FAMILIES: dict[str, Family] = {
 
 def family(name: str) -> Family:
     """The family of that name, or of "module:Class" for a model of the user's own; raises
-    `InputError` suggesting the nearest."""
+    `InputError` suggesting the nearest.
+    """
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
@@ -130,7 +133,8 @@ def engine_names() -> tuple[str, ...]:
 
 def not_installed(name: str) -> str:
     """What to say where the engine of that model is not installed; empty where it is, or needs
-    none."""
+    none.
+    """
     if family(name).module != ENGINES:
         return ""
     engine = _class_of(name)
@@ -156,7 +160,8 @@ def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
 
 def is_own(name: str) -> bool:
     """True for a user-defined model (module:Class); its code may lie beside the suite or in the
-    working directory."""
+    working directory.
+    """
     return ":" in name
 
 
@@ -182,7 +187,8 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
 
 def home(name: str) -> str:
     """The module in which the model of that name is defined; for one of the user's own the one that
-    it is named after."""
+    it is named after.
+    """
     return family(name).module if is_own(name) else str(_class_of(name).__module__)
 
 
@@ -212,7 +218,8 @@ def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
 
 def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
     """`build`, also for a model of the user's own, whose code is imported: for worker processes, of
-    what was allowed."""
+    what was allowed.
+    """
     if not is_own(name):
         return build(name, settings)
     check_allowed(name, (name,))

@@ -86,7 +86,8 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
 
 def cores() -> int:
     """How many threads this process may use: one in a worker, else what its run says, or one a
-    core."""
+    core.
+    """
     one = os.environ.get("NUMBA_NUM_THREADS") == "1"
     return 1 if one else THREADS.get() or os.cpu_count() or 1
 
@@ -159,8 +160,9 @@ class Pool:
                 os.environ.pop(key, None) if value is None else os.environ.update({key: value})
 
     def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
-        """Runs the calls and yields each as it ends. The caller may put calls into `waiting`, or
-        take them out, meanwhile.
+        """Runs the calls and yields each as it ends.
+
+        The caller may put calls into `waiting`, or take them out, meanwhile.
 
         What has not ended at `until` (of `time.monotonic`) is ended and not yielded.
         """
@@ -189,8 +191,10 @@ class Pool:
                 future.cancel()
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
-        """Gives each process a call, and one ahead. A call that waits for another one to compile is
-        passed over."""
+        """Gives each process a call, and one ahead.
+
+        A call that waits for another one to compile is passed over.
+        """
         compiling = {
             call.compiles for call, _ in running.values() if call.compiles
         } - self._compiled
@@ -297,8 +301,10 @@ def death(code: int) -> str:
 
 
 class Cluster(Pool):
-    """The workers of a Dask cluster. Of the calls that may have to compile the same code, one goes
-    first on each machine."""
+    """The workers of a Dask cluster.
+
+    Of the calls that may have to compile the same code, one goes first on each machine.
+    """
 
     def __init__(self, address: str, memory_mb: float | None = None) -> None:
         super().__init__(1, memory_mb)

@@ -1,5 +1,6 @@
 """What a result depends on: code, libraries, scene and settings, as one key; and what the run's
-machine was."""
+machine was.
+"""
 
 from __future__ import annotations
 
@@ -146,8 +147,10 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
 
 @cache
 def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
-    """The file of a module, None where there is none (a name inside a module). No code of
-    `search_path` is run."""
+    """The file of a module, None where there is none (a name inside a module).
+
+    No code of `search_path` is run.
+    """
     parts = name.split(".")
     for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
         try:
@@ -176,7 +179,8 @@ def _imports(
     path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]
 ) -> Iterable[str]:
     """Names of the modules that a file of `package` imports; of a package only where something that
-    is no module is taken from it."""
+    is no module is taken from it.
+    """
     for node in _source_of(path)[0]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)

@@ -74,7 +74,8 @@ class Store:
         history: History | None = None,
     ) -> None:
         """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record;
-        `history` is what the files hold."""
+        `history` is what the files hold.
+        """
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
@@ -86,7 +87,8 @@ class Store:
 
     def load(self, name: str) -> History:
         """The history of that name: from memory where it was put or loaded lately, else from its
-        file. Raises `InputError`."""
+        file. Raises `InputError`.
+        """
         found = self._recent.get(name)
         if found is None:
             for suffix in SUFFIXES:
@@ -142,7 +144,8 @@ class Store:
 
     def prune(self, now: float | None = None) -> None:
         """Remove results that no run has used for two weeks, and the leavings of killed runs after
-        a day."""
+        a day.
+        """
         now = time.time() if now is None else now
         for path in [
             *(path for kind in self.kinds for path in (self.folder / kind).iterdir()),

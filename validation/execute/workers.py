@@ -81,8 +81,7 @@ def play(task: Task | BatchTask) -> Played:
 
 
 def _play_batch(task: BatchTask, began: float) -> Played:
-    """Peak |theta| in alpha and outcome of each scene; None and the reason where the model
-    failed."""
+    """Peak |theta| (alpha) and outcome of each scene; None and the reason where it failed."""
     peaks: list[float | None] = []
     outcomes: list[str] = []
     cost = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "set_up": 0.0, "steps": 0, "evaluations": 0}
@@ -116,7 +115,8 @@ def _simulate(task: Work, scene: Scene) -> History:
 
 def _numerical(task: Task, history: History) -> dict[str, Any] | None:
     """The numerical uncertainty of a run, None for a model without a step; a coarser run that fails
-    is not converged."""
+    is not converged.
+    """
     try:
         found = numerical_uncertainty(build_own(task.family, task.settings), task.scene, history)
     except (ModelFailure, InputError) as error:

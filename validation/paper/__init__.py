@@ -28,7 +28,8 @@ KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
 @dataclass(frozen=True, eq=False)
 class Panel:
     """One spectrum to be played: its scene, and the paper's figure that shows it, None for one's
-    own."""
+    own.
+    """
 
     name: str
     title: str
@@ -49,7 +50,8 @@ def title_of(figure: int) -> str:
 
 def paper_panels(*figures: int) -> tuple[Panel, ...]:
     """The seven spectra of each of these figures, by default all: unobstructed, then gap by gap
-    with e = 0 and e = 1."""
+    with e = 0 and e = 1.
+    """
     places = [None, *itertools.product(GAPS, RESTITUTIONS)]
     return tuple(_panel(n, place) for n in figures or FIGURES for place in places)
 

@@ -211,7 +211,8 @@ def towards_the_wall(paper: Paper) -> Measured:
 
 def matters_most(paper: Paper, most: str) -> Measured:
     """Nodes that are safe in one of two spectra only which differ in one parameter alone, mean over
-    all such pairs."""
+    all such pairs.
+    """
     means = {}
     for k, axis in enumerate(AXES):
         two = combinations(np.moveaxis(paper.safe, k, 0), 2)
@@ -297,7 +298,8 @@ def restitution_rules(paper: Paper) -> Measured:
 
 def likelier_side(paper: Paper) -> Measured:
     """Nodes that overturn clockwise against counterclockwise without a wall: up to an amplitude, up
-    to a frequency, and in all."""
+    to a frequency, and in all.
+    """
     rows, ends, whole = [], [], []
     a = paper.amplitudes
     for mu, outcomes in zip(AXES["friction"], paper.alone, strict=True):
@@ -323,7 +325,8 @@ def likelier_side(paper: Paper) -> Measured:
 
 def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
     """At how many frequencies the lowest overturning is clockwise, up to the one at which that side
-    leads by most."""
+    leads by most.
+    """
     falls = outcomes != SAFE
     some = np.flatnonzero(falls.any(axis=0))
     clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
@@ -349,7 +352,8 @@ def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.i
 @dataclass(frozen=True)
 class Shown:
     """The case that shows a finding best: its place or friction, in words, and the nodes that its
-    map marks; then rows and what the finding says, as of any measure."""
+    map marks; then rows and what the finding says, as of any measure.
+    """
 
     case: str
     figure: int
@@ -485,7 +489,8 @@ class Beyond:
 
 def claims_of(paper: Paper) -> list[Claim]:
     """The paper's sentences, judged: a sentence holds where all rows do, or, of what is said to be
-    so generally, most of them."""
+    so generally, most of them.
+    """
     found = []
     for about in SENTENCES["claim"]:
         rows, says = globals()[about["measure"]](paper, **about.get("with", {}))

@@ -1,2 +1,1 @@
-"""The studies: each lists tasks, plays them, gathers a finding (see
-`rockcheck.validation.study`)."""
+"""The studies: each lists tasks, plays them, gathers a finding (`rockcheck.validation.study`)."""

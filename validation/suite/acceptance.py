@@ -1,5 +1,6 @@
 """`accept`: the figures of a run become the expected ones of the suite's tolerance file, which
-keeps its remarks and order."""
+keeps its remarks and order.
+"""
 
 from __future__ import annotations
 

@@ -80,8 +80,10 @@ class Change(Stored):
 
 
 def changes(before: Run, after: Run) -> list[Change]:
-    """All that differs, verdicts first, then figures, the one that moved most first. Raises
-    `InputError` for runs of two suites."""
+    """All that differs, verdicts first, then figures, the one that moved most first.
+
+    Raises `InputError` for runs of two suites.
+    """
     if before.suite != after.suite:
         raise InputError(
             f"the runs are of two suites, {printable(before.suite)} and {printable(after.suite)}"
@@ -105,7 +107,8 @@ def changes(before: Run, after: Run) -> list[Change]:
 def difference(before: Run, after: Run, most: int | None = None) -> Finding:
     """What changed between two finished runs of a suite, with at most so many of the figures that
     moved in its table; exit 1 where a verdict changed or a cell is in one of them only. Raises
-    `InputError` for runs of two suites."""
+    `InputError` for runs of two suites.
+    """
     found = changes(before, after)
     counts = Counter(change.what for change in found)
     words = ", ".join(f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items())
@@ -179,7 +182,8 @@ def _moved(name: str, was: float | None, now: float | None) -> bool:
 
 class Moment(Stored):
     """One run in a history: when, of which commit and version, its verdict, and every judged figure
-    by "scene, model: check"."""
+    by "scene, model: check".
+    """
 
     created: str
     commit: str = ""
@@ -210,7 +214,8 @@ def moment_of(run: Run, folder: Path) -> Moment:
 
 def commit_of(folder: Path) -> str:
     """The commit that is checked out, with "-dirty" where files have changed since; "" outside of a
-    repository."""
+    repository.
+    """
     git = shutil.which("git")
     if git:
         words = [
@@ -234,7 +239,9 @@ def commit_of(folder: Path) -> str:
 
 def remember(path: Path, moment: Moment) -> list[Moment]:
     """Append a line to the history; returns all its moments of the same suite, the oldest first.
-    Raises `InputError`."""
+
+    Raises `InputError`.
+    """
     known = read_history(path) if path.exists() else []
     try:
         with path.open("a", encoding="utf-8") as stream:
@@ -270,7 +277,8 @@ class Trend(Stored):
     @property
     def spread(self) -> float:
         """Largest less smallest value, relative to the largest size; 0 where fewer than two are
-        known."""
+        known.
+        """
         known = [value for value in self.values if value is not None]
         most = max(map(abs, known), default=0.0)
         return (max(known) - min(known)) / most if most > 0.0 else 0.0
@@ -301,7 +309,8 @@ DRAWN, MOST_MOVED = 12, 10
 
 def trend_of(moments: Sequence[Moment]) -> Finding:
     """The figures of a suite over its runs: those that moved since the one before, those that
-    varied, drawn and in a table; the runs."""
+    varied, drawn and in a table; the runs.
+    """
     every, last = trends(moments), moments[-1]
     found = [trend for trend in every if trend.spread > 0.0]
     moved = [trend for trend in every if trend.moved]
@@ -380,7 +389,8 @@ def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str
 
 def experience_of(runs: Sequence[Run]) -> Experience:
     """Bias and scatter a model and figure, and the domain of the scenes (the range of each axis,
-    `scenes.experience.axes_of`), over some runs of suites."""
+    `scenes.experience.axes_of`), over some runs of suites.
+    """
     trust: dict[str, dict[str, Trust]] = {}
     for model, found in sorted(pairs_of(runs).items()):
         if len(found) >= FEWEST:
@@ -397,7 +407,7 @@ def experience_of(runs: Sequence[Run]) -> Experience:
 
 
 def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """delta and sigma of (E, M) pairs; see the module."""
+    """Delta and sigma of (E, M) pairs; see the module."""
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
     return math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter

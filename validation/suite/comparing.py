@@ -1,7 +1,8 @@
 """A suite's cells as they are planned, their figures against references under any law of impacts,
 what else is worked out once and kept (the horizon, the landing at which laws part, what a spread of
 inputs makes of figures), and how sure figures are: a cell's difference from each reference against
-u_num, u_input and u_D (ASME V&V 20)."""
+u_num, u_input and u_D (ASME V&V 20).
+"""
 
 from __future__ import annotations
 
@@ -41,7 +42,8 @@ BY_ANY = ("outcome_agrees", "peak_ratio")
 @dataclass(frozen=True)
 class Planned(Task):
     """A cell that is to be played: a scene by a model, or the scenes `numbers` of an `ensemble`,
-    which are drawn from `scene`. Its key is of all that it depends on."""
+    which are drawn from `scene`. Its key is of all that it depends on.
+    """
 
     scene: Scene = field(compare=False)
     variant: ModelVariant = field(compare=False)
@@ -141,7 +143,8 @@ class ComparisonRecord(Stored):
 
 def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
     """What the store has under that name, a value of the type `kind`; computed and kept where there
-    is none that has the fields it must have."""
+    is none that has the fields it must have.
+    """
     adapter = TypeAdapter(kind)
     with suppress(KeyError, TypeError, ValueError):
         return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
@@ -183,14 +186,16 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
 
 def horizon_of(store: Store, scene: Scene) -> float:
     """The time up to which histories of this scene can be compared point by point (`ebm.horizon`),
-    s; kept in the store."""
+    s; kept in the store.
+    """
     name = _of_scene(scene, HORIZON, "ebm.horizon")
     return float(kept(store, name, float, lambda: predictability_horizon(scene)))
 
 
 def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
     """What a reference does under the other laws, by law; those under which it fails, or has no law
-    to choose, are left out."""
+    to choose, are left out.
+    """
     model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
     found: dict[str, History] = {}
     if isinstance(model, EventBasedModel):
@@ -280,7 +285,8 @@ def _compute(
     horizon: float | None,
 ) -> ComparisonRecord:
     """The figures of the cell itself where `reference` is None, with the law of impacts that it
-    followed."""
+    followed.
+    """
     candidate = store.load(planned.name)
     yardstick = store.load(reference.name) if reference else None
     figures: list[Figure] = []
@@ -356,7 +362,8 @@ def _other_outcome(
     against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
 ) -> Explanation:
     """What two different outcomes say: the peaks and slips of a block that falls have nothing to be
-    compared with."""
+    compared with.
+    """
     reasons = [reason for found in (mine, other) if found for reason in found.reasons]
     if reasons:
         return explain("outcome", "", None, None, reason="; ".join(reasons), against=against)

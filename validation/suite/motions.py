@@ -116,7 +116,8 @@ def _shaken(
     base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float
 ) -> UncertainScene:
     """A scene under one motion, horizontal and perhaps vertical; what is not known of the
-    excitation that it replaces goes with that."""
+    excitation that it replaces goes with that.
+    """
     scene = base.scene
     horizontal, vertical = motion
     change: dict[str, Any] = {"excitation": _record(horizontal, label, scale)}
@@ -143,7 +144,8 @@ def _record(motion: Recording, label: str, scale: float) -> Record:
 
 def _labels(names: Sequence[str]) -> list[str]:
     """Names of records as names of scenes may have them: without their endings, where these do not
-    tell two apart."""
+    tell two apart.
+    """
     short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
     return [
         _allowed(one if short.count(one) == 1 else name)
@@ -161,7 +163,8 @@ RECORD_STEP = 0.002
 
 class Distribution(Frozen):
     """`uniform` between two values, or `lognormal` with a median and the standard deviation of the
-    logarithm."""
+    logarithm.
+    """
 
     uniform: tuple[Finite, Finite] | None = None
     lognormal: tuple[Positive, NonNegative] | None = None

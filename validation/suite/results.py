@@ -102,7 +102,8 @@ class Check(Stored):
 
 class CostRecord(Stored):
     """What the cell's run took: `scenes.Cost`, and all of the worker's wall time (set-up,
-    simulation, writing)."""
+    simulation, writing).
+    """
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -177,13 +178,15 @@ class Cell(Stored):
     @property
     def converged(self) -> bool | None:
         """Whether the run's numerical error is known; None where it was not asked for or the model
-        has no step."""
+        has no step.
+        """
         return None if self.numerical is None else self.numerical.converged
 
     @property
     def verdict(self) -> Verdict:
         """The worst of the cell's checks; "error" if the model failed, "incomplete" if it is not
-        installed."""
+        installed.
+        """
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
         return worst(check.weighs for check in self.checks)
@@ -191,7 +194,8 @@ class Cell(Stored):
     @property
     def words(self) -> str:
         """The verdict for people; "no tolerance yet" where nothing else keeps the cell from
-        passing."""
+        passing.
+        """
         waits = self.status == "done" and any(
             check.words == "no tolerance yet" for check in self.checks
         )
@@ -250,8 +254,10 @@ class Run(Stored):
 
     @property
     def verdict(self) -> Verdict:
-        """The worst cell's verdict. At least "fail" where there are faults, or where checks were
-        asked for and none was made."""
+        """The worst cell's verdict.
+
+        At least "fail" where there are faults, or where checks were asked for and none was made.
+        """
         weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
         found = worst(weighed + (["fail"] if self.faults else []))
         judged = any(check.verdict != "not defined" for _, check in self.checks())
@@ -260,7 +266,8 @@ class Run(Stored):
     @property
     def words(self) -> str:
         """The verdict for people; "no tolerance yet" where nothing else keeps the run from passing,
-        "not judged" where nothing was."""
+        "not judged" where nothing was.
+        """
         if not self.judged and self.verdict == "pass":
             return "not judged"
         found = {cell.words for cell in self.cells}
@@ -299,7 +306,8 @@ class Run(Stored):
 
     def by_scene(self) -> dict[str, dict[str, Cell]]:
         """All cells by scene or ensemble, and by model, in order: for whoever goes through all of
-        them."""
+        them.
+        """
         found: dict[str, dict[str, Cell]] = {}
         for cell in self.cells:
             found.setdefault(cell.scene, {})[cell.model] = cell
@@ -328,7 +336,8 @@ class Run(Stored):
 
     def save(self, folder: Path) -> Path:
         """Write `run.json` and its schema into `folder` (made if need be), each whole or not at
-        all; returns run.json's path."""
+        all; returns run.json's path.
+        """
         write_whole(
             made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n"
         )
@@ -337,7 +346,8 @@ class Run(Stored):
     @classmethod
     def load(cls, folder: str | Path) -> Run:
         """The run in `folder`; raises `InputError` where there is none or it was written by another
-        format."""
+        format.
+        """
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
@@ -382,7 +392,8 @@ def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
 
 def _by_line(data: Mapping[str, Any]) -> str:
     """JSON with a line for each value, and for each of those in a list or an object: two thirds of
-    what indented JSON takes."""
+    what indented JSON takes.
+    """
     fields = []
     for name, value in data.items():
         if value and isinstance(value, dict):

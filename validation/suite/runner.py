@@ -1,5 +1,4 @@
-"""Runs a suite: plays the cells that are not up to date, compares, judges, and returns the
-`Run`."""
+"""Run a suite: play the cells that are not up to date, compare, judge, return the `Run`."""
 
 from __future__ import annotations
 
@@ -51,7 +50,8 @@ from rockcheck.validation.uncertainty.population import Inputs
 
 class BatchRecord(Stored):
     """What is kept of a batch: peak |theta| in alpha and outcome of each scene, None and the reason
-    where the model failed."""
+    where the model failed.
+    """
 
     peaks: tuple[float | None, ...]
     outcomes: tuple[str, ...]
@@ -83,8 +83,10 @@ def run_suite(
 
 
 class SuiteStudy(Study):
-    """A suite: tasks are its cells and its ensembles' batches. Results are kept and read back in
-    `folder`."""
+    """A suite: tasks are its cells and its ensembles' batches.
+
+    Results are kept and read back in `folder`.
+    """
 
     name = "suite"
     kinds = (HISTORIES, COMPARISONS)
@@ -140,8 +142,10 @@ class SuiteStudy(Study):
         )
 
     def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[Planned]:
-        """An ensemble in batches. A batch's key covers how its scenes are drawn, so it can be
-        looked up without drawing them."""
+        """An ensemble in batches.
+
+        A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
+        """
         drawing = {
             "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
             "code": provenance.code_digest("rockcheck.validation.suite.motions"),
@@ -179,7 +183,8 @@ class SuiteStudy(Study):
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
         """Keep a history or a batch, and compare its scene where that is the last of it: while
-        others play."""
+        others play.
+        """
         self.records[task] = _record_of(task).model_validate(record.record)
         if record.traceback:  # some scenes of a batch: not to be read back
             self.traces.add(task)
@@ -377,7 +382,8 @@ class SuiteStudy(Study):
 
     def _explained(self, cell: Cell, cells: Sequence[Cell], inputs: Inputs | None) -> Cell:
         """The cell with the verdicts on its differences from the references among `cells`, of its
-        scene, that finished; unchanged where nothing is known."""
+        scene, that finished; unchanged where nothing is known.
+        """
         own = self.suite.suite_of(cell.scene)
         if cell.numerical is None:
             return cell
@@ -492,7 +498,8 @@ def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
 
 def _figure(figures: Sequence[Figure], place: Place) -> Figure:
     """The figure that a check is about; one without value where it is missing, so that the check
-    cannot pass."""
+    cannot pass.
+    """
     against = "" if place.against == OWN_FIGURES else place.against
     for figure in figures:
         if (figure.measure, figure.against, figure.window) == (

@@ -116,7 +116,8 @@ class Require(Frozen):
 
 class Grid(Frozen):
     """Scenes by combination: one alternative of each axis merged into `scene`, their names joined
-    to the scene's."""
+    to the scene's.
+    """
 
     scene: dict[str, Any] = Field(default_factory=dict)
     axes: Annotated[tuple[tuple[dict[str, Any], ...], ...], Field(min_length=1)]
@@ -240,7 +241,8 @@ class Suite:
 
     def required(self, scene: str, model: str) -> dict[Place, Kind]:
         """What must be judged in a cell, and as what: what the suite requires and whatever has a
-        tolerance."""
+        tolerance.
+        """
         own = self.suite_of(scene)
         require = own.require
         if scene in own.ensembles:
@@ -259,7 +261,8 @@ class Suite:
 
     def kind(self, place: Place) -> Kind:
         """What a check means: with a wall (or a bounce), a model that cannot fly differs in form
-        from one that can."""
+        from one that can.
+        """
         if place.against == OWN_FIGURES:
             return "exact" if place.what.definition.exact else "absolute"
         if "measured" in (
@@ -393,8 +396,10 @@ def scene_suite(
 
 
 def is_scene(source: str) -> bool:
-    """Whether that is the name or the file of a scene, where a suite could be meant. Raises
-    `InputError` for a file that is no TOML."""
+    """Whether that is the name or the file of a scene, where a suite could be meant.
+
+    Raises `InputError` for a file that is no TOML.
+    """
     if source in named_suites():
         return False
     path = Path(source)
@@ -446,7 +451,8 @@ def _tolerances(
 
 def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
     """Names of scenes and models that make a cell: all, but a measured history belongs to the
-    scenes that it names."""
+    scenes that it names.
+    """
     for scene in scenes:
         yield from (
             (scene, label)
@@ -456,8 +462,7 @@ def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterat
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
-    """Several suites as one; their scenes must have different names, their references must
-    agree."""
+    """Several suites as one: names of scenes must differ, references must agree."""
     included = [
         load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
         for name in given.include
@@ -559,8 +564,7 @@ def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
 
 
 def _merged(base: Any, change: Any) -> Any:
-    """`change` over `base`: tables key by key, lists of tables one by one, anything else
-    replaced."""
+    """`change` over `base`: tables by key, lists of tables one by one, anything else replaced."""
     if isinstance(base, dict) and isinstance(change, dict):
         return {**base, **{key: _merged(base.get(key), value) for key, value in change.items()}}
     if isinstance(base, list) and isinstance(change, list):

@@ -65,7 +65,8 @@ def not_shown(run: Run) -> list[str]:
 
 def finding_of(run: Run) -> Finding:
     """What a run says on a terminal: the verdicts, or the outcomes where nothing is judged, and the
-    reasons of what is no pass."""
+    reasons of what is no pass.
+    """
     wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
     if not run.judged:
         told = Text(OUTCOMES)
@@ -88,7 +89,8 @@ def finding_of(run: Run) -> Finding:
 
 def verdict_table(run: Run) -> Table:
     """A row a cell: the check that is nearest to its limit, how much of that it uses, and the
-    verdict. Of a large run, the scenes that are `shown`."""
+    verdict. Of a large run, the scenes that are `shown`.
+    """
     places, before, rows = set(shown(run)), "", []
     for cell in run.cells:
         if cell.scene not in places:
@@ -113,7 +115,8 @@ def verdict_table(run: Run) -> Table:
 
 def outcome_tables(run: Run) -> Iterator[Table]:
     """Each scene with a row a model: what becomes of the block, its peak rotation, and how far from
-    the reference."""
+    the reference.
+    """
     names = ("peak_rotation_alpha", "apart_alpha")
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
@@ -150,7 +153,8 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
 
 def summary(run: Run) -> dict[str, Any]:
     """The verdicts in a few plain values: of the run, of each cell, and why anything is not a pass;
-    where nothing is judged, what became of each cell."""
+    where nothing is judged, what became of each cell.
+    """
     common = {
         "suite": run.suite,
         "exit_code": run.exit_code,
@@ -268,8 +272,10 @@ def percent(check: Check) -> str:
 
 
 def nearest(cell: Cell) -> Check | None:
-    """The check that failed, else the one nearest to its limit. A yes-or-no measure, or a limit of
-    0, is never near its limit."""
+    """The check that failed, else the one nearest to its limit.
+
+    A yes-or-no measure, or a limit of 0, is never near its limit.
+    """
     return max(
         (
             check
@@ -379,7 +385,8 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 
 def markdown(run: Run) -> str:
     """A summary for a job's page: the verdict, what is not a pass and why, and a table of scenes by
-    models."""
+    models.
+    """
     count = f"{len(run.cells)} simulations, {run.up_to_date} up to date"
     parts = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
@@ -404,7 +411,8 @@ def markdown(run: Run) -> str:
 
 def _laws(run: Run, places: Container[str]) -> Iterator[str]:
     """Which law of impacts each model followed, where these scenes have a landing that tells; it is
-    no verdict."""
+    no verdict.
+    """
     found = {(cell.scene, cell.model): cell.impact_law for cell in run.cells if cell.impact_law}
     told = {scene: law.t for (scene, _), law in found.items() if scene in places}
     models = [model for model in run.models if any(model == of for _, of in found)]
@@ -434,7 +442,8 @@ def _entry(cell: Cell | None, judged: bool) -> str:
 
 def _plain(text: str) -> str:
     """Text that somebody else may have chosen, as Markdown that shows it and does nothing: no tag,
-    link, picture or new line."""
+    link, picture or new line.
+    """
     return (
         re.sub(r"([\\`*\[\]!#~])", r"\\\1", printable(text, 1000))
         .replace("&", "&amp;")

@@ -71,7 +71,8 @@ class Windowed:
     @classmethod
     def parse(cls, text: str) -> Windowed:
         """Read "measure@window"; raises `InputError` for an unknown measure or a window that is
-        none."""
+        none.
+        """
         name, at, window = text.partition("@")
         if name not in MEASURES:
             raise unknown_name("measure", name, MEASURES)
@@ -106,8 +107,7 @@ class Tolerance(Frozen):
 
 @dataclass(frozen=True, order=True)
 class Place:
-    """Where a tolerance belongs: scene, model, what it is held against, and the windowed
-    measure."""
+    """Where a tolerance belongs: scene, model, what it is held against, windowed measure."""
 
     scene: str
     model: str
@@ -155,7 +155,8 @@ def _spread(
     lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]
 ) -> Iterator[tuple[_Path, Any]]:
     """The lines with those for every scene at each of the model's cells, below what the scene
-    itself says."""
+    itself says.
+    """
     played = list(cells)
     common = {path: line for path, line in lines.items() if path[0] == EVERY}
     for path, line in lines.items():
@@ -314,8 +315,7 @@ def _verdict(
 
 
 def _nearer(value: float, expected: float, perfect: float | None) -> float:
-    """By how much a value is nearer to a perfect one than the expected is; 0 where there is
-    none."""
+    """How much nearer to a perfect value it is than the expected one; 0 where there is none."""
     if perfect is None or math.isinf(perfect):
         return 0.0 if perfect is None else value - expected
     return abs(expected - perfect) - abs(value - perfect)

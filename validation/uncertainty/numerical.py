@@ -192,7 +192,8 @@ def _outcome(history: History, reason: str = "") -> Quantity:
 
 def _between_rows(history: History) -> float:
     """How far the largest |theta| may lie above that of the rows, rad: by the parabola through the
-    highest three."""
+    highest three.
+    """
     theta = np.abs(history.channels["theta"])
     top = int(np.argmax(theta))
     if not 0 < top < len(theta) - 1:
@@ -201,8 +202,7 @@ def _between_rows(history: History) -> float:
 
 
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
-    """The change, times the factor of safety: the finer run errs, too, by a few hundredths of
-    it."""
+    """The change times the factor of safety, as the finer run errs by a few hundredths of it."""
     if _side(given) != _side(finer):
         return (_outcome(given, "the outcome changes with the tolerance"),)
     rms = _changes(scene, given, finer)["theta_rms"]
@@ -215,7 +215,8 @@ def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quant
 
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     """Name, unit and value of the scalar figures: peak rotation and last slip, or the time of the
-    fall."""
+    fall.
+    """
     if _side(history):
         return [("end_time", "s", float(history.channels["t"][-1]))]
     found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
@@ -281,7 +282,8 @@ def explain(
     against: str = "",
 ) -> Explanation:
     """The verdict on a difference; `u_num` holds both runs' numerical uncertainties, `reason` why
-    it is None, `against` the reference."""
+    it is None, `against` the reference.
+    """
     verdict = _verdict(unit, error, u_num, u_input, u_data)
     return Explanation(
         quantity=quantity,

@@ -247,7 +247,8 @@ class Interval(Stored):
 
 class Sensitivity(Stored):
     """Sobol indices of one uncertain number: shares of a figure's variance, by itself and with all
-    others."""
+    others.
+    """
 
     name: str
     first: float
@@ -287,7 +288,8 @@ class Inputs(Stored):
 @dataclass(frozen=True)
 class Propagated:
     """Draws of a scene, played: what they say, and the bands on theta (alpha) at times `t` (s), a
-    row a quantile of `BANDS`."""
+    row a quantile of `BANDS`.
+    """
 
     inputs: Inputs
     t: Floats

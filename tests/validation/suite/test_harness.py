@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[3]
 
 
 class Copy:
-    """A copy of the project as it is installed, folders in place of links, in which files can be changed and put back,
+    """A copy of the project in which files can be changed and put back,
     compiled code and times kept."""
 
     def __init__(self, folder: Path) -> None:

@@ -129,7 +129,8 @@ CREEP = Scene(
 
 def cone(m: Motion) -> float:
     """The coefficient at which slip begins over mu: the base's acceleration grows by j t, so a free
-    slip by j (t - t0)^3/6."""
+    slip by j (t - t0)^3/6.
+    """
     rate, slipped = G / RAMP_TIME, 0.01
     # Once slipping, friction stays mu g: x = j (t - t0)^3 / 6.
     since = _when(m.t, m.x - m.x[0], slipped) - (6.0 * slipped / rate) ** (1.0 / 3.0)
@@ -227,7 +228,8 @@ def uplift(m: Motion) -> float:
 
 def housner(m: Motion) -> float:
     """The ratio of angular velocities over the first impact, from the turning points, over
-    1 - 1.5 sin^2(alpha)."""
+    1 - 1.5 sin^2(alpha).
+    """
     alpha = SLENDER.alpha
     swing = float(np.max(-m.theta[(m.t > _when(m.t, -m.theta, 0.0)) & (m.t < 2.2)]))
     after, before = (math.cos(alpha - tilt) - math.cos(alpha) for tilt in (swing, TILT))
@@ -284,7 +286,8 @@ LANDS = math.sqrt(2.0 * 0.1 / G)
 
 def energy_gained(m: Motion) -> float:
     """The largest rise of the energy above its lowest before, over its first, from differences of
-    positions."""
+    positions.
+    """
     rates = [np.diff(channel) / np.diff(m.t) for channel in (m.x, m.y, m.theta)]
     y, theta = (0.5 * (channel[1:] + channel[:-1]) for channel in (m.y, m.theta))
     total = energy(TUMBLE.block, G, y, theta, *rates)

@@ -1,5 +1,6 @@
 """`rockcheck conformance`: engines, models of the user's own and histories written elsewhere,
-each held against phenomena with a certain answer; and the scenes for an engine elsewhere."""
+each held against phenomena with a certain answer; and the scenes for an engine elsewhere.
+"""
 
 from __future__ import annotations
 
@@ -146,8 +147,7 @@ class Trial(Task):
 
 @dataclass(frozen=True)
 class Seen:
-    """What a player showed: a value (None: it lacks what it takes, or nothing could be read
-    off)."""
+    """What a player showed: a value, or None where it lacks a part or nothing could be read off."""
 
     value: float | None
     verdict: str
@@ -221,7 +221,8 @@ class Conformance(Study):
 
 def _in_units(scene: Scene, history: History) -> None:
     """Raises `ModelFailure` for a history that does not begin as its scene does, or does not last:
-    as a rule a column in other units than its name says."""
+    as a rule a column in other units than its name says.
+    """
     t, size = history.channels["t"], scene.block.radius
     begins = dict(zip(("x", "y", "theta"), scene.initial_state, strict=False))
     for name, value in begins.items():
@@ -422,8 +423,10 @@ MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_a
 
 
 def export(folder: Path) -> list[str]:
-    """Write all scenes as tables into a folder; returns their names. An `engine.toml` that is there
-    stays."""
+    """Write all scenes as tables into a folder; returns their names.
+
+    An `engine.toml` that is there stays.
+    """
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             write_whole(folder / f"{name}-base.csv", table_text(MOTION, _motion(scene)))

@@ -1,5 +1,6 @@
 """`rockcheck conformance --tune`: engines' own parameters for a wanted restitution and friction,
-found by dropping a block and sliding it."""
+found by dropping a block and sliding it.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +36,8 @@ WANTED = {
 @dataclass(frozen=True)
 class Knob:
     """The parameter that sets an engine's restitution: its bounds, and all parameters in the
-    engine's own words, which `calibrate` fills in."""
+    engine's own words, which `calibrate` fills in.
+    """
 
     bounds: tuple[float, float]
     words: Mapping[str, str]
@@ -125,7 +127,8 @@ KNOBS: dict[str, Knob] = {
 @dataclass(frozen=True)
 class Calibration:
     """What an engine needs, in its own words, and what was reached with it: restitution, friction,
-    penetration (m)."""
+    penetration (m).
+    """
 
     engine: str
     step: float
@@ -220,7 +223,8 @@ def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: flo
 @dataclass(frozen=True)
 class Tune(Task):
     """What is wanted of an engine: restitution, friction, and a penetration (m) that is not
-    exceeded, at a step (s)."""
+    exceeded, at a step (s).
+    """
 
     engine: str
     restitution: float

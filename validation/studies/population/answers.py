@@ -226,7 +226,8 @@ def quantity_of(name: str, runs: Sequence[tuple[str, Ran]]) -> dict[str, Any]:
 
 def gaps_of(found: Found) -> dict[str, Any]:
     """What each gap does; the clear distance without which a block would strike; the largest gap up
-    to which no run overturns."""
+    to which no run overturns.
+    """
     rows: list[dict[str, Any]] = []
     for gap, runs in found.at_gaps.items():
         known_of = [run for run in runs if not run.reason]
@@ -262,7 +263,8 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
 def contributions_of(found: Found) -> list[dict[str, Any]]:
     """Shares of the variance of the peak rotation by source, the largest first; a block that falls
-    counts as 1 alpha."""
+    counts as 1 alpha.
+    """
     nominal = found.nominal
     peaks = {case: [run.peak for run in runs] for case, runs in found.runs.items() if runs}
     means = [float(np.mean(some)) for some in peaks.values()]

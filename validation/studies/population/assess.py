@@ -76,7 +76,8 @@ class Assessment(Study):
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
         """The numbers of each draw, the same for every case; none without records, since they are
-        then drawn about the single run."""
+        then drawn about the single run.
+        """
         first = next(iter(self.cases.values()))
         if not (self.samples and self.recorded):
             return ()
@@ -244,7 +245,8 @@ class Assessment(Study):
 
 def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
     """What --gaps says: `0.05,0.1` of the scene's walls, or `left:0.05,0.1` of that side, where a
-    wall without rebound is put if there is none. Raises `InputError`."""
+    wall without rebound is put if there is none. Raises `InputError`.
+    """
     side, colon, numbers = text.rpartition(":")
     known_sides: tuple[Side, ...] = tuple(wall.side for wall in scene.walls)
     if colon and side not in get_args(Side):

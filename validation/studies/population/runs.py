@@ -30,7 +30,8 @@ MOST_ROWS = 2000
 
 class Ran(Stored):
     """One run: its motion, how far it slid and reached to the left and to the right (m, also of a
-    block that falls), or why it has none."""
+    block that falls), or why it has none.
+    """
 
     outcome: str
     motion: Motion | None = None
@@ -52,7 +53,8 @@ class Ran(Stored):
 
 class Played(Stored):
     """The runs of a task, in the order of its variants; of the first perhaps the history as CSV,
-    and what hand methods say of it: by method, whether it happens, and how far."""
+    and what hand methods say of it: by method, whether it happens, and how far.
+    """
 
     runs: tuple[Ran, ...]
     history: str = ""
@@ -61,7 +63,8 @@ class Played(Stored):
 
 class Sure(Stored):
     """How sure a run is: its numerical uncertainty, the time (s) from which it depends on the law
-    of impacts, and what its uncertain numbers make of it."""
+    of impacts, and what its uncertain numbers make of it.
+    """
 
     numerical: Numerical | None
     depends_on_law_from_s: float | None
@@ -71,7 +74,8 @@ class Sure(Stored):
 @dataclass(frozen=True)
 class Run(Task):
     """Runs of one scene: as it is, or with numbers changed; a gap that is infinite takes the wall
-    away. `shown` asks for the history and for hand methods."""
+    away. `shown` asks for the history and for hand methods.
+    """
 
     of: tuple[str, ...]
     scene: Scene = field(repr=False)
@@ -160,7 +164,8 @@ class Certainty(Task):
 
     def play(self) -> Sure:
         """The run at coarser steps or a finer tolerance, under other laws of impacts, and its
-        draws."""
+        draws.
+        """
         landing = parting_landing(self.scene)
         return Sure(
             numerical=numerical_uncertainty(build(self.model, dict(self.settings)), self.scene),

@@ -182,7 +182,8 @@ def blocks_of(
     curves: Sequence[Curve], across: Column, other: dict[str, Any] | None = None
 ) -> list[Block]:
     """The curves, drawn and as tables, over the intensity `across`; `other`: its axis in another
-    unit, see `finding.Plot`."""
+    unit, see `finding.Plot`.
+    """
     columns = [
         text("case", "event"),
         Column("median", f"median {across.label}", across.unit),
@@ -235,7 +236,8 @@ def blocks_of(
 
 def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Column) -> list[Block]:
     """Peaks (motion, direction, intensity) as a line a motion, and their quantiles: the smallest
-    peak that the share of the motions does not exceed. A line ends where the block falls."""
+    peak that the share of the motions does not exceed. A line ends where the block falls.
+    """
     x, signs = levels.tolist(), (1, -1)
     quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
     known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
@@ -321,8 +323,10 @@ def measure_of(word: str) -> Measure:
 def _recorded(
     motions: Motions, scene: Scene, of: Callable[[Recording, Scene], float]
 ) -> list[tuple[str, Record, float]]:
-    """Records with their own intensities. Raises `InputError` for too few, or one without
-    motion."""
+    """Records with their own intensities.
+
+    Raises `InputError` for too few, or one without motion.
+    """
     if len(motions) < FEWEST:
         raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
     found = [

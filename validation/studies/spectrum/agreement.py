@@ -1,5 +1,6 @@
 """The same spectra by the other models: at some nodes of each, the share of outcomes that are equal
-to the event-based models', and coarse maps of one figure."""
+to the event-based models', and coarse maps of one figure.
+"""
 
 from __future__ import annotations
 
@@ -62,7 +63,8 @@ def choose_nodes(
 
 def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
     """The indices of `count` of the chosen nodes, in the order chosen: the first half of each side,
-    or all nodes."""
+    or all nodes.
+    """
     if count >= len(near):
         return np.arange(len(near))
     sides = [np.flatnonzero(near == part) for part in (True, False)]
@@ -92,7 +94,8 @@ def nodes_played(model: str, count: int) -> int:
 
 def plays(request: Request, panel: Panel) -> bool:
     """Whether the model has what the panel asks of contacts; an engine without restitution does not
-    play walls that bounce."""
+    play walls that bounce.
+    """
     model = build(request.model, request.settings)
     lacks = model.lacks() if isinstance(model, Engine) else ()
     return "restitution" not in lacks or panel.wall is None or panel.wall.restitution == 0.0

@@ -55,8 +55,11 @@ LAWS = (
 
 @dataclass(frozen=True)
 class Spectra(Study):
-    """The spectra of some panels, all on one grid by one model. At `compared` nodes of each, where
-    that is not 0, the other models play, too. Raises `InputError` where the model cannot play."""
+    """The spectra of some panels, all on one grid by one model.
+
+    At `compared` nodes of each, where that is not 0, the other models play, too. Raises
+    `InputError` where the model cannot play.
+    """
 
     panels: tuple[Panel, ...]
     request: Request = field(default_factory=Request)
@@ -130,7 +133,8 @@ class Spectra(Study):
 
     def _stem(self, panel: Panel) -> str:
         """The name of a spectrum's files: the panel's, and the model's where that is not the
-        paper's."""
+        paper's.
+        """
         model = self.request.model
         return panel.name if model == "ebm" else f"{panel.name}--{model}"
 
@@ -260,7 +264,8 @@ class Spectra(Study):
 
     def _about(self, panel: Panel, one: Spectrum) -> str:
         """The settings of a spectrum's files, as JSON; a record's samples are left out: its name
-        says which it is."""
+        says which it is.
+        """
         scene = panel.scene.model_dump(mode="json")
         for part in ("excitation", "vertical"):
             scene[part].pop("unscaled", None)
@@ -293,7 +298,8 @@ def _spread(size: int) -> NDArray[np.int64]:
 
 def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
     """Amplitude (m/s^2) and period (s) of the pulses along the axes, and the frequency and
-    amplitude ratio of one's `own` (None: of the paper's); None for a record."""
+    amplitude ratio of one's `own` (None: of the paper's); None for a record.
+    """
     pulse = panel.scene.excitation
     if not isinstance(pulse, Ricker | Sine):
         return None
@@ -328,7 +334,8 @@ def _npz(spectrum: Spectrum, about: str) -> bytes:
 
 def _csv(spectrum: Spectrum, about: str) -> bytes:
     """One row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0 safe, 1
-    overturned right."""
+    overturned right.
+    """
     columns = ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())]
     rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
     table = table_text(columns, ([amplitude, *row] for amplitude, row in rows))

@@ -1,5 +1,6 @@
 """What a spectrum asks for: its request, the tasks that play its nodes, and what is whole of it by
-what has been played."""
+what has been played.
+"""
 
 from __future__ import annotations
 
@@ -209,8 +210,10 @@ MOST_SIZE = 5000
 
 
 def axis(low: float, high: float, size: int, key: str) -> Floats:
-    """`size` equally spaced ratios from `low` to `high`. Raises `InputError` where they are not
-    finite, positive and in order."""
+    """`size` equally spaced ratios from `low` to `high`.
+
+    Raises `InputError` where they are not finite, positive and in order.
+    """
     said = f"{low:g} to {high:g} is not allowed"
     if not (np.isfinite(low) and np.isfinite(high) and low > 0.0):
         raise InputError(f"{said}: give positive finite numbers", key)
@@ -221,8 +224,10 @@ def axis(low: float, high: float, size: int, key: str) -> Floats:
 
 @dataclass(frozen=True)
 class Request:
-    """How spectra are to be played: grid, model and settings. Raises `InputError` where that
-    cannot be."""
+    """How spectra are to be played: grid, model and settings.
+
+    Raises `InputError` where that cannot be.
+    """
 
     size: int = 100
     frequency_range: tuple[float, float] = FREQUENCIES
@@ -272,8 +277,10 @@ class Book:
     wanted: list[Nodes] = field(default_factory=list)
 
     def ask(self, tasks: Sequence[Nodes]) -> list[Played] | None:
-        """Their records, None where some are still to be played. All nodes of a task that failed
-        are undecided."""
+        """Their records, None where some are still to be played.
+
+        All nodes of a task that failed are undecided.
+        """
         missing = [task for task in tasks if task not in self.done]
         self.wanted += missing
         if missing:
@@ -290,7 +297,8 @@ class Book:
 
     def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
         """A spectrum, None where nodes are still to be played: refinement then begins again with
-        all that is known."""
+        all that is known.
+        """
 
         def known(scene: Scene, a: Floats, f: Floats) -> Outcomes:
             found = self.outcomes(scene, a, f, request.model, settings or request.settings)
@@ -306,8 +314,7 @@ class Book:
 
 
 def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
-    """The nodes (i, j), a row each, that are decided and differ in one of the others, decided,
-    too."""
+    """The decided nodes (i, j), a row each, that differ from a decided one of another spectrum."""
     differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
     for other in others:
         own = spectrum.outcomes != other.outcomes

@@ -1,2 +1,3 @@
 """Stress: random scenes against invariants, where engines break, and the smallest scenes that show
-a failure."""
+a failure.
+"""

@@ -1,5 +1,7 @@
-"""Random scenes over all that a user could write. Each follows from a seed and a number, so any one
-can be made again."""
+"""Random scenes over all that a user could write.
+
+Each follows from a seed and a number, so any one can be made again.
+"""
 
 from __future__ import annotations
 
@@ -40,8 +42,10 @@ WALLED: tuple[tuple[Literal["left", "right"], ...], ...] = (
 
 
 def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
-    """Scene `number` of the run with this seed. It is the same for all kinds, except for what a
-    kind cannot play."""
+    """Scene `number` of the run with this seed.
+
+    It is the same for all kinds, except for what a kind cannot play.
+    """
     r = np.random.default_rng([seed, number])
     alpha = float(r.uniform(*ALPHA)) if r.random() < 0.7 else _log(r, *ALPHA)
     radius = _log(r, *RADIUS)
@@ -242,8 +246,10 @@ LONG, LASTS = 0.02, 1e4
 
 
 def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
-    """Scene `number` of the run with this seed. It is the same for all kinds, except for what a
-    kind cannot play."""
+    """Scene `number` of the run with this seed.
+
+    It is the same for all kinds, except for what a kind cannot play.
+    """
     r = np.random.default_rng([seed, number, 1])
     width, height = SIDES[int(r.integers(len(SIDES)))]
     chance = np.random.default_rng([seed, number, 3])
@@ -299,7 +305,8 @@ def _pick(r: np.random.Generator, values: tuple[float, ...]) -> float:
 
 def _exact_walls(r: np.random.Generator, block: Block) -> list[Wall]:
     """No wall, one, or two: touching, at equal distances, or so that the block's diagonal just fits
-    between them."""
+    between them.
+    """
     gaps = (
         0.0,
         0.0,
@@ -321,7 +328,8 @@ def _exact_walls(r: np.random.Generator, block: Block) -> list[Wall]:
 
 def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Excitation:
     """Rest, a pulse whose peak is one of the levels, or a record that jumps or ramps between few of
-    them."""
+    them.
+    """
     kind = r.random()
     level = _sign(r) * _pick(r, levels[1:])
     period = _pick(r, (0.25, 0.5, 1.0, 2.0))

@@ -1,5 +1,6 @@
-"""What must hold of every history, whatever the scene. Each invariant gives a figure, which must
-stay below its bound.
+"""What must hold of every history, whatever the scene.
+
+Each invariant gives a figure, which must stay below its bound.
 
 Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/g)), energies
 relative to what was at play.
@@ -132,7 +133,8 @@ SWAPPED = {"overturned left": "overturned right", "overturned right": "overturne
 @dataclass(frozen=True, kw_only=True)
 class CheckedRun:
     """What was found of one run: the figure of each invariant that was looked at, and how it failed
-    to end."""
+    to end.
+    """
 
     figures: dict[str, float]
     failure: str = ""
@@ -158,8 +160,10 @@ class CheckedRun:
 def check_run(
     model: EventBasedModel, scene: Scene, *, seed: int = 0, audit: bool = False, only: str = ""
 ) -> CheckedRun:
-    """Plays a scene and checks every invariant, or only one. With `audit` also those that ask for
-    many rows: energy, clearance."""
+    """Plays a scene and checks every invariant, or only one.
+
+    With `audit` also those that ask for many rows: energy, clearance.
+    """
     played = audited(scene) if audit else scene
     try:
         history = model.simulate(played)
@@ -203,7 +207,8 @@ def check_run(
 
 def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     """Whether a wall is struck that is out of reach by all that lies between two rows, or one is
-    not struck that is within; nothing is said of a block that falls, or hardly moves."""
+    not struck that is within; nothing is said of a block that falls, or hardly moves.
+    """
     side: Literal["left", "right"] = "left" if seed % 2 else "right"
     free = scene.replace(walls=())
     history = model.simulate(free)
@@ -243,7 +248,8 @@ def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
 
 def audited(scene: Scene) -> Scene:
     """The scene with rows so dense that integrals over them are exact to 1e-10, and no longer than
-    can be afforded."""
+    can be afforded.
+    """
     unit = math.sqrt(scene.block.radius / scene.gravity)
     step = 0.03 * unit
     for excitation in (scene.excitation, scene.vertical):
@@ -402,7 +408,8 @@ def _friction_power(motion: Motion) -> Floats:
 
 def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     """Which groups of eight steps have neither event nor kink inside, and in which the mode of
-    motion is the same in all rows."""
+    motion is the same in all rows.
+    """
     t, mode = history.channels["t"], history.channels["mode"]
     groups = (len(t) - 1) // GROUP
     edges = t[: groups * GROUP + 1 : GROUP]
@@ -434,7 +441,8 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
 
 def _mirror(model: EventBasedModel, motion: Motion) -> float:
     """How many values differ from those of the mirror image, to the bit; infinitely many where it
-    is longer."""
+    is longer.
+    """
     history = motion.history
     try:
         image = model.simulate(motion.scene.mirrored())
@@ -454,7 +462,8 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
 
 def similar(scene: Scene, seed: int) -> Scene:
     """The scene at another scale: lengths times k, times sqrt(k), accelerations the same; k is
-    random in 0.01 to 100."""
+    random in 0.01 to 100.
+    """
     k = float(np.exp(np.random.default_rng([seed, 1]).uniform(math.log(1e-2), math.log(1e2))))
     root = math.sqrt(k)
     return scene.replace(
@@ -472,7 +481,8 @@ def similar(scene: Scene, seed: int) -> Scene:
 
 class _Horizon:
     """Compares histories of a scene up to the time at which a small disturbance of its data shows;
-    that time is computed only if needed."""
+    that time is computed only if needed.
+    """
 
     def __init__(self, model: EventBasedModel, motion: Motion, seed: int) -> None:
         self.model, self.motion, self.seed = model, motion, seed
@@ -480,7 +490,8 @@ class _Horizon:
 
     def apart(self, scene: Scene, model: EventBasedModel | None = None) -> float:
         """Largest |difference of theta| in rad within the horizon; infinite where the other run
-        fails within it."""
+        fails within it.
+        """
         played, history = model or self.model, self.motion.history
         if played.friction == "bouc-wen" and scene.block.radius != self.motion.radius:
             size = played.yield_displacement * scene.block.radius / self.motion.radius
@@ -498,7 +509,8 @@ class _Horizon:
     @cached_property
     def row(self) -> int:
         """The first row in which the scene and a disturbed one, or two finer tolerances, part (see
-        `SEEN`)."""
+        `SEEN`).
+        """
         self.found, scene, history = 1, self.motion.scene, self.motion.history
         rows = [len(history.channels["t"])]
         # The horizon belongs to the scene, however coarse the model is. Rounding is a disturbance,
@@ -552,8 +564,7 @@ def _agree(a: History, b: History, seen: float) -> int:
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
-    """The scene with all its data changed by up to a relative `DISTURBANCE`, in random
-    directions."""
+    """The scene with all its data changed at random, by up to a relative `DISTURBANCE`."""
     r = np.random.default_rng([seed, 2])
 
     def by(value: float) -> float:

@@ -36,8 +36,7 @@ CLOSED, SLIPS = 1e-8, 1e-9
 
 @dataclass(frozen=True)
 class Forces:
-    """Contact forces per unit mass in units of g, one value a row; zero where there is no
-    contact."""
+    """Contact forces per unit weight, one value a row; zero where there is no contact."""
 
     normal: Floats
     friction: Floats
@@ -117,8 +116,10 @@ def tilted_forces(
 
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
-    """Solves one system for each row. Where contacts are parallel to rounding (a corner just off
-    its wall), takes the least forces."""
+    """Solves one system for each row.
+
+    Where contacts are parallel to rounding (a corner just off its wall), takes the least forces.
+    """
     try:
         return np.asarray(np.linalg.solve(matrix, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
@@ -139,7 +140,8 @@ BOOLE = np.array([7.0, 32.0, 12.0, 32.0, 14.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 4
 
 def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Floats:
     """Integrals of `values`, given at multiples of `step`, over each group of eight steps; what is
-    over is left out."""
+    over is left out.
+    """
     groups = (len(values) - 1) // GROUP
     nodes = values[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return np.asarray(step * (nodes @ rule))
@@ -194,7 +196,8 @@ class Motion(NamedTuple):
         self, rows: Mask, slip: Floats, *, later: float = 0.0, faster: float = 0.0
     ) -> tuple[Arms, Forces]:
         """The arms and forces in these rows, in which the block is tilted; `slip` as of
-        `tilted_forces`. `later` they turn on for that time, at a rate that is `faster`."""
+        `tilted_forces`. `later` they turn on for that time, at a rate that is `faster`.
+        """
         sign, walls, on = self.sign, self.within("lean", "ladder"), np.ones(int(rows.sum()), bool)
         w = (sign * self.w)[rows]
         at = arms(self.scene.block, sign[rows], np.abs(self.channels["theta"])[rows] + later * w)

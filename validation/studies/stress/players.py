@@ -1,5 +1,6 @@
 """The models that are stressed: the settings and scenes of each, and the invariants that it must
-keep."""
+keep.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ AUDIT = 10
 @dataclass(frozen=True)
 class Player(ABC):
     """A model under stress: its label, the kind of scenes that it can play, how many in a whole
-    run, and in a quick one."""
+    run, and in a quick one.
+    """
 
     label: str
     kind: Kind
@@ -128,7 +130,8 @@ class Approximate(Player):
 
     def scene(self, seed: int, number: int) -> Scene:
         """The scene of that number, no longer than affordable, with a row a step: between them the
-        base may do any work."""
+        base may do any work.
+        """
         scene = random_scene(seed, number, self.kind)
         unit = math.sqrt(scene.block.radius / scene.gravity)
         return scene.replace(
@@ -142,8 +145,10 @@ class Approximate(Player):
         return {"time_step": self.step * math.sqrt(scene.block.radius / scene.gravity)}
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Checks the run's end, finite numbers, depth and energy. If an engine breaks one of the
-        last two, says what half the step does."""
+        """Checks the run's end, finite numbers, depth and energy.
+
+        If an engine breaks one of the last two, says what half the step does.
+        """
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
         if broken and self.family != "cm":
@@ -171,7 +176,8 @@ class Approximate(Player):
 
     def depth(self, motion: Motion) -> float:
         """Deepest penetration over what the model states: for an engine the way of a step, for the
-        CM that of a spring."""
+        CM that of a spring.
+        """
         spin = float(np.max(np.abs(motion.channels["theta_dot"])))
         ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
         speed = ways * motion.unit / motion.radius + spin * motion.unit
@@ -208,7 +214,8 @@ def energy_without_source(motion: Motion) -> float:
 
 def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
     """Integral of the base acceleration from the first of the times `t` on; exact for a record,
-    which is linear between samples."""
+    which is linear between samples.
+    """
     times = t
     if isinstance(excitation, Record):
         kinks = excitation.time_step * np.arange(len(excitation.unscaled))

@@ -1,5 +1,6 @@
 """Runs of one model under stress: chunks of them, what they showed, and smaller scenes of those
-that failed: parts are dropped, shortened or rounded as long as the failure stays."""
+that failed: parts are dropped, shortened or rounded as long as the failure stays.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +71,8 @@ def simplifications(scene: Scene) -> Iterator[Scene]:
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     """The scene's tables with a part left out, a shorter run or list, another scale, and at last
-    one number that is zero or has fewer digits."""
+    one number that is zero or has fewer digits.
+    """
     tables = _tables(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     for path, _ in places:
@@ -127,7 +129,8 @@ def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
 
 def scene_text(scene: Scene, remarks: str) -> str:
     """A scene file that `load_scene` reads back to the bit (samples stand in the file itself), with
-    remarks on top."""
+    remarks on top.
+    """
     tables = {
         key: value for key, value in _tables(scene).items() if key != "name"
     }  # the file's own
@@ -319,7 +322,8 @@ class Shrinking(Task):
 
 def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
     """These runs as a task; what it may take is far more than it does, and little enough for a hang
-    to be found soon."""
+    to be found soon.
+    """
     a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
     return Chunk(
         model,

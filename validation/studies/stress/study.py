@@ -124,7 +124,8 @@ SETUPS = {
 @dataclass(frozen=True)
 class Stable:
     """The largest step (sqrt(R/g)) from which on a model is stable, 0 where none was; and what the
-    next coarser one does."""
+    next coarser one does.
+    """
 
     line: str
     axis: str
@@ -136,7 +137,8 @@ class Stable:
 @dataclass(frozen=True)
 class Still:
     """What a block does that should stand still: the largest of each, R, alpha or sqrt(g R);
-    `fault` where the run did not end."""
+    `fault` where the run did not end.
+    """
 
     line: str
     case: str
@@ -164,7 +166,8 @@ def scene_at(axis: str, value: float) -> Scene:
 
 def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     """How a run of that step (sqrt(R/g)) breaks: "blows up", "sinks", "gains energy"; empty where
-    it does not."""
+    it does not.
+    """
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
     scene = scene.replace(
         output_step=max(scene.output_step, step * unit)
@@ -250,7 +253,8 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
 @dataclass(frozen=True)
 class Place(Task):
     """A place of a map: a model with settings at a value of an axis, or a block that should stand
-    so long (s)."""
+    so long (s).
+    """
 
     line: str
     at: str
@@ -273,7 +277,8 @@ class Place(Task):
 
 def places(quick: bool = False) -> list[Place]:
     """The maps of all `SETUPS` that are installed, the longest tasks first; `quick` has fewer
-    values, steps and seconds."""
+    values, steps and seconds.
+    """
     lines = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
     how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
     still = [
@@ -308,7 +313,8 @@ MOVES = {"creep": "R", "sinking": "R", "rotation": "α", "uplift": "R", "jitter"
 @dataclass(frozen=True)
 class Stress(Study):
     """What is played: all, runs or maps; `runs` of each of the `models`, by default as many as
-    `PLAYERS` says of all that are installed."""
+    `PLAYERS` says of all that are installed.
+    """
 
     what: What = "all"
     seed: int = 1

@@ -159,7 +159,8 @@ QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 @dataclass(frozen=True)
 class Prepared:
     """A member cut at its horizon (s), the reference of each kind of model, and how far these are
-    apart (RMS, alpha)."""
+    apart (RMS, alpha).
+    """
 
     scene: Scene
     horizon: float
@@ -204,7 +205,8 @@ FITTED = 3e-13, 0.2
 @dataclass(frozen=True)
 class DiagramLine:
     """A line of the diagrams: a model, the setting that is swept, coarse to fine, and the model
-    that is its reference."""
+    that is its reference.
+    """
 
     label: str
     model: str
@@ -443,7 +445,8 @@ RATES = ("cpu", "wall", "steps")
 
 def points_of(frame: pd.DataFrame) -> pd.DataFrame:
     """The settings of all lines in all families: median error with its 10-90 % band and the worst,
-    and median cost a simulated second. A run that failed counts as infinitely wrong."""
+    and median cost a simulated second. A run that failed counts as infinitely wrong.
+    """
     names = "family", "line", "value"
     rows = [(*at, *_point(some)) for at, some in grouped(frame, *names)]
     return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
@@ -487,7 +490,8 @@ def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) ->
 
 def at_the_cost(point: Any, points: pd.DataFrame) -> float:
     """The error of the engine's adaptive line at a point's CPU time, interpolated; NaN outside its
-    range."""
+    range.
+    """
     adaptive = f"{LINES[point.line].model} adaptive"
     return error_at(_of(points, family=point.family, line=adaptive), point.cpu)
 
@@ -514,7 +518,8 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
 
 def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]]:
     """The engines' lines: the largest step (s) whose median error is at most `LEVEL`, in each kind
-    of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played."""
+    of `LEAGUE` and in all of them, NaN where none is; and the smallest step that was played.
+    """
     rows = []
     for (label,), line in grouped(pooled(frame, LEAGUE), "line"):
         good = line[line.rms <= LEVEL]
@@ -527,7 +532,8 @@ def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]
 
 def error_at(line: pd.DataFrame, cpu: float) -> float:
     """Median error of a line, coarse to fine, at a CPU time, both interpolated on logarithmic axes;
-    NaN outside its range."""
+    NaN outside its range.
+    """
     for (e, a), (f, b) in itertools.pairwise(zip(line.rms, line.cpu, strict=True)):
         if a <= cpu <= b and a < b and f > 0.0 and math.isfinite(e):
             return float(e * (f / e) ** (math.log(cpu / a) / math.log(b / a)))
@@ -536,7 +542,8 @@ def error_at(line: pd.DataFrame, cpu: float) -> float:
 
 def quantile(values: Sequence[float], share: float) -> float:
     """The value below which `share` of the sample lies, halfway between two where it lies between
-    them; values may be infinite."""
+    them; values may be infinite.
+    """
     ordered, place = sorted(values), share * len(values)
     below = ordered[max(math.ceil(place - 1e-9) - 1, 0)]
     above = ordered[min(math.floor(place + 1e-9), len(values) - 1)]
@@ -545,7 +552,8 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 def order_of(line: pd.DataFrame) -> float:
     """Slope of log median error over log of the swept setting, by least squares; NaN with fewer
-    than two points."""
+    than two points.
+    """
     fitted = line[(line.rms > FITTED[0]) & (line.rms < FITTED[1])]
     return slope(fitted.value, fitted.rms)
 
@@ -588,7 +596,8 @@ LEAST_ORDER, ROUNDED = 0.5, 1e-6
 
 def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
     """The wall scenes' errors (alpha) by reference, model and setting, coarse to fine; `within`:
-    how many are at most `LEVEL`."""
+    how many are at most `LEVEL`.
+    """
     groups = [*grouped(_ordered(frame, "line"), "line", "value")]
     return pd.DataFrame(
         {
@@ -607,7 +616,8 @@ def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
 
 def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
     """Slopes of log error over log step by model and reference: of the median error, and scene by
-    scene."""
+    scene.
+    """
     lines, rows = dict(grouped(frame.sort_index(), "line", "family")), []
     for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):
         mine = _of(levels, model=model, reference=reference)

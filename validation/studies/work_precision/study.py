@@ -120,9 +120,11 @@ class WorkPrecision(Study):
             yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
-        """Interleaved: whatever else the machine does touches all models alike. An engine's
-        smallest steps go to the workers; in a quick run one member plays those of 1e-4 s, and the
-        adaptive ones of DART, which cost as much."""
+        """Interleaved: whatever else the machine does touches all models alike.
+
+        An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
+        s, and the adaptive ones of DART, which cost as much.
+        """
         families = QUICK if self.quick else tuple(FAMILIES)
         for member, family, line in itertools.product(
             range(QUICK_MEMBERS if self.quick else MEMBERS), families, LINES.values()

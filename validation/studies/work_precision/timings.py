@@ -1,6 +1,7 @@
 """Timings: compiled batches of the event-based model on one core, as microseconds and as
 right-hand-side evaluations; cold starts; and what each thing costs that a scene may not need, the
-same scene with it and without it."""
+same scene with it and without it.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +79,8 @@ class BatchTime:
 @dataclass(frozen=True)
 class ColdStart:
     """Seconds in a fresh process: importing the package, and its first simulation (compiler's
-    import included)."""
+    import included).
+    """
 
     cache: str
     importing: float
@@ -88,7 +90,8 @@ class ColdStart:
 @dataclass(frozen=True)
 class BatchSize:
     """What a batch of so many random pulses (μ 0.3, no wall) takes whole with so many threads,
-    packing included: s a run (median)."""
+    packing included: s a run (median).
+    """
 
     runs: int
     threads: int
@@ -123,7 +126,8 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
 
 def _pulse(scene: Scene, frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
     """Amplitudes (m/s^2) and periods (s) of pulses whose frequency is given over p, whose amplitude
-    over g tan(alpha)."""
+    over g tan(alpha).
+    """
     strength = amplitude * scene.gravity * math.tan(scene.block.alpha)
     return strength, 2.0 * math.pi / (frequency * scene.frequency_parameter)
 
@@ -181,7 +185,8 @@ def batch_size(runs: int, threads: int) -> BatchSize:
 
 def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     """A case's cost on one core, a row a tolerance, played in turn with the time of one right-hand
-    side."""
+    side.
+    """
     case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
     packed = case.packed(reference_model, nodes)
@@ -233,7 +238,8 @@ def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
 
 def right_hand_side_seconds(count: int = 400_000) -> float:
     """CPU seconds of one evaluation of the rocking equation under a Ricker pulse: sin, cos, exp and
-    a polynomial."""
+    a polynomial.
+    """
     from rockcheck.ebm import natural
 
     ground = natural.base_of(_scene()).horizontal
@@ -261,7 +267,8 @@ print(imported - began, time.perf_counter() - loaded)
 
 def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
     """Import and first simulation in a fresh process without compile cache, or with it: the median
-    of so many."""
+    of so many.
+    """
     with tempfile.TemporaryDirectory() as folder:
         fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
         if not cached:
@@ -304,7 +311,8 @@ NOT_MEASURED = (
 @dataclass(frozen=True)
 class Saving:
     """Cost with and without a thing that the scene does not need, in `unit`; `change`: largest
-    change of theta, alpha."""
+    change of theta, alpha.
+    """
 
     model: str
     thing: str
@@ -327,7 +335,8 @@ Pair = tuple[str, str, str, Play, Play, float, str]
 
 def measured(name: str, rounds: int = SAVING_ROUNDS) -> list[Saving]:
     """The savings of one of `KINDS`: median costs with and without, played in turn; a first round
-    warms up."""
+    warms up.
+    """
     found = []
     for model, thing, unit, dear, cheap, change, remark in KINDS[name]():
         costs = [(dear(), cheap()) for _ in range(rounds + 1)][1:]
