@@ -1,5 +1,6 @@
 """The paper's Continuous Model: penalty contact at the corners, one equation of motion for all
-modes."""
+modes.
+"""
 
 from rockcheck.cm.model import ContinuousModel
 from rockcheck.cm.restitution import measured_restitution

@@ -52,8 +52,9 @@ def friction_force(
     stretch: float,
     rate: float,
 ) -> tuple[float, bool]:
-    """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone. Returns force
-    and whether it slips.
+    """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone.
+
+    Returns force and whether it slips.
 
     `stretch` (m) is the spring's memory, `rate` (m/s) the corner's tangential velocity as it would
     be without this force, and `mobility` how much of that velocity a unit of force takes away: the
@@ -76,8 +77,9 @@ def effective_mass(
     friction: float,
     restitution: float,
 ) -> float:
-    """Share of the block's mass that a corner brings to an impact with friction. It arrives at
-    `normal` (< 0) and `tangential` speed.
+    """Share of the block's mass that a corner brings to an impact with friction.
+
+    It arrives at `normal` (< 0) and `tangential` speed.
 
     A unit impulse along the normal changes the corner's velocity by k_n = 1 + 3 r_t^2/R^2 along the
     normal and by k_c = -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3

@@ -112,7 +112,8 @@ class Parameters(NamedTuple):
 
 class Contacts(NamedTuple):
     """The contacts of a run: `memory` holds one row a contact, `friction` the floor's; `surfaces`
-    lists those of the scene, the floor last."""
+    lists those of the scene, the floor last.
+    """
 
     memory: Floats
     friction: Floats
@@ -122,7 +123,8 @@ class Contacts(NamedTuple):
 
 class Step(NamedTuple):
     """A step, seen from its middle: the place of the mass's centre and of the corners, the velocity
-    before it, its length, and the time."""
+    before it, its length, and the time.
+    """
 
     x: float
     y: float
@@ -134,7 +136,8 @@ class Step(NamedTuple):
 
 class Arrival(NamedTuple):
     """A corner (0 or 1) that comes to a surface: its offset, its mobility, that of the surface's
-    other corner and what couples them, its rate (< 0) and slip; gap and rate of the other one."""
+    other corner and what couples them, its rate (< 0) and slip; gap and rate of the other one.
+    """
 
     surface: int
     corner: int
@@ -151,7 +154,8 @@ class Arrival(NamedTuple):
 
 class Pair(NamedTuple):
     """The two corners that face a surface: their forces as if these did not move them, how much a
-    unit of velocity lowers these, their mobilities and what couples them, and their levers."""
+    unit of velocity lowers these, their mobilities and what couples them, and their levers.
+    """
 
     f1: float
     f2: float
@@ -176,7 +180,8 @@ class Shaking(NamedTuple):
 @kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
     """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after
-    the last."""
+    the last.
+    """
     place = t * rate
     left = int(place)
     if left + 1 >= len(samples):
@@ -219,6 +224,7 @@ def with_forces(
 @inner_kernel
 def closes(contacts: Contacts, arrival: Arrival, t: float) -> float:
     """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long.
+
     Returns the step that it asks for.
 
     When the surface's other corner arrives within the contact's own time, the two share the block's
@@ -288,7 +294,8 @@ def response(
     ahead: float,
 ) -> tuple[float, float]:
     """Force of a closed contact as if its own forces did not move it, and how much a unit of
-    velocity lowers it."""
+    velocity lowers it.
+    """
     share = felt_share(damping * mobility * step)
     return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (
         share * damping + k * ahead
@@ -332,7 +339,8 @@ def pushed(
     contacts: Contacts, arrival: Arrival, gap: float, before: float, now: Step, ahead: float
 ) -> tuple[float, float, float]:
     """What `response` says of a closed contact; and the step that it asks for if it has just
-    closed, else infinity."""
+    closed, else infinity.
+    """
     memory, one = contacts.memory, 2 * arrival.surface + arrival.corner
     fine = math.inf
     if memory[one, CLOSED] == 0.0:
@@ -485,7 +493,8 @@ def wall_force(memory: Floats) -> float:
 @kernel
 def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
     """Write the strikes that began by `until` into `events` behind the first `n_events`; returns
-    how many there are then."""
+    how many there are then.
+    """
     for i in range(len(memory)):
         if memory[i, STRUCK] <= until:
             events[n_events, :] = memory[i, STRUCK], float(i), memory[i, IMPULSE]
@@ -499,7 +508,8 @@ def sweep(
     contacts: Contacts, now: Step, v: Velocity, ahead: float, takes_back: bool
 ) -> tuple[Velocity, float, float, float, float]:
     """Each surface in turn takes back its force, or has none yet, and replaces it: what `press`
-    returns of all surfaces, by how much the forces have changed, and their sum."""
+    returns of all surfaces, by how much the forces have changed, and their sum.
+    """
     memory = contacts.memory
     closing = young = math.inf
     change = whole = 0.0
@@ -549,7 +559,8 @@ def kick(
 @inner_kernel
 def stretch(contacts: Contacts, now: Step, v: Velocity) -> None:
     """The friction spring follows the lower corner over a step; one that slips keeps the length of
-    its largest force."""
+    its largest force.
+    """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
     corners, v0, step = now.corners, now.v0, now.length
     friction[SLIPPED] = friction[SLIPS]
@@ -611,7 +622,8 @@ def run_to(
 ) -> tuple[bool, int, int, int, float]:
     """Steps from one of two times to the other, and moves `state` along (see `advance`): whether
     the block overturns, the events written, the steps and the sweeps that this took, and the time
-    reached."""
+    reached.
+    """
     parameters, memory = contacts.parameters, contacts.memory
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
     x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state

@@ -85,7 +85,8 @@ class ContinuousModel(Frozen):
 
     def coarser(self, factor: float) -> Self:
         """The same model with steps `factor` times as long, and the contacts as much softer as that
-        allows (step ~ 1/sqrt(k/m))."""
+        allows (step ~ 1/sqrt(k/m)).
+        """
         change: dict[str, float] = {"penetration": factor**2 * self.penetration}
         if self.stiffness is not None:
             change = {"stiffness": self.stiffness / factor**2}
@@ -243,8 +244,10 @@ class ContinuousModel(Frozen):
     def _initial(
         self, scene: Scene, parameters: kernels.Parameters
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so
-        that it does not bounce."""
+        """State and contact memory at t = 0.
+
+        A block on the floor starts sunk in by its weight, so that it does not bounce.
+        """
         from rockcheck.cm import kernels
 
         x, y, tilt, *rates = scene.initial_state
@@ -282,7 +285,8 @@ def _samples(
     excitation: Rest | Ricker | Sine | Record, duration: float
 ) -> tuple[NDArray[np.float64], float]:
     """The excitation as samples (m/s^2) with straight lines between them, and their number a
-    second; a record's own."""
+    second; a record's own.
+    """
     if isinstance(excitation, Record):
         return excitation.samples, 1.0 / excitation.time_step
     if isinstance(excitation, Rest):

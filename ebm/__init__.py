@@ -1,5 +1,6 @@
 """The event-based models of a rocking and sliding block, overturning spectra, and the horizon of
-predictability."""
+predictability.
+"""
 
 from rockcheck.ebm.horizon import predictability_horizon
 from rockcheck.ebm.model import EventBasedModel

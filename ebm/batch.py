@@ -64,7 +64,8 @@ def pack_pulses(
     scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats
 ) -> Packed:
     """Packs one scene under many pulses of its own kind: amplitudes in m/s^2, periods in s, 1-D
-    arrays of one length."""
+    arrays of one length.
+    """
     model.check(scene)
     unit, count = natural.time_unit(scene), len(amplitudes)
     template = type(scene.excitation)

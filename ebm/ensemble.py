@@ -1,5 +1,6 @@
 """Histories of many scenes of one duration at once: rotations on a common grid, peaks, outcomes and
-last slips."""
+last slips.
+"""
 
 from __future__ import annotations
 

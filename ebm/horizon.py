@@ -85,7 +85,8 @@ def _disturbed(
     scene: Scene, model: EventBasedModel, perturbation: float
 ) -> Iterator[tuple[EventBasedModel, Scene]]:
     """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off
-    zero."""
+    zero.
+    """
     alpha, rate = scene.block.alpha, scene.block.alpha * scene.frequency_parameter
     speed = scene.block.radius * rate
     units = {"initial_rotation": alpha, "initial_angular_velocity": rate, "initial_velocity": speed}

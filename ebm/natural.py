@@ -121,7 +121,8 @@ def state_of(scene: Scene) -> NDArray[np.float64]:
 
 def to_si(scene: Scene, states: NDArray[np.float64]) -> NDArray[np.float64]:
     """States (n x 6: x, y, theta and rates) of the mass's centre in natural units as those of the
-    box's centre in SI."""
+    box's centre in SI.
+    """
     radius, unit = scene.block.radius, time_unit(scene)
     found = states * np.array([radius, radius, 1.0, radius / unit, radius / unit, 1.0 / unit])
     if scene.block.centre_of_mass is not None:

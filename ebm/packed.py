@@ -29,7 +29,8 @@ _READY: dict[bool, Callable[..., None]] = {}
 @dataclass(frozen=True, kw_only=True)
 class Packed:
     """Runs as arrays, one row each, natural units: what compiled code is given, the motion at the
-    start, and the duration."""
+    start, and the duration.
+    """
 
     rows: Rows
     starts: NDArray[np.void]
@@ -111,7 +112,8 @@ def play(model: Any, rows: Rows, states: NDArray[np.void], records: Records) -> 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:
     """The machine code of the event loop with the model's friction, loaded or compiled, for what it
-    is given: always of the same types."""
+    is given: always of the same types.
+    """
     bouc_wen = model.friction == "bouc-wen"
     if bouc_wen not in _READY:
         _READY[bouc_wen] = for_types_of(march.play_bouc_wen if bouc_wen else march.play, *given)

@@ -1,5 +1,6 @@
 """Overturning spectra: the outcome over a grid of pulse frequencies and amplitudes (the paper's
-Figs. 6 to 9)."""
+Figs. 6 to 9).
+"""
 
 from __future__ import annotations
 
@@ -76,8 +77,7 @@ class Spectrum(Shown):
         return float(np.mean(self.safe))
 
     def least_overturning_amplitude(self) -> Floats:
-        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none
-        overturns."""
+        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
         fallen = self.outcomes != SAFE
         first = np.argmax(fallen, axis=0)
         return np.where(fallen.any(axis=0), self.amplitude_ratios[first], np.nan)
@@ -213,7 +213,8 @@ def _packed(
 @dataclass(frozen=True)
 class Motion:
     """The motion at one node: `rows` of t (s), theta (rad), x and y (m), fewer where the node's
-    `block` overturns; and the outcome."""
+    `block` overturns; and the outcome.
+    """
 
     block: Block
     rows: Floats
@@ -273,7 +274,8 @@ def node_scene(
     scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0
 ) -> Scene:
     """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after
-    the motion of the base."""
+    the motion of the base.
+    """
     if isinstance(scene.excitation, Record):
         return scene.replace(
             excitation=scene.excitation.scaled(float(amplitude_ratio)),
@@ -291,7 +293,8 @@ def node_scene(
 
 def node_pulse(scene: Scene, amplitude_ratio: float, frequency_ratio: float) -> tuple[float, float]:
     """Amplitude (m/s^2) and period (s) of the pulse of one node: a = A g tan(alpha), T = 2 pi/(F p)
-    with the frequency parameter p."""
+    with the frequency parameter p.
+    """
     amplitude = float(amplitude_ratio) * scene.gravity * scene.block.slope
     return amplitude, 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
 

@@ -62,7 +62,8 @@ _NEARLY = 10.0
 @inner_kernel
 def _fill_z(block, a, k, loads, yielded):
     """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, given those of V and z up to
-    k."""
+    k.
+    """
     if yielded:
         a[Row.Z, k + 1] = 0.0
         return
@@ -76,7 +77,8 @@ def _fill_z(block, a, k, loads, yielded):
 @inner_kernel
 def _less_later(value, a, x, y, k):
     """A value less the products of x's later coefficients, to be divided by its first one for y's
-    coefficient k."""
+    coefficient k.
+    """
     for j in range(1, k + 1):
         value -= a[x, j] * a[y, k - j]
     return value
@@ -211,7 +213,8 @@ def _held(block, base, state):
 @inner_kernel
 def _hangs_on(base, state):
     """Whether the floor begins to fall away faster than g under a block at rest, and nothing tells
-    to which side it would tip."""
+    to which side it would tip.
+    """
     mode, t = state.mode, state.t
     stands = mode.pivot == Pivot.STICK and mode.pull > 0 and not on_wall(mode)
     still = (
@@ -232,8 +235,10 @@ def _rest(block, base, state):
 
 @inner_kernel
 def _waits(base, state):
-    """Waits until a block at rest may move. Friction fails as the push of the floor ends: what
-    moves in between is rounding."""
+    """Waits until a block at rest may move.
+
+    Friction fails as the push of the floor ends: what moves in between is rounding.
+    """
     motion = state.motion
     if motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0:
         state.t = weightless_at(base.vertical, state.t)
@@ -242,7 +247,8 @@ def _waits(base, state):
 @called_kernel
 def _leave_rest(block, base, run):
     """The block at rest starts to slide, or to tilt, as u grows to the side to which it tips first;
-    returns z = -u/(mu_k G0), +-1 if it slides."""
+    returns z = -u/(mu_k G0), +-1 if it slides.
+    """
     state, t = run.state, run.state.t
     sense = tips_first(block, base, state)
     u, g = acceleration(base.horizontal, t), 1.0 + acceleration(base.vertical, t)
@@ -299,7 +305,8 @@ def _tilts(block, base, run, sense, v, zeta):
 @called_kernel
 def _starts(block, base, run, zeta):
     """The contacts of a block that starts, or goes on after an impact; returns z, changed only
-    where it was at rest."""
+    where it was at rest.
+    """
     state, motion = run.state, run.state.motion
     v = slip_velocity(block, motion)
     if motion.theta == 0.0 and motion.w == 0.0:
@@ -318,7 +325,8 @@ def _starts(block, base, run, zeta):
 @called_kernel
 def _wedged_series(block, base, run, zeta, order, reach):
     """The series of a block that both walls hold (see ebm.core.motion), and the share of its
-    friction in what they carry."""
+    friction in what they carry.
+    """
     mode, a = run.state.mode, run.a
     order = tilt_series(block, base, run, order, 0.0, reach)
     side = side_of(block, mode.sense)
@@ -337,8 +345,9 @@ def _wedged_series(block, base, run, zeta, order, reach):
 
 @called_kernel
 def _close_walls(block, base, run, zeta, which):
-    """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with
-    more walls are tried first.
+    """Lets the corners of a tilting block rest on the touched walls that would push them.
+
+    Sets with more walls are tried first.
 
     A push that `which` has just ended (or Guard.NONE) does not go on where anything else fits,
     however near to zero it still is. The slack multiplies what counts as noise: at one instant it
@@ -378,8 +387,10 @@ def _try_walls(block, base, run, zeta, walls, ended):
 
 @inner_kernel
 def _fits_walls(block, base, run, zeta, walls, ended):
-    """Whether the mode with these walls, of those that are touched, fits. It is left in the
-    state."""
+    """Whether the mode with these walls, of those that are touched, fits.
+
+    It is left in the state.
+    """
     leans, touched = walls
     if not _try_walls(block, base, run, zeta, leans, ended):
         return False
@@ -426,8 +437,10 @@ def _aim(block, base, run, zeta, ended):
 
 @inner_kernel
 def _has_sign(a, sign, ended):
-    """Whether P begins with this sign. Where the other one has just ended, it may do so an instant
-    later."""
+    """Whether P begins with this sign.
+
+    Where the other one has just ended, it may do so an instant later.
+    """
     if ended != 0 and abs(a[Row.P, 0]) <= abs(a[Row.P, 1]) * INSTANT:
         return True
     return sign * leading(a, Row.P, _LOOK - 2, NOISE[Kind.FORCE], AHEAD) >= 0
@@ -435,8 +448,9 @@ def _has_sign(a, sign, ended):
 
 @called_kernel
 def _initial_friction(block, base, run):
-    """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at
-    most 1 in size)."""
+    """Z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at
+    most 1 in size).
+    """
     mode, motion, a = run.state.mode, run.state.motion, run.a
     v = slip_velocity(block, motion)
     if abs(v) > SLOW:
@@ -483,7 +497,8 @@ def expand(block, base, run, reach):
 @inner_kernel
 def locate(block, run):
     """The first event of the step, as with Coulomb's friction; one more is that z comes to the sign
-    of V, from where the pivot loads."""
+    of V, from where the pivot loads.
+    """
     state, mode, a = run.state, run.state.mode, run.a
     fill_guards(block, run.state, run.a)
     # The friction of a wedged block, which does not slip, is what z makes it: it has no cone to
@@ -572,8 +587,10 @@ def _follow(block, base, run):
 
 @inner_kernel
 def _turn(block, base, state):
-    """The slip has come to its end: the pivot slips back, or a flat block rests. The event that is
-    told."""
+    """The slip has come to its end: the pivot slips back, or a flat block rests.
+
+    The event that is told.
+    """
     event = Event.UNTOLD if state.holds else Event.STICKS
     state.holds = True
     state.mode.slip = -state.mode.slip
@@ -594,7 +611,8 @@ def _comes_to_rest(block, base, state):
 @inner_kernel
 def _tip_sliding(block, base, run):
     """A block tilts while it slides; the event that is told, none where rounding keeps it flat for
-    a while."""
+    a while.
+    """
     state, slip = run.state, run.state.mode.slip
     # It slid by rounding, whose sign would choose the side.
     if abs(state.motion.vx) < SLOW and _comes_to_rest(block, base, state):

@@ -38,7 +38,8 @@ def quiet_from(base, tolerance):
 @inner_kernel
 def decided(block, base, state):
     """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else
-    -1."""
+    -1.
+    """
     t, quiet, peak, theta = state.t, state.quiet_from, state.peak, state.motion.theta
     still = base.vertical.form.kind == Shape.STILL
     ahead = 0.0
@@ -124,7 +125,9 @@ def swings_again(state, energy):
 @inner_kernel
 def swing_error(tolerance):
     """The error of rotation and speed after a swing: a step errs by the tolerance, or by rounding.
-    Energy errs by that times the speed."""
+
+    Energy errs by that times the speed.
+    """
     return _STEPS * (tolerance + NOISE[Kind.POSITION])
 
 
@@ -157,7 +160,8 @@ def _falls(block, base, state):
 @inner_kernel
 def _rocks_for_good(block, mode, energy):
     """Whether the block rocks and neither pivot can slip in free rocking of this energy (up to its
-    balance point), impacts included."""
+    balance point), impacts included.
+    """
     if block.walls or not rocks(mode):
         return False
     return block.no_slip or (

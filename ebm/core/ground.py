@@ -195,7 +195,8 @@ def next_kink(g, t):
 @inner_kernel
 def acceleration_after(g, t):
     """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the
-    next kink."""
+    next kink.
+    """
     return acceleration(g, _soon(g, t))
 
 
@@ -207,7 +208,8 @@ def _soon(g, t):
 @inner_kernel
 def weightless_at(g, t):
     """The time at which vertical base motion falls away with 1 g, if it falls away with less at t,
-    and with more soon after; else t."""
+    and with more soon after; else t.
+    """
     now, after = 1.0 + acceleration(g, t), 1.0 + acceleration_after(g, t)
     return t + (_soon(g, t) - t) * now / (now - after) if now > 0.0 > after else t
 
@@ -250,7 +252,8 @@ def _next_extremum_of_pulse(f, t):
 @inner_kernel
 def _next_extremum(g, t):
     """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
-    dying out) for good."""
+    dying out) for good.
+    """
     if g.form.kind == Shape.SAMPLED:
         return next_kink(g, t)
     if g.form.kind == Shape.SINE:
@@ -265,7 +268,8 @@ def _next_extremum(g, t):
 @inner_kernel
 def largest_ahead(g, t):
     """A bound on |acceleration| from time t on: its value now and at the extrema to come; a
-    record's largest sample."""
+    record's largest sample.
+    """
     if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
     if g.form.kind == Shape.SINE:
@@ -284,7 +288,8 @@ def largest_ahead(g, t):
 @inner_kernel
 def impulse_ahead(g, t):
     """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe,
-    infinite before it."""
+    infinite before it.
+    """
     if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
     tau = t - g.form.centre
@@ -331,7 +336,8 @@ def _passage(g, a, b, fa, fb, level):
 @inner_kernel
 def _leaves(g, times, values, level, beyond, ahead):
     """The time between two `times` at which the acceleration passes the level, but at most `ahead`
-    before it is `beyond`; it is monotone in between, with these values at the ends."""
+    before it is `beyond`; it is monotone in between, with these values at the ends.
+    """
     (t, end), (here, there) = times, values
     passed = t
     if (here - level) * (there - level) <= 0.0:

@@ -75,7 +75,8 @@ _ANY = 2.0**400
 @inner_kernel
 def _enter(a, which, shorter, series, weight):
     """Enters a guard into the table: so many terms shorter than the series, with the weight of one
-    of them; its other weights and its constant are zero."""
+    of them; its other weights and its constant are zero.
+    """
     row = Row.TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
@@ -161,8 +162,7 @@ def _fill_gap(block, state, a, tip):
 
 @inner_kernel
 def _fill_flat(block, mode, a):
-    """The guards of a translating block; the tip wall is the left one, the far wall the right
-    one."""
+    """The guards of a translating block; the tip wall is the left one, the far wall the right one."""
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
     if block.gap_left < np.inf and mode.tip == 0:
         _enter(a, Guard.TIP_GAP, 0, Row.XI, 1.0)
@@ -220,8 +220,10 @@ def _fill_uplift(block, mode, hangs, plus, a):
 
 @inner_kernel
 def _coefficients(which, half, a):
-    """Eight coefficients, from `half` on, of a guard of the table, without its constant. A series
-    without weight need not be there."""
+    """Eight coefficients, from `half` on, of a guard of the table, without its constant.
+
+    A series without weight need not be there.
+    """
     row, sum, rate = Row.TABLE + which, zeros(), KIND[which] == Kind.RATE
     for part in range(_MOST):
         series = _COMBINES[which, part]
@@ -233,7 +235,8 @@ def _coefficients(which, half, a):
 @inner_kernel
 def guard(which, order, a):
     """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode
-    has no such guard."""
+    has no such guard.
+    """
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return -1
@@ -247,8 +250,9 @@ def guard(which, order, a):
 
 @inner_kernel
 def _with_slack(which, slack, a):
-    """The noise allowed to the guard in the workspace, in a mode with this slack. An open contact
-    is not noise.
+    """The noise allowed to the guard in the workspace, in a mode with this slack.
+
+    An open contact is not noise.
 
     A gap that touches without speed may close by the noise. That takes time, so that the events of
     one instant come to an end.
@@ -292,7 +296,8 @@ def _coefficient(which, k, a):
 @inner_kernel
 def starts_positive(which, ahead, a):
     """A cheap proof, without writing the guard, that it leaves zero upward, seen so far ahead; a
-    mode without it has nothing to prove."""
+    mode without it has nothing to prove.
+    """
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
@@ -310,7 +315,8 @@ def starts_positive(which, ahead, a):
 @inner_kernel
 def _stays_positive(which, order, until, slack, a):
     """A cheap proof, without writing the guard, that it is positive up to a time: more so than the
-    sum of all its terms that fall."""
+    sum of all its terms that fall.
+    """
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
@@ -389,6 +395,7 @@ def first_event(run):
 @inner_kernel
 def rock_guards_hold(block, run):
     """A cheap proof that a rocking block keeps every guard of ROCK but Guard.PHI through a step h.
+
     False where it proves nothing.
 
     Each guard is bounded from below as in `first_root`, without being written. Inside the cone the
@@ -419,7 +426,8 @@ def rock_guards_hold(block, run):
 @inner_kernel
 def _rock_gap_holds(row, order, h, a):
     """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a
-    step h."""
+    step h.
+    """
     along, across = a[row, Row.COS], a[row, Row.SIN]
     cos_low, cos_high = halves(a, Row.COS, order)
     sin_low, sin_high = halves(a, Row.SIN, order)

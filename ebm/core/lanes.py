@@ -104,7 +104,8 @@ def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callab
 
 class _Arithmetic(AbstractTemplate):
     """The types of sums and products: of lanes with lanes, and of lanes with a number, which all
-    lanes then have."""
+    lanes then have.
+    """
 
     def generic(self, args: Any, kws: Any) -> Any:
         if _LANES in args and all(kind in (_LANES, types.float64) for kind in args):
@@ -235,7 +236,8 @@ def _falls(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 def total(v: Numbers) -> float:
     """The sum of all lanes: of the two halves, of the two quarters of that, and of the two numbers
-    that are left."""
+    that are left.
+    """
     while len(v) > 1:
         half = len(v) // 2
         v = v[:half] + v[half:]

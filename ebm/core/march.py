@@ -120,7 +120,8 @@ def smooth_until(base, state):
 @inner_kernel
 def finite(state, holds):
     """Whether the motion is finite, as `holds` says; else the run ends: no step is good for a
-    series that is not finite."""
+    series that is not finite.
+    """
     if not holds:
         state.ending = Ending.NOT_FINITE
     return holds

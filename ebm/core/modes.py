@@ -80,7 +80,8 @@ _FLAT_TRIES = 4
 
 def _tries() -> np.ndarray:
     """The candidates, by number, and then -1: of a tilted block that touches these walls (none, 1,
-    2, 3), in the last row of a flat one."""
+    2, 3), in the last row of a flat one.
+    """
     family, sense, walls, only_flat = _CANDIDATES[:, [0, 1, 5, 6]].T
     rows = np.full((_FLAT_TRIES + 1, len(_CANDIDATES) + 1), -1, dtype=np.int8)
     rows[_FLAT_TRIES, :-1] = range(len(_CANDIDATES))
@@ -106,8 +107,10 @@ def forget(state):
 
 @inner_kernel
 def leave(state, kind):
-    """Notes that a guard of this kind has ended the mode. If it was a force's, and by rounding
-    only, the mode may go on once."""
+    """Notes that a guard of this kind has ended the mode.
+
+    If it was a force's, and by rounding only, the mode may go on once.
+    """
     if state.t - state.since > INSTANT:
         forget(state)
     code = code_of(state.mode)
@@ -196,14 +199,16 @@ def _favoured(block, base, state):
 @inner_kernel
 def tips_first(block, base, state):
     """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which
-    all of it is calculated."""
+    all of it is calculated.
+    """
     return 1 if _favoured(block, base, state) >= 0 else -1
 
 
 @inner_kernel
 def hangs_flat(mode):
     """Whether the floor holds a flat block at rest that no wall touches, though it falls away
-    faster than g."""
+    faster than g.
+    """
     return rests(mode) and mode.pull < 0 and not on_wall(mode)
 
 
@@ -256,7 +261,8 @@ def _may_pull(block, mode, flat, mine):
 @inner_kernel
 def _flat_on(mode, mine, walls):
     """Whether a flat block rests on the right walls, of those that it touches: at rest it is held
-    on these; sliding it touches none; between two walls that it fills it leans on both."""
+    on these; sliding it touches none; between two walls that it fills it leans on both.
+    """
     held = mode.pivot == Pivot.STICK or (mode.pivot == Pivot.OFF and walls == 3)
     return (mine == walls or not held) and (mine == 0 or mode.pivot != Pivot.SLIPPING)
 
@@ -264,7 +270,8 @@ def _flat_on(mode, mine, walls):
 @inner_kernel
 def touched_walls(block, motion, sense, flat):
     """The walls that the block touches, as bits: flat, left and right; else, as it tips to `sense`,
-    the tip wall and the far one."""
+    the tip wall and the far one.
+    """
     if not block.walls:
         return 0
     return (1 if closed_wall(block, motion, 1 if flat else sense, False) else 0) + (
@@ -275,7 +282,8 @@ def touched_walls(block, motion, sense, flat):
 @inner_kernel
 def _clean(block, motion, floor):
     """Sets to zero what differs from it by rounding only: a tilt, a slip, the motion of a block
-    that stands on floor and wall."""
+    that stands on floor and wall.
+    """
     upright(block, motion)
     if floor and abs(slip_velocity(block, motion)) < SLOW:
         stand(block, motion)
@@ -292,7 +300,8 @@ class _Touching(NamedTuple):
     """What a selection begins with: the side to which the block would rather tip (0: either), that
     to which it is first asked to, whether it touches the floor, its slip velocity; the walls that
     it touches, as bits: flat (left and right), as it tips to the first side, to the other; and the
-    row of the candidates."""
+    row of the candidates.
+    """
 
     favoured: int
     first: int
@@ -326,8 +335,10 @@ def _touching(block, base, state):
 
 @called_kernel
 def select(block, base, run):
-    """Writes the consistent mode into the state, or the one that is wrong by least. False where the
-    state is not finite."""
+    """Writes the consistent mode into the state, or the one that is wrong by least.
+
+    False where the state is not finite.
+    """
     state, mode = run.state, run.state.mode
     state.began = state.t
     at = _touching(block, base, state)
@@ -356,7 +367,8 @@ def select(block, base, run):
 @inner_kernel
 def _least_wrong(block, base, run, at, trial):
     """By how much the candidate is wrong that is wrong by least, and which; the first one that fits
-    is left in the state. The last trial looks at the modes that have been tried at this instant."""
+    is left in the state. The last trial looks at the modes that have been tried at this instant.
+    """
     least, chosen = np.inf, -1
     for place in range(_TRIES.shape[1]):
         number = _TRIES[at.tries, place]
@@ -373,7 +385,8 @@ def _least_wrong(block, base, run, at, trial):
 @inner_kernel
 def _comes_up(block, state, at, number, again):
     """Writes a candidate, if the walls that it leans on are touched; whether it is possible, and
-    has been tried at this instant (`again`) or not."""
+    has been tried at this instant (`again`) or not.
+    """
     mode = state.mode
     tilts = _CANDIDATES[number, 0] == Family.TILT
     touched = (at.near if _CANDIDATES[number, 1] > 0 else at.away) if tilts else at.upright_walls

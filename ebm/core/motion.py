@@ -70,7 +70,8 @@ def base_series(base, t, sign, order, a):
 @inner_kernel
 def turned(block, state, a):
     """Writes the start of the series of rotation, sine and cosine; returns the side that it tips
-    to."""
+    to.
+    """
     mode, motion = state.mode, state.motion
     sign = float(mode.sense)
     a[Row.PHI, 0] = sign * motion.theta
@@ -112,8 +113,9 @@ def tilt_series(block, base, run, order, enough, reach):
 
 @inner_kernel
 def _products(a, x, y, first, last, n):
-    """The sum of x_j y_(n-j) for j from `first` to `last`. The ends, which are the newest
-    coefficients, are added last:
+    """The sum of x_j y_(n-j) for j from `first` to `last`.
+
+    The ends, which are the newest coefficients, are added last:
 
     so the processor need not wait for them to begin with the sum.
     """
@@ -130,7 +132,8 @@ def _products(a, x, y, first, last, n):
 @inner_kernel
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
     """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to
-    a constant."""
+    a constant.
+    """
     w0, s0, c0, u0 = a[Row.OMEGA, 0], a[Row.SIN, 0], a[Row.COS, 0], a[Row.U, 0]
     w, s, c = w0, s0, c0
     ds, dc, push = w0 * c0, w0 * s0, u0 * c0
@@ -176,8 +179,10 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
 
 @inner_kernel
 def _slide_series(spin, kappa, order, enough, reach, a):
-    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general
-    solution, written out for speed."""
+    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P.
+
+    The general solution, written out for speed.
+    """
     sine, cosine = a[Row.SIN, 0], a[Row.COS, 0]
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
@@ -267,7 +272,8 @@ def _lean_series(block, side, tip, order, a):
 
 class _Acting(NamedTuple):
     """The contacts of a mode: the side that the block tips to, 1/I, the friction of a slipping
-    pivot (Q = -kappa P), and which of them act; `stick` is the pivot's tangent."""
+    pivot (Q = -kappa P), and which of them act; `stick` is the pivot's tangent.
+    """
 
     side: Any
     spin: float
@@ -286,14 +292,15 @@ def _acts(acting, which):
 
 @inner_kernel
 def _wall_arms(side, s, c):
-    """c' of the corners on the tip wall and on the far wall."""
+    """C' of the corners on the tip wall and on the far wall."""
     return side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
 
 
 @inner_kernel
 def _contact_rows(acting, a):
     """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start;
-    returns their number."""
+    returns their number.
+    """
     s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
     along, upward = (0.0, 1.0, 1.0, -1.0), (1.0, 0.0, 0.0, 0.0)
@@ -319,7 +326,8 @@ def _contact_rows(acting, a):
 @called_kernel
 def _contact_series(block, mode, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
-    forces is the same each time."""
+    forces is the same each time.
+    """
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
     stick = (
@@ -377,7 +385,8 @@ def _contact_series(block, mode, order, enough, reach, a):
 @inner_kernel
 def _moment_of_lower_orders(acting, k, a):
     """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later
-    terms; none where both walls hold it."""
+    terms; none where both walls hold it.
+    """
     moment = 0.0
     if acting.floor:
         a[Row.FLOOR_ARM, k] = a[Row.SIN, k] + acting.kappa * a[Row.COS, k]

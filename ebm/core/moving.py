@@ -21,7 +21,8 @@ _FADES = 0.25
 @inner_kernel
 def may_go_on(block, base, run):
     """Whether the run goes on; else why it ends here: its time is up, its outcome is certain, or it
-    has taken too many steps."""
+    has taken too many steps.
+    """
     state, motion = run.state, run.state.motion
     if state.t >= state.t_end:
         state.ending = Ending.DONE
@@ -83,7 +84,8 @@ def advance(block, base, run):
 @inner_kernel
 def passes_on(block, base, run):
     """Whether the event that ends the step ends no mode: the block only grazes the floor, or the
-    run is over."""
+    run is over.
+    """
     state, motion = run.state, run.state.motion
     if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):
         return True
@@ -104,6 +106,7 @@ def passes_on(block, base, run):
 @inner_kernel
 def _grazes(block, base, run):
     """Whether a hanging block that comes down with less energy than a swing errs by does not land.
+
     It is then put where it turns back.
 
     A block at rest whose floor falls away swings back to just where it started. That cannot be told

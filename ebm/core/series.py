@@ -1,7 +1,9 @@
-"""Taylor polynomials: evaluation and the first root. A polynomial is a row of a two-dimensional
-array: the coefficients a[row, 0..n] of 1, tau, tau^2, ..., n <= ORDER. (Rows are addressed in
-place; views of them would cost more than the sums.) They are worked on in two halves of eight, each
-at once (see ebm.core.lanes). What stands behind a[row, n] does not matter.
+"""Taylor polynomials: evaluation and the first root.
+
+A polynomial is a row of a two-dimensional array: the coefficients a[row, 0..n] of 1, tau, tau^2,
+..., n <= ORDER. (Rows are addressed in place; views of them would cost more than the sums.) They
+are worked on in two halves of eight, each at once (see ebm.core.lanes). What stands behind a[row,
+n] does not matter.
 
 Everything that the event-based model follows in time (rotation, position, contact forces, gaps) is
 one such polynomial a step, so an event is the root of a polynomial and can be located to rounding,
@@ -128,8 +130,7 @@ def size_of(a, one, other, k):
 
 @inner_kernel
 def step_size(a, one, other, order, last_term, reach):
-    """The step at which the last two terms of two series stay below `last_term`, at most
-    `reach`."""
+    """The step at which the last two terms of two series stay below `last_term`, at most `reach`."""
     return longest_step(
         size_of(a, one, other, order), size_of(a, one, other, order - 1), order, last_term, reach
     )
@@ -164,8 +165,9 @@ def _step_of_term(size, k, last_term):
 
 @inner_kernel
 def force_step(a, row, order, tolerance, reach):
-    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An
-    error of its rate moves nothing.
+    """The step at which the last two terms of a force stay below the tolerance, at most `reach`.
+
+    An error of its rate moves nothing.
 
     Friction that winds up under a constant acceleration is a series of every fourth power. So the
     two terms before count, too. Limit of term k: tolerance^(k/(order-1)), for geometric decay.
@@ -182,7 +184,8 @@ def force_step(a, row, order, tolerance, reach):
 @called_kernel
 def leading(a, row, n, floor, ahead):
     """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time
-    `ahead`, at most AHEAD."""
+    `ahead`, at most AHEAD.
+    """
     k = _order_of_zero(a, row, n, floor, ahead)
     if k > n:
         return 0
@@ -192,7 +195,8 @@ def leading(a, row, n, floor, ahead):
 @inner_kernel
 def leads_up(begin, rate, half_bend, floor, ahead):
     """Whether the first three coefficients show that c leaves tau = 0 upward: as `leading`, where c
-    is positive beyond all noise."""
+    is positive beyond all noise.
+    """
     noise = _ERROR * max(begin, ahead * abs(rate), ahead * ahead * abs(half_bend))
     return max(floor, noise) < begin < math.inf
 

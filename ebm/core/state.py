@@ -148,7 +148,8 @@ class Rows(NamedTuple):
 
 class Records(NamedTuple):
     """Where a run writes: rows of states, their modes, the log of events; arrays of these where
-    there are several runs."""
+    there are several runs.
+    """
 
     out: Numbers
     out_mode: NDArray[np.int8]
@@ -157,7 +158,8 @@ class Records(NamedTuple):
 
 class Run(NamedTuple):
     """A run: its state, the series of its step and the stack of the search for roots, and where it
-    writes."""
+    writes.
+    """
 
     state: np.record
     a: Numbers
@@ -168,7 +170,8 @@ class Run(NamedTuple):
 @kernel
 def workspace():
     """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
-    search."""
+    search.
+    """
     series = np.zeros((ROWS, WIDTH))
     series[Row.G, 0] = series[Row.ANGLE, 2] = 1.0
     return series, np.zeros((48, WIDTH))

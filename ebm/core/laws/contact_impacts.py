@@ -80,7 +80,8 @@ class Stage(NamedTuple):
     """What a stage of an impact works on: rows of the contacts, a linear system, of a trial the
     impulses and the velocities; of each contact its restitution, the velocity that it is to leave
     with, its impulse, its approach, how far its next impact is ahead, whether it takes part, and
-    its full rebound; the velocities after the stage."""
+    its full rebound; the velocities after the stage.
+    """
 
     rows: Numbers
     system: Numbers
@@ -99,7 +100,8 @@ class Stage(NamedTuple):
 @inner_kernel
 def contact_rows(b, sense, phi, rows):
     """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a
-    block that tips by phi to `sense`."""
+    block that tips by phi to `sense`.
+    """
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
     rows[:] = 0.0
@@ -135,7 +137,8 @@ def _mass_dot(spin, row, column):
 @inner_kernel
 def kinetic_energy(spin, v):
     """Kinetic energy of velocities (xi, y, phi), per unit mass; `spin` is one over the moment of
-    inertia."""
+    inertia.
+    """
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / spin)
 
 
@@ -181,7 +184,8 @@ def _pivots(system, n, k):
 @inner_kernel
 def _fits(number, friction, slippery):
     """Whether a set is to be tried with this friction: at most three unknowns, friction where the
-    floor is in it."""
+    floor is in it.
+    """
     on_floor = _SETS[number, 4] & _ON_FLOOR != 0
     if friction == Friction.HELD:
         return on_floor and _SETS[number, 0] <= 2
@@ -191,7 +195,8 @@ def _fits(number, friction, slippery):
 @inner_kernel
 def _push(rows, index, kappa, k):
     """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping
-    floor's the friction."""
+    floor's the friction.
+    """
     return rows[index, k] - (kappa * rows[Contact.TANGENT, k] if index <= Contact.OTHER else 0.0)
 
 
@@ -204,7 +209,8 @@ def _unknown(number, i):
 @inner_kernel
 def _try_set(block, stage, v, number, friction):
     """The impulses of the contacts in the set, and the velocities after them; False where there are
-    none."""
+    none.
+    """
     rows, system, lam, trial, spin = stage.rows, stage.system, stage.lam, stage.trial, block.spin
     n = _SETS[number, 0] + (1 if friction == Friction.HELD else 0)
     mu_k = block.mu_k
@@ -234,7 +240,8 @@ def _try_set(block, stage, v, number, friction):
 @inner_kernel
 def _violation(block, stage, number, friction, rounding):
     """By how much a solution violates the law, 0 within the rounding: a pull, a contact that still
-    closes, friction beyond its cone or in the wrong sense."""
+    closes, friction beyond its cone or in the wrong sense.
+    """
     rows, lam, trial = stage.rows, stage.lam, stage.trial
     count = _SETS[number, 0]
     worst = 0.0
@@ -382,7 +389,8 @@ def _approaches(block, impact, stage, plastic, rounding):
 @inner_kernel
 def _choose(law, impact, stage, number, rounding):
     """Writes which contacts take part in stage `number` by this law, and the velocities that they
-    are to leave with."""
+    are to leave with.
+    """
     if law == Law.FLOOR_FIRST:
         _floor_first(stage, impact.touching, number, rounding)
     else:
@@ -480,7 +488,8 @@ def _strike_without_gain(block, stage, v, before):
 @called_kernel
 def _close(spin, stage, impact):
     """Contacts that part more slowly than `resting` are closed: the velocity is projected onto
-    them, mass-orthogonally."""
+    them, mass-orthogonally.
+    """
     rows, v = stage.rows, impact.v
     members, count = stage.lam, 0
     for j in range(CONTACTS):
@@ -495,7 +504,8 @@ def _close(spin, stage, impact):
 @inner_kernel
 def _project(spin, stage, v, count):
     """Takes the rates of the first so many of the contacts in `lam` out of the velocity; False
-    where their rows are parallel."""
+    where their rows are parallel.
+    """
     rows, system, members = stage.rows, stage.system, stage.lam
     for i in range(count):
         row = rows[int(members[i])]

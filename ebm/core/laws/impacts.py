@@ -24,7 +24,8 @@ from rockcheck.scenes.compiled import inner_kernel
 
 class Corner(NamedTuple):
     """A corner that strikes a wall, and the pivot: S, Sw, s, c, C = S Sw c', the pivot's k, and
-    `spin`."""
+    `spin`.
+    """
 
     S: float
     Sw: float
@@ -119,7 +120,8 @@ def wall_stick(corner, e, w1, xdot1):
 @inner_kernel
 def wall_slip(corner, e, w1, xdot1, kappa):
     """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2,
-    P, Q = -kappa P, with kappa = mu_k Sr sy."""
+    P, Q = -kappa P, with kappa = mu_k Sr sy.
+    """
     S, s, c, C, spin = corner.S, corner.s, corner.c, corner.C, corner.spin
     k = S * s + (c + C) * kappa
     w2 = (w1 / spin + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (

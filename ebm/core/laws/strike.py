@@ -50,7 +50,8 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 @called_kernel
 def strike(block, base, run, resting):
     """Resolves the impact at the gap that has closed: what it was, an Event, and whether the mode
-    is already the one that follows. What is slower than `resting` comes to rest."""
+    is already the one that follows. What is slower than `resting` comes to rest.
+    """
     state, mode, motion = run.state, run.state.mode, run.state.motion
     which = state.guard
     touch(block, mode, motion, which)
@@ -128,8 +129,10 @@ def touch(block, mode, motion, which):
 
 @inner_kernel
 def _settle_flat(block, state, resting):
-    """An upright block with a spin below the settling speed lies flat. Along a wall such a spin is
-    a slip, too, and is dropped with it."""
+    """An upright block with a spin below the settling speed lies flat.
+
+    Along a wall such a spin is a slip, too, and is dropped with it.
+    """
     motion = state.motion
     state.rules[Rule.SETTLES] += 1
     v = slip_velocity(block, motion)
@@ -141,8 +144,10 @@ def _settle_flat(block, state, resting):
 
 @inner_kernel
 def _floor_impact(block, state, resting):
-    """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on
-    in the state's mode."""
+    """Bilateral pivot: the block lands at theta = 0.
+
+    Returns whether it is already known to rock on in the state's mode.
+    """
     mode, motion = state.mode, state.motion
     w1, v1 = motion.w, slip_velocity(block, motion)
     S1, c = mode.sense, block.height
@@ -173,8 +178,10 @@ def _floor_impact(block, state, resting):
 
 @inner_kernel
 def _wall_impact(block, state, tip, resting):
-    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether
-    the mode is already right."""
+    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall.
+
+    Returns whether the mode is already right.
+    """
     mode, motion = state.mode, state.motion
     # Wedged: between both walls at once nothing rebounds.
     if between_walls(block, motion) or on_wall(mode):
@@ -194,7 +201,8 @@ def _wall_impact(block, state, tip, resting):
 @inner_kernel
 def _corner_impact(block, state, sw, e, resting):
     """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the
-    pivot's frame."""
+    pivot's frame.
+    """
     mode, motion = state.mode, state.motion
     phi, sign = abs(motion.theta), float(mode.sense)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
