@@ -60,8 +60,9 @@ class EventBasedModel(Frozen):
         return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
 
     def finer(self) -> Self:
-        """The same model at a hundredth of its tolerance, or at the finest tolerance that double
-        precision allows.
+        """The same model at a hundredth of its tolerance, but at least the finest tolerance.
+
+        The limit is double precision's.
         """
         return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
 

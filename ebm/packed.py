@@ -1,7 +1,7 @@
-"""Runs as compiled code takes them, one or many: scenes packed into arrays of records, a row a run,
-their states at the start, and the event loop that plays them.
+"""Runs as compiled code takes them: scenes packed into arrays of records, a row a run.
 
-`EventBasedModel`, which plays a history by this, is known here by its settings only.
+Here are also their states at the start and the event loop that plays them. `EventBasedModel`, which
+plays a history by this, is known here by its settings only.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ _READY: dict[bool, Callable[..., None]] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, natural units: what compiled code is given, the motion at the
-    start, and the duration.
+    """Runs as arrays, one row each, in natural units.
+
+    `rows` is the input of the compiled code, `starts` the motion at the start.
     """
 
     rows: Rows
@@ -111,8 +112,9 @@ def play(model: Any, rows: Rows, states: NDArray[np.void], records: Records) -> 
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:
-    """The machine code of the event loop with the model's friction, loaded or compiled, for what it
-    is given: always of the same types.
+    """The machine code of the event loop with the model's friction, loaded or compiled.
+
+    It is specialised to the types of `given`, which are always the same.
     """
     bouc_wen = model.friction == "bouc-wen"
     if bouc_wen not in _READY:
