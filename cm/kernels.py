@@ -187,7 +187,7 @@ class Shaking(NamedTuple):
 
 @kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
-    """Linear interpolation in `samples`, `rate` of them a second from t = 0; zero after the last."""
+    """Linear interpolation in `samples`, `rate` a second from t = 0; zero after the last."""
     place = t * rate
     left = int(place)
     if left + 1 >= len(samples):

@@ -1,5 +1,4 @@
-"""Which corners rest on floor and walls, and how a block is put exactly onto a contact that it
-reaches.
+"""Which corners rest on floor and walls, and how a block is put exactly onto a contact.
 
 Natural units. A contact is closed where its gap and the gap's rate are zero; there is one zero of
 position, one of velocity.
@@ -54,9 +53,7 @@ def stop(motion):
 
 @inner_kernel
 def wall_gap(block, motion, side):
-    """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it;
-    infinite without a wall.
-    """
+    """Clear gap between the wall on `side` (+1 left, -1 right) and its corner; inf if no wall."""
     gap, faces = block.gap_left if side > 0 else block.gap_right, side_of(block, side)
     if gap == math.inf:
         return gap

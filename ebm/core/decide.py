@@ -37,8 +37,9 @@ def quiet_from(base, tolerance):
 
 @inner_kernel
 def decided(block, base, state):
-    """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else
-    -1.
+    """The final peak rotation if the rest of the motion is certain, else -1.
+
+    From pi/2 on the block overturns.
     """
     t, quiet, peak, theta = state.t, state.quiet_from, state.peak, state.motion.theta
     still = base.vertical.form.kind == Shape.STILL
@@ -102,12 +103,12 @@ def energy_of(block, motion):
 
 @inner_kernel
 def swings_again(state, energy):
-    """Whether this swing, which turns back in a step that starts now with this energy, is the last
-    one again: then so are all to come.
+    """Whether this swing repeats the last one: then all to come do, too.
 
-    After the excitation the energy and the place of the pivot are all that a swing depends on.
-    Beside a wall that takes no energy a block may rock so for ever, however near its balance it
-    turns back. Only what sticks to the floor and touches no wall swings.
+    The swing turns back in a step that starts now with this energy. After the excitation the energy
+    and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy a
+    block may rock so for ever, however near its balance it turns back. A swing counts only where
+    the pivot sticks to the floor and the block touches no wall.
     """
     mode = state.mode
     if state.t < state.quiet_from or mode.pivot != Pivot.STICK or on_wall(mode):
@@ -139,8 +140,7 @@ def _highest(block, side, energy):
 
 @inner_kernel
 def _falls(block, base, state):
-    """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else
-    -1.
+    """pi/2 if a block past its balance point falls whatever the excitation does, else -1.
 
     Turning outward, beyond tan(phi - alpha) > mu and > |u| for all time to come, it is accelerated
     outward in every mode: sticking by (3), slipping by (7), by an impulse of the floor, or not at
@@ -159,8 +159,9 @@ def _falls(block, base, state):
 
 @inner_kernel
 def _rocks_for_good(block, mode, energy):
-    """Whether the block rocks and neither pivot can slip in free rocking of this energy (up to its
-    balance point), impacts included.
+    """Whether the block rocks and neither pivot can slip in free rocking of this energy.
+
+    That is up to its balance point, impacts included.
     """
     if block.walls or not rocks(mode):
         return False

@@ -119,8 +119,9 @@ def smooth_until(base, state):
 
 @inner_kernel
 def finite(state, holds):
-    """Whether the motion is finite, as `holds` says; else the run ends: no step is good for a
-    series that is not finite.
+    """Whether the motion is finite, as `holds` says; else the run ends.
+
+    No step is good for a series that is not finite.
     """
     if not holds:
         state.ending = Ending.NOT_FINITE
@@ -160,11 +161,11 @@ _play_row, _play_row_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
 
 @kernel
 def play(rows, states, work, records):
-    """Plays runs in `states`, a row each with its motion, t_end and control, with a
-    `workspace()` and Coulomb's friction.
+    """Plays runs in `states`, a row each, with Coulomb's friction.
 
-    Of row i `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
-    `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode after, impulse.
+    A state has its motion, t_end and control; `work` is a `workspace()`. Of row i `records.out[i]`
+    (n x 6) has the motion at k * output_step, `out_mode[i]` its modes; `log[i]` (m x 5) takes one
+    row an event: time, kind, mode before, mode after, impulse.
     """
     for i in range(len(states)):
         _play_row(rows, i, states, work, records)

@@ -20,8 +20,9 @@ _FADES = 0.25
 
 @inner_kernel
 def may_go_on(block, base, run):
-    """Whether the run goes on; else why it ends here: its time is up, its outcome is certain, or it
-    has taken too many steps.
+    """Whether the run goes on; else writes why it ends here.
+
+    Its time is up, its outcome is certain, or it has taken too many steps.
     """
     state, motion = run.state, run.state.motion
     if state.t >= state.t_end:
@@ -83,8 +84,9 @@ def advance(block, base, run):
 
 @inner_kernel
 def passes_on(block, base, run):
-    """Whether the event that ends the step ends no mode: the block only grazes the floor, or the
-    run is over.
+    """Whether the event that ends the step ends no mode.
+
+    The block only grazes the floor, or the run is over.
     """
     state, motion = run.state, run.state.motion
     if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):

@@ -147,8 +147,9 @@ class Rows(NamedTuple):
 
 
 class Records(NamedTuple):
-    """Where a run writes: rows of states, their modes, the log of events; arrays of these where
-    there are several runs.
+    """Where a run writes: rows of states, their modes, the log of events.
+
+    Arrays of these where there are several runs.
     """
 
     out: Numbers
@@ -157,9 +158,7 @@ class Records(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A run: its state, the series of its step and the stack of the search for roots, and where it
-    writes.
-    """
+    """A run: its state, the series `a` of its step, the root search's `stack`, and its records."""
 
     state: np.record
     a: Numbers
@@ -169,8 +168,9 @@ class Run(NamedTuple):
 
 @kernel
 def workspace():
-    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
-    search.
+    """Scratch for one trajectory: the series and the stack of the root search.
+
+    The series of G is 1: no vertical motion.
     """
     series = np.zeros((ROWS, WIDTH))
     series[Row.G, 0] = series[Row.ANGLE, 2] = 1.0
