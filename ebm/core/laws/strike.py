@@ -1,5 +1,4 @@
-"""What an impact does to a block: the floor impact, a wall impact, or all contacts that touch at
-one instant.
+"""Resolves an impact: on the floor, on a wall, or at all contacts that touch at one instant.
 
 The bilateral pivot follows the paper's laws (`impacts`), one impact at a time. With the unilateral
 one every contact that touches takes part (`contact_impacts`). Either way slow rebounds end by the
@@ -49,8 +48,9 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 @called_kernel
 def strike(block, base, run, resting):
-    """Resolves the impact at the gap that has closed: what it was, an Event, and whether the mode
-    is already the one that follows. What is slower than `resting` comes to rest.
+    """Resolves the impact at the gap that has closed: the Event, and whether the mode is known.
+
+    A known mode is already the one that follows. Rebounds slower than `resting` end in rest.
     """
     state, mode, motion = run.state, run.state.mode, run.state.motion
     which = state.guard
@@ -93,12 +93,11 @@ def _lands_along(block, state):
 
 @inner_kernel
 def touch(block, mode, motion, which):
-    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the
-    tolerance only.
+    """Puts the block onto the contact whose gap has just closed.
 
-    A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot
-    would creep, impact by impact. It stands after it, too: else it would approach the floor, or
-    leave it, by as much as the correction.
+    The series knows the gap to the tolerance only. A standing pivot keeps its place if the rotation
+    can take up the correction. Otherwise the pivot would creep, impact by impact. It stands after
+    it, too: else it would approach the floor, or leave it, by as much as the correction.
     """
     phi = abs(motion.theta)
     if which == Guard.LANDING:
@@ -200,8 +199,9 @@ def _wall_impact(block, state, tip, resting):
 
 @inner_kernel
 def _corner_impact(block, state, sw, e, resting):
-    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the
-    pivot's frame.
+    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1).
+
+    It works in the pivot's frame.
     """
     mode, motion = state.mode, state.motion
     phi, sign = abs(motion.theta), float(mode.sense)
