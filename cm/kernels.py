@@ -79,8 +79,8 @@ YOUNG = 4.0
 FINE, FINE_DAMPER = 0.02, 1.0
 #: Shortest step, as a share of the contact time; it bounds the number of steps.
 SHORTEST = 1e-3
-#: Sweeps over surfaces and friction end when the forces change by less than this share of them, or
-#: after so many.
+#: Sweeps over surfaces and friction end when the forces change by less than this share, or after
+#: MOST_SWEEPS.
 SWEPT, MOST_SWEEPS = 1e-5, 50
 #: No step is cut for a contact that would close by less than this share of the depth under the
 #: block's weight; a contact that closes more slowly than this share of g/sqrt(k/m) is no impact.
@@ -415,11 +415,10 @@ def press(
     """Applies the forces of one surface over a step.
 
     `v` is the velocity that the block would have without them, `now.v0` the velocity before the
-    step.
-    `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
+    step. `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
     (implicit, so that the step need not resolve them), zero while one is young. Returns the
-    velocity with the forces; the time until an open contact closes; the step that a contact which
-    closes asks for, else infinity.
+    velocity with the forces; the time until an open contact closes; the step that a closing contact
+    needs, else infinity.
     """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
     x, y, corners, v0, step, t = now

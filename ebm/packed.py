@@ -28,10 +28,7 @@ _READY: dict[bool, Callable[..., None]] = {}
 
 @dataclass(frozen=True, kw_only=True)
 class Packed:
-    """Runs as arrays, one row each, in natural units.
-
-    `rows` is the input of the compiled code, `starts` the motion at the start.
-    """
+    """Runs as compiled code is given them, one row each, natural units."""
 
     rows: Rows
     starts: NDArray[np.void]

@@ -101,7 +101,7 @@ def overturning_spectrum(
     `frequency_ratios` are sizes of the block relative to its own (the gaps stay as they are) and
     `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first
     (more of a small grid), then those between nodes that differ (and their neighbours). `jobs`
-    threads, default all cores; `on_progress` is told the nodes done by `model`. `play` runs the
+    threads, default all cores; `on_progress` gets the nodes done by `model`. `play` runs the
     nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
     """
     frequencies, amplitudes = (

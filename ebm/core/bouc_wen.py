@@ -557,7 +557,7 @@ def after_event(block, base, run):
 
 @called_kernel
 def _follow(block, base, run):
-    """What follows an event that is no impact: the Event that is told, or none."""
+    """Changes the contacts after an event that is no impact; returns the Event, or UNTOLD."""
     state, mode, which = run.state, run.state.mode, run.state.guard
     _waits(base, state)
     # At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
@@ -588,7 +588,7 @@ def _follow(block, base, run):
 def _turn(block, base, state):
     """The slip has come to its end: the pivot slips back, or a flat block rests.
 
-    The event that is told.
+    Returns the Event.
     """
     event = Event.UNTOLD if state.holds else Event.STICKS
     state.holds = True

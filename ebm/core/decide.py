@@ -57,7 +57,7 @@ def decided(block, base, state):
 
 @inner_kernel
 def _by_energy(block, state, ahead):
-    """What the energy that the block has and can still gain says of its outcome.
+    """The peak (pi/2: overturns) that follows from the energy now and still to come, else -1.
 
     `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from
     standing, grows by no other work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I.
@@ -134,7 +134,7 @@ def swing_error(tolerance):
 
 @inner_kernel
 def _highest(block, side, energy):
-    """The rotation on this side to which so much energy lifts the block."""
+    """The rotation on this side to which this energy lifts the block."""
     return side.alpha - math.acos(min((block.height + energy) / side.radius, 1.0))
 
 

@@ -51,7 +51,7 @@ _NO_SAMPLES = np.zeros(1)
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
 #: Newton's method finds a root in fewer trials, or not at all.
 _SOME = 30
-#: The sign with which an acceleration leaves zero is read so much later.
+#: The sign with which an acceleration leaves zero is read this much later.
 _SOON = 1e-6
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 

@@ -68,7 +68,7 @@ _CONSTANT, _SHORTER = 30, 31
 #: only, within this share of a step.
 _NEARBY = 0.25
 #: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it.
-#: Its square is a number, too.
+#: Its square is finite, too.
 _ANY = 2.0**400
 
 

@@ -1,6 +1,6 @@
 """Eight numbers that compiled code adds and multiplies at once: the lanes of one vector register.
 
-A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two such values. LLVM makes the
+A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two vectors. LLVM makes the
 machine code: one instruction where a register holds eight numbers (AVX-512), two or four where it
 holds fewer, with the same result to the bit. Here numba learns the type and what can be done with
 it: for each function there is the plain one, on an array of eight, which also says what it does,

@@ -29,7 +29,7 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
 def loop_with(friction: ModuleType) -> object:
-    """What plays a row of `play`: the event loop with a law of friction, by its four doors."""
+    """The function that plays a row of `play`: the event loop with the four doors of `friction`."""
     expand, locate, looks_ahead = friction.expand, friction.locate, friction.LOOKS_AHEAD
     advance_friction, after_event = friction.advance, friction.after_event
 
@@ -148,7 +148,7 @@ def resolve(block, base, run):
 
 @inner_kernel
 def end(run):
-    """Looks at how the run has ended."""
+    """Checks that the motion is finite, and writes the rows after the last step."""
     state = run.state
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE

@@ -49,7 +49,7 @@ def may_go_on(block, base, run):
 
 @inner_kernel
 def sample(block, run):
-    """The rows of this step."""
+    """Writes the rows of this step."""
     state, records = run.state, run.records
     t, step, code = state.t, run.state.control.output_step, mode_code(state)
     state.whole = state.guard == Guard.NONE and state.tau >= state.smooth_until - t
