@@ -129,7 +129,8 @@ def figure(plot: Plot) -> Figure:
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            # A panel without a wall is two rows high; the column right of it has labels, too.
+            # Where panels are two grid rows high, column 0 holds the panel without a wall, midway
+            # between the rows of the others: it is labelled below, and column 1 beside, too.
             below, beside = row + high == rows or column < high - 1, column < high
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=not data["record"])
