@@ -1,5 +1,4 @@
-"""The contact law of the Continuous Model: scalar pure functions, usable from Python and from the
-compiled loop alike.
+"""The contact law of the Continuous Model: scalar functions for Python and the compiled loop.
 
 Forces and coefficients are per unit mass: stiffness in 1/s^2, damping in 1/s, force in m/s^2. A
 contact's effective mass is the share of the block's mass that its corner feels, 1/m_eff = J M^-1
@@ -12,8 +11,9 @@ import math
 
 
 def felt_share(x: float) -> float:
-    """Share of a step's change of speed that a damper feels within that step, for x = c K step
-    (damping, mobility, step).
+    """Share of a step's change of speed that a damper feels within that step.
+
+    The argument is x = c K step (damping, mobility, step).
 
     The Kelvin-Voigt force is k depth - c (rate + share change), change = K step force: the speed
     then decays by 1/(1 + x + x^2/2), of second order and without overshoot however large x is, and
@@ -25,12 +25,12 @@ def felt_share(x: float) -> float:
 def normal_forces(
     f1: float, f2: float, d1: float, d2: float, k11: float, k12: float, k21: float, k22: float
 ) -> tuple[float, float]:
-    """Forces of two Kelvin-Voigt contacts that can only push, each of which feels both forces
-    within the step.
+    """Forces of two Kelvin-Voigt contacts that can only push, coupled within the step.
 
-    f is the force k depth - c rate without them. d is the loss of force for a unit of velocity
-    gained within the step. K is the velocity (over the step's length) that a unit of force j gives
-    to corner i. So F_i + d_i (K F)_i = f_i, but F_i >= 0. An open contact has f = d = 0.
+    Here f is the force k depth - c rate that a contact would have if neither force acted, and d the
+    loss of force for a unit of velocity gained within the step. K_ij is the velocity (over the
+    step's length) that a unit of force j gives to corner i. So F_i + d_i (K F)_i = f_i, but F_i >=
+    0. An open contact has f = d = 0.
     """
     a11, a12, a21, a22 = 1.0 + d1 * k11, d1 * k12, d2 * k21, 1.0 + d2 * k22
     determinant = a11 * a22 - a12 * a21
@@ -52,8 +52,9 @@ def friction_force(
     stretch: float,
     rate: float,
 ) -> tuple[float, bool]:
-    """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone. Returns force
-    and whether it slips.
+    """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone.
+
+    Returns force and whether it slips.
 
     `stretch` (m) is the spring's memory, `rate` (m/s) the corner's tangential velocity as it would
     be without this force, and `mobility` how much of that velocity a unit of force takes away: the
@@ -76,8 +77,9 @@ def effective_mass(
     friction: float,
     restitution: float,
 ) -> float:
-    """Share of the block's mass that a corner brings to an impact with friction. It arrives at
-    `normal` (< 0) and `tangential` speed.
+    """Share of the block's mass that a corner brings to an impact with friction.
+
+    It arrives at `normal` (< 0) and `tangential` speed.
 
     A unit impulse along the normal changes the corner's velocity by k_n = 1 + 3 r_t^2/R^2 along the
     normal and by k_c = -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3
@@ -95,8 +97,7 @@ def effective_mass(
 
 
 def shared_mass(own: float, other: float, coupling: float, ratio: float) -> float:
-    """Share of the block's mass that a corner brings to an impact that it shares with another one,
-    without friction.
+    """Share of the block's mass that a corner brings to a frictionless impact of two corners.
 
     The other corner arrives `ratio` times as fast. A unit impulse at a corner changes its own
     velocity by `own` (by `other` at that one) and the other corner's by `coupling`. Negative where
@@ -106,11 +107,10 @@ def shared_mass(own: float, other: float, coupling: float, ratio: float) -> floa
 
 
 def damping_ratio_of_paper(restitution: float) -> float:
-    """Damping ratio xi for a restitution by the paper's (33), -ln e/sqrt(pi^2 + ln^2 e), 1 at e =
-    0.
+    """Damping ratio xi for a restitution by (33): -ln e/sqrt(pi^2 + ln^2 e), 1 at e = 0.
 
-    It holds for a contact that pulls until its penetration is gone; a clamped one then rebounds
-    faster than asked.
+    It holds for a contact that pulls until its penetration is gone; a clamped one rebounds faster
+    than e says.
     """
     if restitution == 0.0:
         return 1.0
@@ -119,11 +119,11 @@ def damping_ratio_of_paper(restitution: float) -> float:
 
 
 def restitution_of(damping_ratio: float) -> float:
-    """Restitution of a clamped Kelvin-Voigt contact with damping ratio xi (Schwager & Poschel
-    2007).
+    """Restitution of a clamped Kelvin-Voigt contact with damping ratio xi.
 
-    The contact ends where its force vanishes: e = exp(-2 xi arccos(xi)/sqrt(1 - xi^2)), with
-    arccosh and xi^2 - 1 beyond 1.
+    The contact ends where its force vanishes (Schwager & Poschel 2007): e = exp(-2 xi
+    arccos(xi)/sqrt(1
+    - xi^2)), with arccosh and xi^2 - 1 beyond 1.
     """
     xi = damping_ratio
     if abs(xi - 1.0) < 1e-6:
@@ -134,18 +134,16 @@ def restitution_of(damping_ratio: float) -> float:
 
 
 def least_restitution(stiffness: float, frequency_parameter: float) -> float:
-    """Restitution that is asked of a contact with restitution zero: p/sqrt(k/m), with p and k/m as
-    1/s and 1/s^2.
+    """Restitution that stands for zero: p/sqrt(k/m), with p in 1/s and k/m in 1/s^2.
 
-    A clamped contact reaches zero only at infinite damping. This one vanishes with the length of a
-    contact, so that what it leaves is told from runs with softer contacts.
+    A clamped contact reaches zero only at infinite damping. This value vanishes with the duration
+    of a contact, so that runs with softer contacts show its effect.
     """
     return min(frequency_parameter / math.sqrt(stiffness), 1.0)
 
 
 def damping_ratio(restitution: float, least: float) -> float:
-    """Damping ratio at which a clamped Kelvin-Voigt contact has this restitution: the inverse of
-    `restitution_of`.
+    """Damping ratio of a clamped Kelvin-Voigt contact: the inverse of `restitution_of`.
 
     Restitutions below `least` (> 0) get its damping ratio.
     """

@@ -79,8 +79,8 @@ YOUNG = 4.0
 FINE, FINE_DAMPER = 0.02, 1.0
 #: Shortest step, as a share of the contact time; it bounds the number of steps.
 SHORTEST = 1e-3
-#: Sweeps over surfaces and friction end when the forces change by less than this share of them, or
-#: after so many.
+#: Sweeps over surfaces and friction end when the forces change by less than this share, or after
+#: MOST_SWEEPS.
 SWEPT, MOST_SWEEPS = 1e-5, 50
 #: No step is cut for a contact that would close by less than this share of the depth under the
 #: block's weight; a contact that closes more slowly than this share of g/sqrt(k/m) is no impact.
@@ -111,8 +111,11 @@ class Parameters(NamedTuple):
 
 
 class Contacts(NamedTuple):
-    """The contacts of a run: `memory` holds one row a contact, `friction` the floor's; `surfaces`
-    lists those of the scene, the floor last."""
+    """The contacts of a run.
+
+    `memory` holds one row a contact, `friction` the floor's columns; `surfaces` lists the surfaces
+    of the scene, the floor last.
+    """
 
     memory: Floats
     friction: Floats
@@ -121,8 +124,11 @@ class Contacts(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step, seen from its middle: the place of the mass's centre and of the corners, the velocity
-    before it, its length, and the time."""
+    """A step, seen from its middle.
+
+    `x`, `y` and `corners` place the mass's centre and the corners at the middle; `v0` is the
+    velocity before the step.
+    """
 
     x: float
     y: float
@@ -133,8 +139,11 @@ class Step(NamedTuple):
 
 
 class Arrival(NamedTuple):
-    """A corner (0 or 1) that comes to a surface: its offset, its mobility, that of the surface's
-    other corner and what couples them, its rate (< 0) and slip; gap and rate of the other one."""
+    """A corner (0 or 1) that comes to a surface.
+
+    Its offset, its mobility, the mobility of the surface's other corner and their coupling, its
+    rate (< 0) and slip; gap and rate of the other corner.
+    """
 
     surface: int
     corner: int
@@ -150,8 +159,11 @@ class Arrival(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """The two corners that face a surface: their forces as if these did not move them, how much a
-    unit of velocity lowers these, their mobilities and what couples them, and their levers."""
+    """The two corners that face a surface.
+
+    The forces f as if they did not move the corners, the loss d of force for a unit of velocity,
+    the mobilities k11 and k22 and their coupling k12, and the levers.
+    """
 
     f1: float
     f2: float
@@ -175,8 +187,7 @@ class Shaking(NamedTuple):
 
 @kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
-    """Linear interpolation in `samples`, `rate` of them a second, the first at t = 0; zero after
-    the last."""
+    """Linear interpolation in `samples`, `rate` a second from t = 0; zero after the last."""
     place = t * rate
     left = int(place)
     if left + 1 >= len(samples):
@@ -219,6 +230,7 @@ def with_forces(
 @inner_kernel
 def closes(contacts: Contacts, arrival: Arrival, t: float) -> float:
     """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long.
+
     Returns the step that it asks for.
 
     When the surface's other corner arrives within the contact's own time, the two share the block's
@@ -287,8 +299,10 @@ def response(
     step: float,
     ahead: float,
 ) -> tuple[float, float]:
-    """Force of a closed contact as if its own forces did not move it, and how much a unit of
-    velocity lowers it."""
+    """Force of a closed contact as if its own forces did not move it, and the loss of force.
+
+    The loss is for a unit of velocity gained.
+    """
     share = felt_share(damping * mobility * step)
     return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (
         share * damping + k * ahead
@@ -297,10 +311,10 @@ def response(
 
 @kernel
 def closes_in(parameters: Parameters, gap: float, before: float, rate: float, step: float) -> float:
-    """Time from the end of a step until an open contact closes, infinite if that is not soon or too
-    gentle to matter.
+    """Time from the end of a step until an open contact closes.
 
-    `gap` is that in the middle of the step, over which its rate went from `before` to `rate`.
+    Infinite if that is not soon or too gentle to matter. `gap` is the gap at the middle of the
+    step, over which its rate went from `before` to `rate`.
     """
     reach = 0.5 * step + parameters.time_step
     pull = min(0.0, (rate - before) / step)
@@ -331,8 +345,10 @@ def is_closed(
 def pushed(
     contacts: Contacts, arrival: Arrival, gap: float, before: float, now: Step, ahead: float
 ) -> tuple[float, float, float]:
-    """What `response` says of a closed contact; and the step that it asks for if it has just
-    closed, else infinity."""
+    """The `response` of a closed contact, and the step that it needs.
+
+    The step is infinite unless the contact has just closed.
+    """
     memory, one = contacts.memory, 2 * arrival.surface + arrival.corner
     fine = math.inf
     if memory[one, CLOSED] == 0.0:
@@ -348,10 +364,10 @@ def pushed(
 def floor_forces(
     contacts: Contacts, pair: Pair, arm: float, slip: float, step: float
 ) -> tuple[float, float, float]:
-    """The normal forces of the floor and its friction, which is written down, too.
+    """The normal forces of the floor and its friction, which is also written into `friction`.
 
-    Friction acts at the lower corner, with the cone of both: they slip together or not at all.
-    First as if it stuck.
+    Friction acts at the lower corner, within the cone of both: they slip together or not at all. It
+    is first solved as if it stuck.
     """
     f1, f2, d1, d2, k11, k12, k22, lever1, lever2 = pair
     friction, parameters = contacts.friction, contacts.parameters
@@ -396,13 +412,13 @@ def floor_forces(
 def press(
     contacts: Contacts, surface: int, now: Step, v: Velocity, ahead: float
 ) -> tuple[Velocity, float, float]:
-    """The forces of one surface over a step, from the velocity `v` that the block would have
-    without them and `now.v0` before it.
+    """Applies the forces of one surface over a step.
 
-    `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
+    `v` is the velocity that the block would have without them, `now.v0` the velocity before the
+    step. `ahead` is how far (s) the springs look ahead: the step for contacts that have settled
     (implicit, so that the step need not resolve them), zero while one is young. Returns the
-    velocity with the forces; the time until an open contact closes; the step that a contact which
-    closes asks for, else infinity.
+    velocity with the forces; the time until an open contact closes; the step that a closing contact
+    needs, else infinity.
     """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
     x, y, corners, v0, step, t = now
@@ -484,8 +500,10 @@ def wall_force(memory: Floats) -> float:
 
 @kernel
 def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
-    """Write the strikes that began by `until` into `events` behind the first `n_events`; returns
-    how many there are then."""
+    """Writes the strikes that began by `until` into `events`, behind the first `n_events`.
+
+    Returns how many there are then.
+    """
     for i in range(len(memory)):
         if memory[i, STRUCK] <= until:
             events[n_events, :] = memory[i, STRUCK], float(i), memory[i, IMPULSE]
@@ -498,8 +516,11 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
 def sweep(
     contacts: Contacts, now: Step, v: Velocity, ahead: float, takes_back: bool
 ) -> tuple[Velocity, float, float, float, float]:
-    """Each surface in turn takes back its force, or has none yet, and replaces it: what `press`
-    returns of all surfaces, by how much the forces have changed, and their sum."""
+    """Replaces the force of each surface in turn.
+
+    With `takes_back` a surface first takes back the force that it has; else it has none yet.
+    Returns what `press` returns, of all surfaces, the change of the forces, and their sum.
+    """
     memory = contacts.memory
     closing = young = math.inf
     change = whole = 0.0
@@ -520,12 +541,12 @@ def sweep(
 def kick(
     contacts: Contacts, now: Step, v: Velocity, settled: bool
 ) -> tuple[Velocity, float, float, int]:
-    """The forces of all surfaces over a step, from the velocity `v` that the block would have
-    without them and `now.v0` before it.
+    """Applies the forces of all surfaces over a step.
 
-    One surface alone is solved at once. Where a wall touches too, each surface in turn takes back
-    its force (first that of the last step) and replaces it, until they agree. Returns the velocity;
-    the time until an open contact closes; the step that a contact which closes asks for, else
+    `v` is the velocity that the block would have without them, `now.v0` the velocity before the
+    step. One surface alone is solved at once. Where a wall touches too, each surface in turn takes
+    back its force (first the one of the last step) and replaces it, until they agree. Returns the
+    velocity; the time until an open contact closes; the step that a closing contact needs, else
     infinity; the sweeps over the surfaces.
     """
     memory, surfaces, corners, step = contacts.memory, contacts.surfaces, now.corners, now.length
@@ -548,8 +569,10 @@ def kick(
 
 @inner_kernel
 def stretch(contacts: Contacts, now: Step, v: Velocity) -> None:
-    """The friction spring follows the lower corner over a step; one that slips keeps the length of
-    its largest force."""
+    """Moves the friction spring with the lower corner over a step.
+
+    A spring that slips keeps the length of its largest force.
+    """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
     corners, v0, step = now.corners, now.v0, now.length
     friction[SLIPPED] = friction[SLIPS]
@@ -609,9 +632,11 @@ def run_to(
     events: Floats,
     n_events: int,
 ) -> tuple[bool, int, int, int, float]:
-    """Steps from one of two times to the other, and moves `state` along (see `advance`): whether
-    the block overturns, the events written, the steps and the sweeps that this took, and the time
-    reached."""
+    """Steps from one of two times to the other, and moves `state` along (see `advance`).
+
+    Returns whether the block overturns, the events written, the steps and the sweeps taken, and the
+    time reached.
+    """
     parameters, memory = contacts.parameters, contacts.memory
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
     x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
@@ -670,14 +695,13 @@ def advance(
     output: Floats,
     events: Floats,
 ) -> tuple[int, int, int, int, int, float]:
-    """Fill the rows of `output` (x, y, theta and their rates) with the motion that follows `state`,
-    which is moved along.
+    """Fills the rows of `output` with the motion that follows `state`, which is moved along.
 
-    `state` goes on with the time until which a contact is young, the step that it asks for, the
-    time until an open contact closes, the energy allowed by the work done on the block, and that
-    work with every part of it counted as positive. `events` gets rows (onset time,
-    contact, impulse). Returns how it ended, the rows and events written, the steps taken, the
-    sweeps over the surfaces that they took, and the time reached.
+    A row is x, y, theta and their rates. `state` (11) continues with the time until which a contact
+    is young, the step that it needs, the time until an open contact closes, the energy allowed by
+    the work done on the block, and that work with every part of it counted as positive. `events`
+    gets rows (onset time, contact, impulse). Returns the ending (DONE, OVERTURNED or BLOWN_UP), the
+    rows and events written, the steps taken, the sweeps over the surfaces, and the time reached.
     """
     parameters = contacts.parameters
     n_events = steps = sweeps = 0

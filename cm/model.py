@@ -37,8 +37,9 @@ TOUCHING = 1e-9
 
 
 class ContinuousModel(Frozen):
-    """The paper's Continuous Model (Chatzis & Smyth 2012): one equation of motion for all modes,
-    corners on springs.
+    """The paper's Continuous Model (Chatzis & Smyth 2012): corners on springs and dampers.
+
+    One equation of motion holds in all modes.
 
     Each bottom corner meets the floor, each side's corners a wall, in a Kelvin-Voigt contact that
     can only push; the floor has stick-slip friction with a memory. As the stiffness rises the
@@ -84,8 +85,10 @@ class ContinuousModel(Frozen):
         return self
 
     def coarser(self, factor: float) -> Self:
-        """The same model with steps `factor` times as long, and the contacts as much softer as that
-        allows (step ~ 1/sqrt(k/m))."""
+        """The same model with steps `factor` times as long and contacts softer by `factor`^2.
+
+        The step goes with 1/sqrt(k/m).
+        """
         change: dict[str, float] = {"penetration": factor**2 * self.penetration}
         if self.stiffness is not None:
             change = {"stiffness": self.stiffness / factor**2}
@@ -243,8 +246,10 @@ class ContinuousModel(Frozen):
     def _initial(
         self, scene: Scene, parameters: kernels.Parameters
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """State and contact memory at t = 0. A block on the floor starts sunk in by its weight, so
-        that it does not bounce."""
+        """State and contact memory at t = 0.
+
+        A block on the floor starts sunk in by its weight, so that it does not bounce.
+        """
         from rockcheck.cm import kernels
 
         x, y, tilt, *rates = scene.initial_state
@@ -281,8 +286,10 @@ class ContinuousModel(Frozen):
 def _samples(
     excitation: Rest | Ricker | Sine | Record, duration: float
 ) -> tuple[NDArray[np.float64], float]:
-    """The excitation as samples (m/s^2) with straight lines between them, and their number a
-    second; a record's own."""
+    """Samples (m/s^2) of the excitation, linear in between, and their number a second.
+
+    A record keeps its samples.
+    """
     if isinstance(excitation, Record):
         return excitation.samples, 1.0 / excitation.time_step
     if isinstance(excitation, Rest):

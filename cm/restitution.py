@@ -12,8 +12,7 @@ from rockcheck.scenes import History, InputError, Scene
 
 
 def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
-    """Restitution of the first impact in `scene`: the normal speed at which the corner leaves over
-    that at which it arrives.
+    """Restitution of the first impact in `scene`: normal speed after over normal speed before.
 
     The scene is played twice, the second time up to that impact with 20 output times in every
     1/sqrt(k/m). Raises `InputError` if nothing strikes.

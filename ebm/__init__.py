@@ -1,5 +1,4 @@
-"""The event-based models of a rocking and sliding block, overturning spectra, and the horizon of
-predictability."""
+"""The event-based models of a rocking and sliding block, their spectra and their horizon."""
 
 from rockcheck.ebm.horizon import predictability_horizon
 from rockcheck.ebm.model import EventBasedModel

@@ -1,8 +1,7 @@
-"""Many runs of the event-based model at once, compiled and on all cores: outcomes and peaks, and
-their motion where it is asked for.
+"""Many runs of the event-based model at once, compiled and on all cores.
 
-Threads take chunks of rows; the result of a row does not depend on the others, nor on
-the number of threads.
+They give outcomes and peaks, and the motion on request. Threads take chunks of rows; the result of
+a row depends neither on the other rows nor on the number of threads.
 """
 
 from __future__ import annotations
@@ -69,8 +68,10 @@ class Outcomes:
 def pack_pulses(
     scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats
 ) -> Packed:
-    """Packs one scene under many pulses of its own kind: amplitudes in m/s^2, periods in s, 1-D
-    arrays of one length."""
+    """Packs one scene under many pulses of its own kind.
+
+    `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
+    """
     model.check(scene)
     unit, count = natural.time_unit(scene), len(amplitudes)
     template = type(scene.excitation)
@@ -110,13 +111,13 @@ def run_batch(
     jobs: int | None = None,
     on_progress: OnProgress = unheard,
 ) -> Outcomes:
-    """Runs every row; with `until_decided` to the moment when outcome and peak are certain,
-    whatever its duration.
+    """Runs every row; with `until_decided` until outcome and peak are certain.
 
-    With `parts` the motion is kept at the ends of so many equal parts of each row's duration, its
-    start included; not together with `until_decided`. `jobs` threads (default: all cores).
-    `on_progress` is told the rows done. Where a row reaches a cap or has no consistent motion:
-    `ModelFailure` if `strict`, else only its `ending` says so.
+    The durations of the rows then do not count. With `parts` the motion is kept at the start and at
+    the ends of this number of equal parts of each row's duration; not together with
+    `until_decided`. `jobs` threads (default: all cores). `on_progress` gets the number of rows
+    done. Where a row reaches a cap or has no consistent motion: `ModelFailure` if `strict`, else
+    only its `ending` says so.
     """
     refuse_bouc_wen(model)
     count, kept = len(packed), parts + 1 if parts and not until_decided else 0

@@ -1,5 +1,7 @@
-"""Histories of many scenes of one duration at once: rotations on a common grid, peaks, outcomes and
-last slips."""
+"""Histories of many scenes of one duration at once: rotations, peaks, outcomes, last slips.
+
+The rotations are on a common grid of times.
+"""
 
 from __future__ import annotations
 

@@ -84,8 +84,11 @@ def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[Impa
 def _disturbed(
     scene: Scene, model: EventBasedModel, perturbation: float
 ) -> Iterator[tuple[EventBasedModel, Scene]]:
-    """A base motion a little stronger or weaker; a start farther from rest, nearer to it or off
-    zero."""
+    """The scene with disturbed excitation, and with disturbed initial states, of either sign.
+
+    The base motion is a little stronger or weaker; the start is farther from rest, nearer to it, or
+    off zero.
+    """
     alpha, rate = scene.block.alpha, scene.block.alpha * scene.frequency_parameter
     speed = scene.block.radius * rate
     units = {"initial_rotation": alpha, "initial_angular_velocity": rate, "initial_velocity": speed}

@@ -60,8 +60,10 @@ class EventBasedModel(Frozen):
         return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
 
     def finer(self) -> Self:
-        """The same model at a hundredth of its tolerance, or at the finest tolerance that double
-        precision allows."""
+        """The same model at a hundredth of its tolerance, but at least the finest tolerance.
+
+        The limit is double precision's.
+        """
         return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
 
     def check(self, scene: Scene) -> None:
@@ -111,8 +113,10 @@ class EventBasedModel(Frozen):
             )
 
     def simulate(self, scene: Scene) -> History:
-        """The motion of the scene on its output grid. Raises `InputError` (see `check`) or
-        `ModelFailure`."""
+        """The motion of the scene on its output grid.
+
+        Raises `InputError` (see `check`) or `ModelFailure`.
+        """
         history = self._simulate(scene)
         if not self.estimate_error:
             return history

@@ -1,8 +1,7 @@
-"""Between a scene (SI) and the natural units of the compiled code: lengths in R, accelerations in
-g, times in sqrt(R/g).
+"""Between a scene (SI) and the natural units of the compiled code.
 
-Of a block that is not homogeneous R is that of its weaker pivot, and the compiled code follows its
-mass's centre, not the box's.
+Lengths are in R, accelerations in g, times in sqrt(R/g). Of a block that is not homogeneous R is
+that of its weaker pivot, and the compiled code follows its mass's centre, not the box's.
 """
 
 from __future__ import annotations
@@ -121,8 +120,10 @@ def state_of(scene: Scene) -> NDArray[np.float64]:
 
 
 def to_si(scene: Scene, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """States (n x 6: x, y, theta and rates) of the mass's centre in natural units as those of the
-    box's centre in SI."""
+    """States of the mass's centre in natural units as states of the box's centre in SI.
+
+    `states` is n x 6: x, y, theta and their rates.
+    """
     radius, unit = scene.block.radius, time_unit(scene)
     found = states * np.array([radius, radius, 1.0, radius / unit, radius / unit, 1.0 / unit])
     if scene.block.centre_of_mass is not None:

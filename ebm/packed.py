@@ -1,7 +1,7 @@
-"""Runs as compiled code takes them, one or many: scenes packed into arrays of records, a row a run,
-and the event loop that plays them.
+"""Runs as compiled code takes them: scenes packed into arrays of records, a row a run.
 
-`EventBasedModel`, which plays a history by this, is known here by its settings only.
+Here is also the event loop that plays them. `EventBasedModel`, which plays a history by this, is
+known here by its settings only.
 """
 
 from __future__ import annotations
@@ -109,8 +109,10 @@ def sides_of(found: NDArray[np.void]) -> NDArray[np.int8]:
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:
-    """The machine code of the event loop with the model's friction, loaded or compiled, for what it
-    is given: always of the same types."""
+    """The machine code of the event loop with the model's friction, loaded or compiled.
+
+    It is specialised to the types of `given`, which are always the same.
+    """
     bouc_wen = model.friction == "bouc-wen"
     if bouc_wen not in _READY:
         _READY[bouc_wen] = for_types_of(march.play_bouc_wen if bouc_wen else march.play, *given)

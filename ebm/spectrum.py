@@ -1,5 +1,4 @@
-"""Overturning spectra: the outcome over a grid of pulse frequencies and amplitudes (the paper's
-Figs. 6 to 9)."""
+"""Overturning spectra: outcomes over pulse frequency and amplitude (the paper's Figs. 6 to 9)."""
 
 from __future__ import annotations
 
@@ -43,15 +42,16 @@ Player = Callable[[Scene, Floats, Floats], Nodes]
 
 @dataclass(frozen=True, kw_only=True)
 class Spectrum(Shown):
-    """Outcomes over frequency and amplitude, or over block size and scale of a record (see
-    `overturning_spectrum`).
+    """Outcomes over frequency and amplitude, or over block size and scale of a record.
+
+    See `overturning_spectrum`.
 
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at
     `amplitude_ratios[i]` (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p).
     `evaluations` counts the runs, fewer than nodes where only the boundary was refined. `undecided`
     lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
-    `depends_on_law` lists the nodes whose outcome is another one under another law of impacts; None
-    where that was not looked at.
+    `depends_on_law` lists the nodes whose outcome changes under another law of impacts; None where
+    that was not checked.
     """
 
     outcomes: NDArray[np.int8]
@@ -76,8 +76,7 @@ class Spectrum(Shown):
         return float(np.mean(self.safe))
 
     def least_overturning_amplitude(self) -> Floats:
-        """The lowest overturning amplitude ratio at each frequency ratio; NaN where none
-        overturns."""
+        """Lowest overturning amplitude ratio at each frequency ratio; NaN where none overturns."""
         fallen = self.outcomes != SAFE
         first = np.argmax(fallen, axis=0)
         return np.where(fallen.any(axis=0), self.amplitude_ratios[first], np.nan)
@@ -102,7 +101,7 @@ def overturning_spectrum(
     `frequency_ratios` are sizes of the block relative to its own (the gaps stay as they are) and
     `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first
     (more of a small grid), then those between nodes that differ (and their neighbours). `jobs`
-    threads, default all cores; `on_progress` is told the nodes done by `model`. `play` runs the
+    threads, default all cores; `on_progress` gets the nodes done by `model`. `play` runs the
     nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
     """
     frequencies, amplitudes = (
@@ -156,10 +155,10 @@ def play_nodes(
     jobs: int | None = None,
     on_progress: OnProgress = unheard,
 ) -> Nodes:
-    """The outcomes at nodes of a spectrum (1-D arrays of one length): sides (-1, 0, +1), and
-    whether the run failed.
+    """Outcomes at nodes of a spectrum: sides (-1, 0, +1), and whether the run failed.
 
-    A run that fails is made once more at a hundredth of the tolerance.
+    The ratios are 1-D arrays of one length. A run that fails is made once more at a hundredth of
+    the tolerance.
     """
     sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, on_progress)
     if failed.any():
@@ -212,8 +211,10 @@ def _packed(
 
 @dataclass(frozen=True)
 class Motion:
-    """The motion at one node: `rows` of t (s), theta (rad), x and y (m), fewer where the node's
-    `block` overturns; and the outcome."""
+    """The motion at one node, and its outcome.
+
+    `rows` has t (s), theta (rad), x and y (m), fewer rows where the node's `block` overturns.
+    """
 
     block: Block
     rows: Floats
@@ -229,10 +230,10 @@ def play_motions(
     parts: int,
     jobs: int | None = None,
 ) -> list[Motion | None]:
-    """The motion at nodes of a spectrum (1-D arrays of one length), None where the run failed.
+    """The motion at nodes of a spectrum, None where the run failed.
 
-    Each lasts as long as its `node_scene`, and has a row at its start and at the ends of so many
-    equal parts.
+    The ratios are 1-D arrays of one length. Each motion lasts as long as its `node_scene`, and has
+    a row at its start and at the ends of `parts` equal parts.
     """
     from rockcheck.ebm import batch, natural
 
@@ -272,8 +273,10 @@ def play_motions(
 def node_scene(
     scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0
 ) -> Scene:
-    """The scene of one node of a spectrum, for any model to play; it lasts until `settle` s after
-    the motion of the base."""
+    """The scene of one node of a spectrum, for any model to play.
+
+    It lasts until `settle` s after the motion of the base.
+    """
     if isinstance(scene.excitation, Record):
         return scene.replace(
             excitation=scene.excitation.scaled(float(amplitude_ratio)),
@@ -290,8 +293,10 @@ def node_scene(
 
 
 def node_pulse(scene: Scene, amplitude_ratio: float, frequency_ratio: float) -> tuple[float, float]:
-    """Amplitude (m/s^2) and period (s) of the pulse of one node: a = A g tan(alpha), T = 2 pi/(F p)
-    with the frequency parameter p."""
+    """Amplitude (m/s^2) and period (s) of the pulse of one node.
+
+    They are a = A g tan(alpha) and T = 2 pi/(F p), with the frequency parameter p.
+    """
     amplitude = float(amplitude_ratio) * scene.gravity * scene.block.slope
     return amplitude, 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
 
@@ -307,12 +312,12 @@ def check_excitation(scene: Scene) -> None:
 
 
 def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]) -> None:
-    """Fills `outcomes`: a coarse grid, then at each halving only cells whose corners differ, with a
-    ring around them.
+    """Fills `outcomes`: a coarse grid, halved again and again where corners of a cell differ.
 
-    The coarse grid has every eighth node, or more of them where that would be fewer than a dozen
-    cells an axis. At last the boundary is followed: no node near one of another outcome is left to
-    inference, so that a thin tongue is found to its tip.
+    Each halving runs the nodes of these cells and of a ring of cells around them. The coarse grid
+    has every eighth node, or more of them where that would be fewer than a dozen cells an axis. At
+    last the boundary is followed: no node near one of another outcome is left to inference, so that
+    a thin tongue is found to its tip.
     """
     from scipy import ndimage
 

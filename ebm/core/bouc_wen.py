@@ -1,5 +1,4 @@
-"""The model `ebm-bouc-wen`: the bilateral pivot with the paper's regularised friction (9) in place
-of stick and slip.
+"""The model `ebm-bouc-wen`: the bilateral pivot with the paper's regularised friction (9).
 
 The floor's friction force on the pivot is Q = -mu_k |P| z. The hysteretic variable z replaces the
 sign of the slip velocity V and follows it over the yield displacement u_y:
@@ -61,8 +60,10 @@ _NEARLY = 10.0
 
 @inner_kernel
 def _fill_z(block, a, k, loads, yielded):
-    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, given those of V and z up to
-    k."""
+    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2.
+
+    Those of V and z up to k are given.
+    """
     if yielded:
         a[Row.Z, k + 1] = 0.0
         return
@@ -75,8 +76,7 @@ def _fill_z(block, a, k, loads, yielded):
 
 @inner_kernel
 def _less_later(value, a, x, y, k):
-    """A value less the products of x's later coefficients, to be divided by its first one for y's
-    coefficient k."""
+    """A value minus the sum of x_j y_(k-j) over j = 1..k: y_k is this, divided by x_0."""
     for j in range(1, k + 1):
         value -= a[x, j] * a[y, k - j]
     return value
@@ -101,12 +101,11 @@ def _flat_friction_series(block, mode, a, friction, yielded, order):
 
 @inner_kernel
 def friction_series(block, base, run, zeta, yielded, order):
-    """Fills the workspace with the series of a block whose pivot, or base, carries the friction
-    force -mu_k |P| z.
+    """Fills the workspace with the series of a block whose pivot carries the force -mu_k |P| z.
 
-    Tilted, in the pivot's frame (see ebm.core.motion): with Sw = +-1 where a corner rests on the
-    tip or far wall, else 0, C = Sw c', J = I + C^2, f = u - Sw s' w^2, g = G0 - c w^2 and k = mu_k
-    z sgn P,
+    Of a flat block its base carries it. Tilted, in the pivot's frame (see ebm.core.motion): with Sw
+    = +-1 where a corner rests on the tip or far wall, else 0, C = Sw c', J = I + C^2, f = u - Sw s'
+    w^2, g = G0 - c w^2 and k = mu_k z sgn P,
 
         P = (g J - s C f) / (J + s^2 + k s (c + C)),   Q = -k P,
         J theta'' = -s P + (c + C) Q - C f,
@@ -179,10 +178,10 @@ def _fill_friction_series(block, state, a, zeta, yielded, order):
 
 @called_kernel
 def _held(block, base, state):
-    """Whether a flat block without speed stays at rest: the base neither lifts nor slides it, or
-    presses it on a wall.
+    """Whether a flat block without speed stays at rest.
 
-    One that stays at its limit, but for rounding, is at rest; its guards say when it leaves.
+    The base then neither lifts nor slides it, or presses it on a wall. One that stays at its limit,
+    but for rounding, is at rest; its guards say when it leaves.
     """
     motion, t = state.motion, state.t
     g, u = 1.0 + acceleration(base.vertical, t), acceleration(base.horizontal, t)
@@ -210,8 +209,10 @@ def _held(block, base, state):
 
 @inner_kernel
 def _hangs_on(base, state):
-    """Whether the floor begins to fall away faster than g under a block at rest, and nothing tells
-    to which side it would tip."""
+    """Whether the floor begins to fall away faster than g under a block at rest, u being zero.
+
+    Nothing then tells to which side the block would tip.
+    """
     mode, t = state.mode, state.t
     stands = mode.pivot == Pivot.STICK and mode.pull > 0 and not on_wall(mode)
     still = (
@@ -232,8 +233,10 @@ def _rest(block, base, state):
 
 @inner_kernel
 def _waits(base, state):
-    """Waits until a block at rest may move. Friction fails as the push of the floor ends: what
-    moves in between is rounding."""
+    """Waits until a block at rest may move.
+
+    Friction fails as the push of the floor ends: what moves in between is rounding.
+    """
     motion = state.motion
     if motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0:
         state.t = weightless_at(base.vertical, state.t)
@@ -241,8 +244,10 @@ def _waits(base, state):
 
 @called_kernel
 def _leave_rest(block, base, run):
-    """The block at rest starts to slide, or to tilt, as u grows to the side to which it tips first;
-    returns z = -u/(mu_k G0), +-1 if it slides."""
+    """The block at rest starts to slide or to tilt, to the side to which it tips first as u grows.
+
+    Returns z = -u/(mu_k G0), +-1 if it slides.
+    """
     state, t = run.state, run.state.t
     sense = tips_first(block, base, state)
     u, g = acceleration(base.horizontal, t), 1.0 + acceleration(base.vertical, t)
@@ -272,11 +277,11 @@ def _leave_rest(block, base, run):
 
 @called_kernel
 def _tip(block, base, run, first, zeta, free):
-    """Lets a flat block tilt to the side on which its rotation grows, `first` if it can; returns
-    whether there is one.
+    """Lets a flat block tilt to the side on which its rotation grows, `first` if it can.
 
-    One that nothing holds is `free` to tilt though its rotation grows so slowly that rounding hides
-    it: friction has yet to wind up. A tilt that has ended at this instant does not begin again.
+    Returns whether there is such a side. With `free`, nothing holds the block, and it tilts though
+    its rotation grows so slowly that rounding hides it: friction has yet to wind up. A tilt that
+    has ended at this instant does not begin again.
     """
     state = run.state
     v = slip_velocity(block, state.motion)
@@ -298,8 +303,10 @@ def _tilts(block, base, run, sense, v, zeta):
 
 @called_kernel
 def _starts(block, base, run, zeta):
-    """The contacts of a block that starts, or goes on after an impact; returns z, changed only
-    where it was at rest."""
+    """The contacts of a block that starts, or goes on after an impact.
+
+    Returns z, changed only where the block was at rest.
+    """
     state, motion = run.state, run.state.motion
     v = slip_velocity(block, motion)
     if motion.theta == 0.0 and motion.w == 0.0:
@@ -317,8 +324,10 @@ def _starts(block, base, run, zeta):
 
 @called_kernel
 def _wedged_series(block, base, run, zeta, order, reach):
-    """The series of a block that both walls hold (see ebm.core.motion), and the share of its
-    friction in what they carry."""
+    """The series of a block that both walls hold (see ebm.core.motion); returns their order.
+
+    They include the share of its friction in the forces of the walls.
+    """
     mode, a = run.state.mode, run.a
     order = tilt_series(block, base, run, order, 0.0, reach)
     side = side_of(block, mode.sense)
@@ -337,8 +346,9 @@ def _wedged_series(block, base, run, zeta, order, reach):
 
 @called_kernel
 def _close_walls(block, base, run, zeta, which):
-    """Lets the corners of a tilting block rest on the touched walls that would push them. Sets with
-    more walls are tried first.
+    """Lets the corners of a tilting block rest on the touched walls that would push them.
+
+    Sets with more walls are tried first.
 
     A push that `which` has just ended (or Guard.NONE) does not go on where anything else fits,
     however near to zero it still is. The slack multiplies what counts as noise: at one instant it
@@ -378,8 +388,10 @@ def _try_walls(block, base, run, zeta, walls, ended):
 
 @inner_kernel
 def _fits_walls(block, base, run, zeta, walls, ended):
-    """Whether the mode with these walls, of those that are touched, fits. It is left in the
-    state."""
+    """Whether the mode with these walls, of those that are touched, fits.
+
+    It is left in the state.
+    """
     leans, touched = walls
     if not _try_walls(block, base, run, zeta, leans, ended):
         return False
@@ -403,8 +415,7 @@ def _wall_holds(block, run, tip, touched):
 
 @inner_kernel
 def _aim(block, base, run, zeta, ended):
-    """Assumes a sign of P and fills the workspace with the series for it; returns whether P has
-    that sign.
+    """Assumes a sign of P, fills the workspace with its series, and returns whether P has it.
 
     The sign that has just `ended` (+-1, else 0) is not tried. Below Painleve's limit P does not
     depend on the sign that is assumed. Beyond it the denominator is negative for a push, and pull
@@ -426,8 +437,10 @@ def _aim(block, base, run, zeta, ended):
 
 @inner_kernel
 def _has_sign(a, sign, ended):
-    """Whether P begins with this sign. Where the other one has just ended, it may do so an instant
-    later."""
+    """Whether P begins with this sign.
+
+    Where the other one has just ended, it may do so an instant later.
+    """
     if ended != 0 and abs(a[Row.P, 0]) <= abs(a[Row.P, 1]) * INSTANT:
         return True
     return sign * leading(a, Row.P, _LOOK - 2, NOISE[Kind.FORCE], AHEAD) >= 0
@@ -435,8 +448,7 @@ def _has_sign(a, sign, ended):
 
 @called_kernel
 def _initial_friction(block, base, run):
-    """z at the start: sgn V for a pivot that slips, else the value that lets it stand still (at
-    most 1 in size)."""
+    """Z at the start: sgn V for a pivot that slips, else the value that holds it (|z| <= 1)."""
     mode, motion, a = run.state.mode, run.state.motion, run.a
     v = slip_velocity(block, motion)
     if abs(v) > SLOW:
@@ -482,8 +494,10 @@ def expand(block, base, run, reach):
 
 @inner_kernel
 def locate(block, run):
-    """The first event of the step, as with Coulomb's friction; one more is that z comes to the sign
-    of V, from where the pivot loads."""
+    """The first event of the step, as with Coulomb's friction, or z reaching zero.
+
+    Where the pivot unloads, z comes to the sign of V there: from then on the pivot loads.
+    """
     state, mode, a = run.state, run.state.mode, run.a
     fill_guards(block, run.state, run.a)
     # The friction of a wedged block, which does not slip, is what z makes it: it has no cone to
@@ -543,7 +557,7 @@ def after_event(block, base, run):
 
 @called_kernel
 def _follow(block, base, run):
-    """What follows an event that is no impact: the Event that is told, or none."""
+    """Changes the contacts after an event that is no impact; returns the Event, or UNTOLD."""
     state, mode, which = run.state, run.state.mode, run.state.guard
     _waits(base, state)
     # At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
@@ -572,8 +586,10 @@ def _follow(block, base, run):
 
 @inner_kernel
 def _turn(block, base, state):
-    """The slip has come to its end: the pivot slips back, or a flat block rests. The event that is
-    told."""
+    """The slip has come to its end: the pivot slips back, or a flat block rests.
+
+    Returns the Event.
+    """
     event = Event.UNTOLD if state.holds else Event.STICKS
     state.holds = True
     state.mode.slip = -state.mode.slip
@@ -593,8 +609,10 @@ def _comes_to_rest(block, base, state):
 
 @inner_kernel
 def _tip_sliding(block, base, run):
-    """A block tilts while it slides; the event that is told, none where rounding keeps it flat for
-    a while."""
+    """A block tilts while it slides; returns the event.
+
+    It is Event.UNTOLD where rounding keeps the block flat for a while.
+    """
     state, slip = run.state, run.state.mode.slip
     # It slid by rounding, whose sign would choose the side.
     if abs(state.motion.vx) < SLOW and _comes_to_rest(block, base, state):

@@ -1,5 +1,4 @@
-"""Which corners rest on floor and walls, and how a block is put exactly onto a contact that it
-reaches.
+"""Which corners rest on floor and walls, and how a block is put exactly onto a contact.
 
 Natural units. A contact is closed where its gap and the gap's rate are zero; there is one zero of
 position, one of velocity.
@@ -54,8 +53,7 @@ def stop(motion):
 
 @inner_kernel
 def wall_gap(block, motion, side):
-    """The clear gap between the wall on `side` (+1 left, -1 right) and the corner that faces it;
-    infinite without a wall."""
+    """Clear gap between the wall on `side` (+1 left, -1 right) and its corner; inf if no wall."""
     gap, faces = block.gap_left if side > 0 else block.gap_right, side_of(block, side)
     if gap == math.inf:
         return gap
@@ -107,8 +105,10 @@ def closed_floor(block, motion):
 
 @inner_kernel
 def closed_gap(gap, rate):
-    """A gap and its rate; both zero where it touches and closes slowly enough to rest. Then its
-    acceleration decides."""
+    """A gap and its rate; both zero where it touches and closes slowly enough to rest.
+
+    Then its acceleration decides.
+    """
     if abs(gap) < CLOSED:
         if -SLOW < rate < 0.0:
             return 0.0, 0.0
@@ -133,8 +133,10 @@ def upright(block, motion):
 
 @inner_kernel
 def land_upright(block, motion, sign, on_floor):
-    """Sets a theta near zero to exactly zero and keeps the pivot's place. A side that then touches
-    a wall touches it exactly."""
+    """Sets a theta near zero to exactly zero and keeps the pivot's place.
+
+    A side that then touches a wall touches it exactly.
+    """
     side = side_of(block, sign)
     motion.x += sign * (side.arm - side.radius * math.sin(side.alpha - sign * motion.theta))
     if on_floor:

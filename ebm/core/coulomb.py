@@ -30,8 +30,7 @@ _FARTHER = 8.0
 
 @inner_kernel
 def expand(block, base, run, reach):
-    """Series of the mode's motion: their order, the place of a sticking pivot, and the step they
-    are good for."""
+    """Series of the mode's motion: order, place of a sticking pivot, and length of the step."""
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     reach = min(reach, _FARTHER * state.stride)
     state.place = 0.0
@@ -80,8 +79,7 @@ def advance(run):
 
 @inner_kernel
 def after_event(block, base, run):
-    """Selects the mode that follows, and notes the event that ended the one before, unless it goes
-    on."""
+    """Selects the mode that follows, and notes the event unless the mode goes on."""
     state, mode = run.state, run.state.mode
     if state.known:
         state.known = False
@@ -102,8 +100,10 @@ def after_event(block, base, run):
 
 @inner_kernel
 def tell(run, event):
-    """Notes an event, and one more where an impact ends in rest. The end of rest is named by the
-    mode that follows."""
+    """Notes an event, and one more where an impact ends in rest.
+
+    The end of rest is named by the mode that follows.
+    """
     state, mode = run.state, run.state.mode
     rest = mode_code(state) == 0
     if event == Event.UNTOLD or (event == Event.LEAVES_REST and rest):

@@ -37,8 +37,10 @@ def quiet_from(base, tolerance):
 
 @inner_kernel
 def decided(block, base, state):
-    """The final peak rotation (>= pi/2: overturns) if the rest of the motion is certain, else
-    -1."""
+    """The final peak rotation if the rest of the motion is certain, else -1.
+
+    From pi/2 on the block overturns.
+    """
     t, quiet, peak, theta = state.t, state.quiet_from, state.peak, state.motion.theta
     still = base.vertical.form.kind == Shape.STILL
     ahead = 0.0
@@ -55,7 +57,7 @@ def decided(block, base, state):
 
 @inner_kernel
 def _by_energy(block, state, ahead):
-    """What the energy that the block has and can still gain says of its outcome.
+    """The peak (pi/2: overturns) that follows from the energy now and still to come, else -1.
 
     `ahead` bounds the integral of |u| to come, I. The energy E of block and floor, counted from
     standing, grows by no other work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I.
@@ -101,12 +103,12 @@ def energy_of(block, motion):
 
 @inner_kernel
 def swings_again(state, energy):
-    """Whether this swing, which turns back in a step that starts now with this energy, is the last
-    one again: then so are all to come.
+    """Whether this swing repeats the last one: then all to come do, too.
 
-    After the excitation the energy and the place of the pivot are all that a swing depends on.
-    Beside a wall that takes no energy a block may rock so for ever, however near its balance it
-    turns back. Only what sticks to the floor and touches no wall swings.
+    The swing turns back in a step that starts now with this energy. After the excitation the energy
+    and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy a
+    block may rock so for ever, however near its balance it turns back. A swing counts only where
+    the pivot sticks to the floor and the block touches no wall.
     """
     mode = state.mode
     if state.t < state.quiet_from or mode.pivot != Pivot.STICK or on_wall(mode):
@@ -124,20 +126,21 @@ def swings_again(state, energy):
 @inner_kernel
 def swing_error(tolerance):
     """The error of rotation and speed after a swing: a step errs by the tolerance, or by rounding.
-    Energy errs by that times the speed."""
+
+    Energy errs by that times the speed.
+    """
     return _STEPS * (tolerance + NOISE[Kind.POSITION])
 
 
 @inner_kernel
 def _highest(block, side, energy):
-    """The rotation on this side to which so much energy lifts the block."""
+    """The rotation on this side to which this energy lifts the block."""
     return side.alpha - math.acos(min((block.height + energy) / side.radius, 1.0))
 
 
 @inner_kernel
 def _falls(block, base, state):
-    """pi/2 if a block past its balance point falls whatever the rest of the excitation does, else
-    -1.
+    """pi/2 if a block past its balance point falls whatever the excitation does, else -1.
 
     Turning outward, beyond tan(phi - alpha) > mu and > |u| for all time to come, it is accelerated
     outward in every mode: sticking by (3), slipping by (7), by an impulse of the floor, or not at
@@ -156,8 +159,10 @@ def _falls(block, base, state):
 
 @inner_kernel
 def _rocks_for_good(block, mode, energy):
-    """Whether the block rocks and neither pivot can slip in free rocking of this energy (up to its
-    balance point), impacts included."""
+    """Whether the block rocks and neither pivot can slip in free rocking of this energy.
+
+    That is up to its balance point, impacts included.
+    """
     if block.walls or not rocks(mode):
         return False
     return block.no_slip or (

@@ -1,5 +1,4 @@
-"""Ground motion for compiled code: its value, its Taylor series, its kinks, and when it next
-exceeds a level.
+"""Ground motion for compiled code: value, Taylor series, kinks, next passage of a level.
 
 Natural units throughout: acceleration in g, time in sqrt(R/g).
 """
@@ -52,7 +51,7 @@ _NO_SAMPLES = np.zeros(1)
 _SAME, _EPSILON = 2.0**-30, 2.0**-52
 #: Newton's method finds a root in fewer trials, or not at all.
 _SOME = 30
-#: The sign with which an acceleration leaves zero is read so much later.
+#: The sign with which an acceleration leaves zero is read this much later.
 _SOON = 1e-6
 _RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
@@ -171,11 +170,10 @@ def fill_series(g, t, sign, n, a, row):
 
 @inner_kernel
 def next_kink(g, t):
-    """The next time after t at which the motion is not smooth, or up to which its series can be
-    trusted.
+    """The next time after t at which the motion is not smooth, or its series not to be trusted.
 
     In the rise of a pulse exp(-rate tau^2) the terms of a series still grow where it is cut off,
-    unless it is a short one.
+    unless the step is short.
     """
     if g.form.kind == Shape.GAUSSIAN:
         tau = t - g.form.centre
@@ -196,8 +194,7 @@ def next_kink(g, t):
 
 @inner_kernel
 def acceleration_after(g, t):
-    """Acceleration so soon after t that its sign tells how it leaves a zero at t, and before the
-    next kink."""
+    """Acceleration soon after t, before the next kink: its sign tells how it leaves a zero at t."""
     return acceleration(g, _soon(g, t))
 
 
@@ -208,8 +205,10 @@ def _soon(g, t):
 
 @inner_kernel
 def weightless_at(g, t):
-    """The time at which vertical base motion falls away with 1 g, if it falls away with less at t,
-    and with more soon after; else t."""
+    """The time at which vertical base motion begins to fall away with more than 1 g.
+
+    Only if it does so between t and soon after t; else t.
+    """
     now, after = 1.0 + acceleration(g, t), 1.0 + acceleration_after(g, t)
     return t + (_soon(g, t) - t) * now / (now - after) if now > 0.0 > after else t
 
@@ -251,8 +250,10 @@ def _next_extremum_of_pulse(f, t):
 
 @inner_kernel
 def _next_extremum(g, t):
-    """The next time after t up to which the motion is monotone; NEVER where it is monotone (and
-    dying out) for good."""
+    """The next time after t up to which the motion is monotone.
+
+    NEVER where it is monotone (and dying out) for good.
+    """
     if g.form.kind == Shape.SAMPLED:
         return next_kink(g, t)
     if g.form.kind == Shape.SINE:
@@ -266,8 +267,10 @@ def _next_extremum(g, t):
 
 @inner_kernel
 def largest_ahead(g, t):
-    """A bound on |acceleration| from time t on: its value now and at the extrema to come; a
-    record's largest sample."""
+    """A bound on |acceleration| from time t on.
+
+    The largest of its value now and at the extrema to come; of a record the largest sample.
+    """
     if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
     if g.form.kind == Shape.SINE:
@@ -285,8 +288,10 @@ def largest_ahead(g, t):
 
 @inner_kernel
 def impulse_ahead(g, t):
-    """A bound on the integral of |acceleration| from time t on: exact in a pulse's last lobe,
-    infinite before it."""
+    """A bound on the integral of |acceleration| from time t on.
+
+    Exact in a pulse's last lobe, infinite before it.
+    """
     if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
     tau = t - g.form.centre
@@ -303,11 +308,11 @@ def impulse_ahead(g, t):
 
 @inner_kernel
 def _passage(g, a, b, fa, fb, level):
-    """Where the acceleration passes the level between a, inside it by fa, and b, beyond it by fb;
-    it is monotone in between.
+    """Where the acceleration, monotone between a and b, passes the level.
 
-    Newton's method, aimed a little past the root so that the bracket closes on it from both sides,
-    and halving where that leads nowhere; returns the bracket's outer end.
+    It is inside the level by fa at a and beyond it by fb at b. Newton's method, aimed a little past
+    the root so that the bracket closes on it from both sides, and halving where that leads nowhere;
+    returns the bracket's outer end.
     """
     rising = fb > 0.0
     close = 2.0 * _EPSILON * abs(b)
@@ -332,8 +337,11 @@ def _passage(g, a, b, fa, fb, level):
 
 @inner_kernel
 def _leaves(g, times, values, level, beyond, ahead):
-    """The time between two `times` at which the acceleration passes the level, but at most `ahead`
-    before it is `beyond`; it is monotone in between, with these values at the ends."""
+    """The time between two `times` at which the acceleration passes the level.
+
+    It is at most `ahead` before the acceleration passes `beyond`. In between the acceleration is
+    monotone; `values` are its values at the ends.
+    """
     (t, end), (here, there) = times, values
     passed = t
     if (here - level) * (there - level) <= 0.0:
@@ -353,8 +361,7 @@ def _just_before(g, t):
 
 @inner_kernel
 def next_exceedance(g, t, low, high, noise, ahead):
-    """The time from t on at which the acceleration passes below `low` or above `high`, on that
-    side, to be beyond by `noise`; else NEVER.
+    """The time from t on at which the acceleration leaves [low, high] by `noise`; else NEVER.
 
     This is when it passes the limit itself, but at most `ahead` before it passes the limit by the
     noise: an acceleration that stays near its limit has not exceeded it.

@@ -68,14 +68,16 @@ _CONSTANT, _SHORTER = 30, 31
 #: only, within this share of a step.
 _NEARBY = 0.25
 #: The weight with which the noise of forces hides no base acceleration: nothing is rounded in it.
-#: Its square is a number, too.
+#: Its square is finite, too.
 _ANY = 2.0**400
 
 
 @inner_kernel
 def _enter(a, which, shorter, series, weight):
-    """Enters a guard into the table: so many terms shorter than the series, with the weight of one
-    of them; its other weights and its constant are zero."""
+    """Enters a guard into the table, `shorter` terms shorter than the series.
+
+    It gets the weight of one series; its other weights and its constant are zero.
+    """
     row = Row.TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
@@ -161,8 +163,7 @@ def _fill_gap(block, state, a, tip):
 
 @inner_kernel
 def _fill_flat(block, mode, a):
-    """The guards of a translating block; the tip wall is the left one, the far wall the right
-    one."""
+    """The guards of a translating block; tip means the left wall, far the right one."""
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
     if block.gap_left < np.inf and mode.tip == 0:
         _enter(a, Guard.TIP_GAP, 0, Row.XI, 1.0)
@@ -220,8 +221,10 @@ def _fill_uplift(block, mode, hangs, plus, a):
 
 @inner_kernel
 def _coefficients(which, half, a):
-    """Eight coefficients, from `half` on, of a guard of the table, without its constant. A series
-    without weight need not be there."""
+    """Eight coefficients, from `half` on, of a guard of the table, without its constant.
+
+    A series without weight need not be there.
+    """
     row, sum, rate = Row.TABLE + which, zeros(), KIND[which] == Kind.RATE
     for part in range(_MOST):
         series = _COMBINES[which, part]
@@ -232,8 +235,7 @@ def _coefficients(which, half, a):
 
 @inner_kernel
 def guard(which, order, a):
-    """Writes a guard of the table into the workspace and returns its degree, or -1 where the mode
-    has no such guard."""
+    """Writes a guard of the table into the workspace; returns its degree, -1 if there is none."""
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return -1
@@ -247,8 +249,9 @@ def guard(which, order, a):
 
 @inner_kernel
 def _with_slack(which, slack, a):
-    """The noise allowed to the guard in the workspace, in a mode with this slack. An open contact
-    is not noise.
+    """The noise allowed to the guard in the workspace, in a mode with this slack.
+
+    An open contact is not noise.
 
     A gap that touches without speed may close by the noise. That takes time, so that the events of
     one instant come to an end.
@@ -268,8 +271,7 @@ def _with_slack(which, slack, a):
 
 @inner_kernel
 def seen(kind, smooth):
-    """How far ahead a guard of this kind is judged where the base motion is smooth for the time
-    `smooth`.
+    """How far ahead a guard of this kind is judged, the base motion being smooth for `smooth`.
 
     Forces follow the base acceleration at once, and the series does not know it beyond its next
     kink. Positions change little at one.
@@ -291,8 +293,10 @@ def _coefficient(which, k, a):
 
 @inner_kernel
 def starts_positive(which, ahead, a):
-    """A cheap proof, without writing the guard, that it leaves zero upward, seen so far ahead; a
-    mode without it has nothing to prove."""
+    """A cheap proof, without writing the guard, that it leaves zero upward within `ahead`.
+
+    A guard that the mode does not have needs no proof: True.
+    """
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
@@ -309,8 +313,10 @@ def starts_positive(which, ahead, a):
 
 @inner_kernel
 def _stays_positive(which, order, until, slack, a):
-    """A cheap proof, without writing the guard, that it is positive up to a time: more so than the
-    sum of all its terms that fall."""
+    """A cheap proof, without writing the guard, that it is positive up to a time.
+
+    It starts higher than the sum of all its falling terms.
+    """
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return True
@@ -327,10 +333,10 @@ def _stays_positive(which, order, until, slack, a):
 
 @inner_kernel
 def _past_a_touch(which, degree, times, noise, a):
-    """Where a force in the workspace is positive again if it falls below zero by less than the
-    noise, by its parabola; else its root. `times` are that root and the step.
+    """Where a force in the workspace that dips below zero by less than the noise is positive again.
 
-    The two roots of a touch are known less well than an INSTANT apart.
+    By its parabola; where it does not only touch, its root. `times` are that root and the step. The
+    two roots of a touch are known less well than an INSTANT apart.
     """
     root, h = times
     if KIND[which] != Kind.FORCE or not 0.0 < root <= _NEARBY * h:
@@ -356,10 +362,10 @@ def _latest(tau, which, other):
 
 @inner_kernel
 def first_event(run):
-    """The first time within the step at which a guard ends the mode, and which; the step's length
-    and Guard.NONE where none does.
+    """The first time within the step at which a guard ends the mode, and which guard.
 
-    A gap that closes within an INSTANT of it is the event: contacts before forces.
+    Where none does, the step's length and Guard.NONE. A gap that closes within an INSTANT of the
+    event replaces it: contacts before forces.
     """
     state, a = run.state, run.a
     order, h, slack = state.order, state.length, state.slack
@@ -389,6 +395,7 @@ def first_event(run):
 @inner_kernel
 def rock_guards_hold(block, run):
     """A cheap proof that a rocking block keeps every guard of ROCK but Guard.PHI through a step h.
+
     False where it proves nothing.
 
     Each guard is bounded from below as in `first_root`, without being written. Inside the cone the
@@ -418,8 +425,7 @@ def rock_guards_hold(block, run):
 
 @inner_kernel
 def _rock_gap_holds(row, order, h, a):
-    """Whether a bound on the gap that this row of the table gives to ROCK shows it open through a
-    step h."""
+    """Whether a bound on the gap in this row of the table shows it open in ROCK up to h."""
     along, across = a[row, Row.COS], a[row, Row.SIN]
     cos_low, cos_high = halves(a, Row.COS, order)
     sin_low, sin_high = halves(a, Row.SIN, order)

@@ -1,6 +1,6 @@
 """Eight numbers that compiled code adds and multiplies at once: the lanes of one vector register.
 
-A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two such values. LLVM makes the
+A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two vectors. LLVM makes the
 machine code: one instruction where a register holds eight numbers (AVX-512), two or four where it
 holds fewer, with the same result to the bit. Here numba learns the type and what can be done with
 it: for each function there is the plain one, on an array of eight, which also says what it does,
@@ -71,11 +71,11 @@ def _where(b: Any, how: str, place: Any) -> Any:
 
 
 def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Tells numba that the plain function of this name, without the underscore, is compiled by the
-    decorated one.
+    """Tells numba to compile the decorated function in place of the plain one.
 
-    That is given numba's context, the builder of the code, the types and the values of the
-    arguments, for arguments of the types `given`.
+    The plain function has the same name without the underscore. The decorated one is called with
+    numba's context, the builder of the code, the types and the values of the arguments, for
+    arguments of the types `given`.
     """
 
     def tell(code: Callable[..., Any]) -> Callable[..., Any]:
@@ -103,8 +103,10 @@ def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callab
 
 
 class _Arithmetic(AbstractTemplate):
-    """The types of sums and products: of lanes with lanes, and of lanes with a number, which all
-    lanes then have."""
+    """The types of sums and products: lanes with lanes, or lanes with a number.
+
+    The number then stands in all lanes.
+    """
 
     def generic(self, args: Any, kws: Any) -> Any:
         if _LANES in args and all(kind in (_LANES, types.float64) for kind in args):
@@ -234,8 +236,10 @@ def _falls(context: Any, b: Any, kinds: Any, values: Any) -> Any:
 
 
 def total(v: Numbers) -> float:
-    """The sum of all lanes: of the two halves, of the two quarters of that, and of the two numbers
-    that are left."""
+    """The sum of all lanes, by halving.
+
+    The two halves are added, then the two quarters of that, and at last the two numbers left.
+    """
     while len(v) > 1:
         half = len(v) // 2
         v = v[:half] + v[half:]

@@ -29,7 +29,7 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
 def loop_with(friction: ModuleType) -> object:
-    """What plays a row of `play`: the event loop with a law of friction, by its four doors."""
+    """The function that plays a row of `play`: the event loop with the four doors of `friction`."""
     expand, locate, looks_ahead = friction.expand, friction.locate, friction.LOOKS_AHEAD
     advance_friction, after_event = friction.advance, friction.after_event
 
@@ -124,8 +124,10 @@ def smooth_until(base, state):
 
 @inner_kernel
 def finite(state, holds):
-    """Whether the motion is finite, as `holds` says; else the run ends: no step is good for a
-    series that is not finite."""
+    """Whether the motion is finite, as `holds` says; else the run ends.
+
+    No step is good for a series that is not finite.
+    """
     if not holds:
         state.ending = Ending.NOT_FINITE
     return holds
@@ -151,7 +153,7 @@ def resolve(block, base, run):
 
 @inner_kernel
 def end(run):
-    """Looks at how the run has ended."""
+    """Checks that the motion is finite, and writes the rows after the last step."""
     state = run.state
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE
@@ -174,11 +176,12 @@ _play_row, _play_row_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
 
 @kernel
 def play(rows, states, work, records, found):
-    """Plays runs one after the other in `states`, an array of one STATE with its control, with a
-    `workspace()` and Coulomb's friction; `found[i]`, a FOUND, is what is kept of row i.
+    """Plays runs one after the other, with Coulomb's friction.
 
-    Of it `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
-    `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode after, impulse.
+    `states` is an array of one STATE with its control, `work` a `workspace()`; `found[i]`, a FOUND,
+    is what is kept of row i. Of row i `records.out[i]` (n x 6) has the motion at k * output_step,
+    `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
+    after, impulse.
     """
     for i in range(len(rows.durations)):
         _play_row(rows, i, states[0], work, records, found)

@@ -47,9 +47,9 @@ SOON = 1e-6
 
 
 def _candidates() -> np.ndarray:
-    """All modes in the order of trial: more contacts first, sticking before slipping, a pushing
-    floor before a pulling one.
+    """All modes in the order of trial.
 
+    More contacts come first, sticking before slipping, a pushing floor before a pulling one.
     Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or
     left, 2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses
     are relative to that of `tips_first`.
@@ -79,8 +79,11 @@ _FLAT_TRIES = 4
 
 
 def _tries() -> np.ndarray:
-    """The candidates, by number, and then -1: of a tilted block that touches these walls (none, 1,
-    2, 3), in the last row of a flat one."""
+    """The numbers of the candidates to try, by the walls that a tilted block touches.
+
+    Row 0 is none, 1 the tip wall, 2 the far wall, 3 both; the last row is a flat block's. Behind
+    the numbers stands -1.
+    """
     family, sense, walls, only_flat = _CANDIDATES[:, [0, 1, 5, 6]].T
     rows = np.full((_FLAT_TRIES + 1, len(_CANDIDATES) + 1), -1, dtype=np.int8)
     rows[_FLAT_TRIES, :-1] = range(len(_CANDIDATES))
@@ -106,8 +109,10 @@ def forget(state):
 
 @inner_kernel
 def leave(state, kind):
-    """Notes that a guard of this kind has ended the mode. If it was a force's, and by rounding
-    only, the mode may go on once."""
+    """Notes that a guard of this kind has ended the mode.
+
+    If it was a force's, and by rounding only, the mode may go on once.
+    """
     if state.t - state.since > INSTANT:
         forget(state)
     code = code_of(state.mode)
@@ -124,11 +129,10 @@ def slacken(state):
 
 @inner_kernel
 def wrong_by(block, base, run, measured):
-    """0 if the mode can begin, with every guard leaving zero upward; else the slack (in units of
-    noise) with which it could.
+    """0 if the mode can begin, else the slack (in units of noise) with which it could.
 
-    Infinite if the mode needs a motion that does not begin, or if that slack is not `measured`:
-    only where no mode fits is it asked for.
+    A mode can begin with every guard leaving zero upward. Infinite if the mode needs a motion that
+    does not begin, or if that slack is not `measured`: only where no mode fits is it asked for.
     """
     # The plain constant would make numba compile all series once more, for it alone.
     look = min(_LOOK, WIDTH)
@@ -170,13 +174,12 @@ def _guard_wrong_by(mode, which, order, ahead, a, measured):
 
 @inner_kernel
 def _favoured(block, base, state):
-    """The side to which a flat block at rest would rather tip, +1 left or -1 right; 0 where the
-    scene is its own mirror image.
+    """The side to which a flat block at rest would rather tip: +1 left, -1 right, 0 neither.
 
-    Both sides fit only by rounding, or where the floor falls away faster than g under a pivot that
-    cannot let go. Then the base acceleration decides, now or soon, or the friction. Failing these
-    the block's place and its walls fix the order of calculation, so that a mirror image gives the
-    mirrored result.
+    It is 0 where the scene is its own mirror image. Both sides fit only by rounding, or where the
+    floor falls away faster than g under a pivot that cannot let go. Then the base acceleration
+    decides, now or soon, or the friction. Failing these the block's place and its walls fix the
+    order of calculation, so that a mirror image gives the mirrored result.
     """
     motion, t = state.motion, state.t
     toward = acceleration(base.horizontal, t)
@@ -195,15 +198,19 @@ def _favoured(block, base, state):
 
 @inner_kernel
 def tips_first(block, base, state):
-    """The side to which a flat block is first asked to tip, +1 left or -1 right: the sense in which
-    all of it is calculated."""
+    """The side to which a flat block is first tried to tip, +1 left or -1 right.
+
+    It is the sense in which all of the block is calculated.
+    """
     return 1 if _favoured(block, base, state) >= 0 else -1
 
 
 @inner_kernel
 def hangs_flat(mode):
-    """Whether the floor holds a flat block at rest that no wall touches, though it falls away
-    faster than g."""
+    """Whether the floor pulls at a flat block at rest that no wall touches.
+
+    The floor then falls away faster than g.
+    """
     return rests(mode) and mode.pull < 0 and not on_wall(mode)
 
 
@@ -255,16 +262,22 @@ def _may_pull(block, mode, flat, mine):
 
 @inner_kernel
 def _flat_on(mode, mine, walls):
-    """Whether a flat block rests on the right walls, of those that it touches: at rest it is held
-    on these; sliding it touches none; between two walls that it fills it leans on both."""
+    """Whether a flat block rests on the right ones of the walls that it touches.
+
+    At rest it is held on these; sliding it touches none; between two walls that it fills it leans
+    on both.
+    """
     held = mode.pivot == Pivot.STICK or (mode.pivot == Pivot.OFF and walls == 3)
     return (mine == walls or not held) and (mine == 0 or mode.pivot != Pivot.SLIPPING)
 
 
 @inner_kernel
 def touched_walls(block, motion, sense, flat):
-    """The walls that the block touches, as bits: flat, left and right; else, as it tips to `sense`,
-    the tip wall and the far one."""
+    """The walls that the block touches, as bits 1 and 2.
+
+    Of a flat block the left and the right wall; else, as it tips to `sense`, the tip wall and the
+    far one.
+    """
     if not block.walls:
         return 0
     return (1 if closed_wall(block, motion, 1 if flat else sense, False) else 0) + (
@@ -274,8 +287,10 @@ def touched_walls(block, motion, sense, flat):
 
 @inner_kernel
 def _clean(block, motion, floor):
-    """Sets to zero what differs from it by rounding only: a tilt, a slip, the motion of a block
-    that stands on floor and wall."""
+    """Sets to zero what differs from it by rounding only.
+
+    That is a tilt, a slip, or the motion of a block that stands on floor and wall.
+    """
     upright(block, motion)
     if floor and abs(slip_velocity(block, motion)) < SLOW:
         stand(block, motion)
@@ -289,10 +304,12 @@ def _clean(block, motion, floor):
 
 
 class _Touching(NamedTuple):
-    """What a selection begins with: the side to which the block would rather tip (0: either), that
-    to which it is first asked to, whether it touches the floor, its slip velocity; the walls that
-    it touches, as bits: flat (left and right), as it tips to the first side, to the other; and the
-    row of the candidates."""
+    """What a selection begins with.
+
+    The side to which the block would rather tip (0: either) and the side that is tried first;
+    whether the block touches the floor, and its slip velocity; the walls that it touches, as bits:
+    flat (left and right), as it tips to the first side, and to the other; and the row of `_TRIES`.
+    """
 
     favoured: int
     first: int
@@ -326,8 +343,10 @@ def _touching(block, base, state):
 
 @inner_kernel
 def select(block, base, run):
-    """Writes the consistent mode into the state, or the one that is wrong by least. False where the
-    state is not finite."""
+    """Writes the consistent mode into the state, or the one that is wrong by least.
+
+    False where the state is not finite.
+    """
     state, mode = run.state, run.state.mode
     state.began = state.t
     at = _touching(block, base, state)
@@ -355,8 +374,11 @@ def select(block, base, run):
 
 @inner_kernel
 def _least_wrong(block, base, run, at, trial):
-    """By how much the candidate is wrong that is wrong by least, and which; the first one that fits
-    is left in the state. The last trial looks at the modes that have been tried at this instant."""
+    """The slack of the candidate that is least wrong, and its number.
+
+    The first one that fits is left in the state. Trial 2, the last, looks at the modes that have
+    been tried at this instant.
+    """
     least, chosen = np.inf, -1
     for place in range(_TRIES.shape[1]):
         number = _TRIES[at.tries, place]
@@ -372,8 +394,10 @@ def _least_wrong(block, base, run, at, trial):
 
 @inner_kernel
 def _comes_up(block, state, at, number, again):
-    """Writes a candidate, if the walls that it leans on are touched; whether it is possible, and
-    has been tried at this instant (`again`) or not."""
+    """Writes a candidate, if the walls that it leans on are touched.
+
+    Returns whether it is possible, and has been tried at this instant (`again`) or not.
+    """
     mode = state.mode
     tilts = _CANDIDATES[number, 0] == Family.TILT
     touched = (at.near if _CANDIDATES[number, 1] > 0 else at.away) if tilts else at.upright_walls

@@ -1,5 +1,4 @@
-"""Motion of the block for a given set of contacts, as Taylor series: one formulation for every
-mode.
+"""Motion of the block as Taylor series: one formulation for every set of contacts.
 
 Natural units: lengths in R, accelerations in g, hence time in sqrt(R/g), unit mass; the moment of
 inertia of a homogeneous block is then 1/3. x, y are those of the mass's centre, x = 0 where the
@@ -69,8 +68,7 @@ def base_series(base, t, sign, order, a):
 
 @inner_kernel
 def turned(block, state, a):
-    """Writes the start of the series of rotation, sine and cosine; returns the side that it tips
-    to."""
+    """Writes the start of the series of rotation, sine and cosine; returns the side it tips to."""
     mode, motion = state.mode, state.motion
     sign = float(mode.sense)
     a[Row.PHI, 0] = sign * motion.theta
@@ -83,12 +81,11 @@ def turned(block, state, a):
 
 @inner_kernel
 def tilt_series(block, base, run, order, enough, reach):
-    """Fills the workspace with the series of a tilted block's motion from now on; returns their
-    order.
+    """Fills the workspace with the series of a tilted block's motion; returns their order.
 
-    The order is `order`, or less where the terms fall below `enough` within `reach` (the longest
-    step there can be). ROCK, whose motion does not depend on P and Q, has them where the setting
-    asks for a guard on them.
+    The series begin now. The order is `order`, or less where the terms fall below `enough` within
+    `reach` (the longest step there can be). ROCK, whose motion does not depend on P and Q, has them
+    where the setting needs a guard on them.
     """
     mode, motion, a = run.state.mode, run.state.motion, run.a
     base_series(base, run.state.t, float(mode.sense), order, a)
@@ -112,10 +109,10 @@ def tilt_series(block, base, run, order, enough, reach):
 
 @inner_kernel
 def _products(a, x, y, first, last, n):
-    """The sum of x_j y_(n-j) for j from `first` to `last`. The ends, which are the newest
-    coefficients, are added last:
+    """The sum of x_j y_(n-j) for j from `first` to `last`.
 
-    so the processor need not wait for them to begin with the sum.
+    The ends, which are the newest coefficients, are added last, so that the processor can begin the
+    sum without them.
     """
     total = 0.0
     for j in range(first + 1, last):
@@ -129,8 +126,10 @@ def _products(a, x, y, first, last, n):
 
 @inner_kernel
 def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
-    """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking; xi and y are s and c up to
-    a constant."""
+    """ROCK, (3): theta'' = (u c - S s G0)/(I + R^2), the pivot sticking.
+
+    xi and y are s and c up to a constant.
+    """
     w0, s0, c0, u0 = a[Row.OMEGA, 0], a[Row.SIN, 0], a[Row.COS, 0], a[Row.U, 0]
     w, s, c = w0, s0, c0
     ds, dc, push = w0 * c0, w0 * s0, u0 * c0
@@ -176,8 +175,10 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
 
 @inner_kernel
 def _slide_series(spin, kappa, order, enough, reach, a):
-    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P. The general
-    solution, written out for speed."""
+    """SLIDE-ROCK, (7): of the contacts only the pivot's acts, with P and Q = -kappa P.
+
+    The general solution, written out for speed.
+    """
     sine, cosine = a[Row.SIN, 0], a[Row.COS, 0]
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
@@ -266,8 +267,11 @@ def _lean_series(block, side, tip, order, a):
 
 
 class _Acting(NamedTuple):
-    """The contacts of a mode: the side that the block tips to, 1/I, the friction of a slipping
-    pivot (Q = -kappa P), and which of them act; `stick` is the pivot's tangent."""
+    """The contacts of a mode.
+
+    The side that the block tips to, `spin` = 1/I, the friction `kappa` of a slipping pivot (Q =
+    -kappa P), and which contacts act; `stick` is the pivot's tangent.
+    """
 
     side: Any
     spin: float
@@ -286,14 +290,16 @@ def _acts(acting, which):
 
 @inner_kernel
 def _wall_arms(side, s, c):
-    """c' of the corners on the tip wall and on the far wall."""
+    """C' of the corners on the tip wall and on the far wall."""
     return side.tip_sin * s + side.tip_cos * c, side.far_sin * s + side.far_cos * c
 
 
 @inner_kernel
 def _contact_rows(acting, a):
-    """Constraint rows, force columns (xi, y, moment) and the inverse of their matrix at the start;
-    returns their number."""
+    """Writes constraint rows, force columns (xi, y, moment) and the inverse of their matrix.
+
+    They are those at the start of the step. Returns their number.
+    """
     s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
     along, upward = (0.0, 1.0, 1.0, -1.0), (1.0, 0.0, 0.0, 0.0)
@@ -318,8 +324,10 @@ def _contact_rows(acting, a):
 
 @called_kernel
 def _contact_series(block, mode, order, enough, reach, a):
-    """Newton-Euler with the mode's constraints, solved term by term: the matrix of the unknown
-    forces is the same each time."""
+    """Newton-Euler with the mode's constraints, solved term by term; returns the order.
+
+    The matrix of the unknown forces is the same for each term.
+    """
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
     stick = (
@@ -376,8 +384,10 @@ def _contact_series(block, mode, order, enough, reach, a):
 
 @inner_kernel
 def _moment_of_lower_orders(acting, k, a):
-    """Coefficient k of the moment that the forces' coefficients below k give, by their arms' later
-    terms; none where both walls hold it."""
+    """Coefficient k of the moment of the forces' coefficients below k, by their arms' later terms.
+
+    None where both walls hold it.
+    """
     moment = 0.0
     if acting.floor:
         a[Row.FLOOR_ARM, k] = a[Row.SIN, k] + acting.kappa * a[Row.COS, k]
@@ -393,11 +403,10 @@ def _moment_of_lower_orders(acting, k, a):
 
 @inner_kernel
 def _accelerations(acting, n, free, k, a):
-    """Coefficient k of the accelerations (xi, y, phi) and of the n contact forces, so that the
-    constraints hold.
+    """Coefficient k of the accelerations (xi, y, phi), the constraints being kept.
 
-    `free` are the accelerations of sine and cosine but for phi's own, and the moment of the forces'
-    lower coefficients.
+    The n contact forces for that are written into the workspace. `free` are the accelerations of
+    sine and cosine but for phi's own, and the moment of the forces' lower coefficients.
     """
     side, (ks, kc, moment) = acting.side, free
     tip_reach, far_reach = (
@@ -438,10 +447,10 @@ def _accelerations(acting, n, free, k, a):
 
 @inner_kernel
 def inverse_of(a, matrix, inverse, n):
-    """Inverse of the n x n matrix (n <= 3) in the rows from `matrix` on, by cofactors, into the
-    rows from `inverse` on.
+    """Inverse of an n x n matrix (n <= 3), by cofactors.
 
-    Its entries are infinite or NaN where the matrix is singular.
+    The matrix stands in the rows from `matrix` on, its inverse is written into those from `inverse`
+    on. The entries are infinite or NaN where the matrix is singular.
     """
     if n == 1:
         a[inverse, 0] = 1.0 / a[matrix, 0]
@@ -467,11 +476,10 @@ def inverse_of(a, matrix, inverse, n):
 
 @inner_kernel
 def flat_series(block, base, run, order):
-    """Fills the workspace with the series of a block that only translates (world frame); returns
-    their order.
+    """Fills the workspace with the series of a block that only translates; returns their order.
 
-    Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall
-    that presses.
+    World frame. Q is the floor's friction, P its normal force on both corners together, N_a the
+    force of a wall that presses.
     """
     mode, motion, a = run.state.mode, run.state.motion, run.a
     base_series(base, run.state.t, 1.0, order, a)

@@ -20,8 +20,10 @@ _FADES = 0.25
 
 @inner_kernel
 def may_go_on(block, base, run):
-    """Whether the run goes on; else why it ends here: its time is up, its outcome is certain, or it
-    has taken too many steps."""
+    """Whether the run goes on; else writes why it ends here.
+
+    Its time is up, its outcome is certain, or it has taken too many steps.
+    """
     state, motion = run.state, run.state.motion
     if state.t >= state.t_end:
         state.ending = Ending.DONE
@@ -47,7 +49,7 @@ def may_go_on(block, base, run):
 
 @inner_kernel
 def sample(block, run):
-    """The rows of this step."""
+    """Writes the rows of this step."""
     state, records = run.state, run.records
     t, step, code = state.t, run.state.control.output_step, mode_code(state)
     state.whole = state.guard == Guard.NONE and state.tau >= state.smooth_until - t
@@ -82,8 +84,10 @@ def advance(block, base, run):
 
 @inner_kernel
 def passes_on(block, base, run):
-    """Whether the event that ends the step ends no mode: the block only grazes the floor, or the
-    run is over."""
+    """Whether the event that ends the step ends no mode.
+
+    The block only grazes the floor, or the run is over.
+    """
     state, motion = run.state, run.state.motion
     if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):
         return True
@@ -104,6 +108,7 @@ def passes_on(block, base, run):
 @inner_kernel
 def _grazes(block, base, run):
     """Whether a hanging block that comes down with less energy than a swing errs by does not land.
+
     It is then put where it turns back.
 
     A block at rest whose floor falls away swings back to just where it started. That cannot be told

@@ -22,7 +22,7 @@ def waits(base, state):
 
 @inner_kernel
 def rest(block, base, run):
-    """Straight to the next uplift or slip."""
+    """Moves the run straight to the next uplift or slip."""
     state, mode, control = run.state, run.state.mode, run.state.control
     to_left, to_right = block.left.arm / block.height, block.right.arm / block.height
     if not block.no_slip:
@@ -46,7 +46,7 @@ def rest(block, base, run):
 
 @inner_kernel
 def sample_rest(run, until):
-    """Rows of a block that does not change, up to a time."""
+    """Writes the rows of a block at rest, up to a time."""
     state, records = run.state, run.records
     code = mode_code(state)
     while state.rows < records.out.shape[0] and state.rows * run.state.control.output_step <= until:
@@ -56,7 +56,7 @@ def sample_rest(run, until):
 
 @inner_kernel
 def write(records, row, motion, code):
-    """One row of the history."""
+    """Writes one row of the history."""
     out = records.out
     out[row, 0], out[row, 1], out[row, 2] = motion.x, motion.y, motion.theta
     out[row, 3], out[row, 4], out[row, 5] = motion.vx, motion.vy, motion.w

@@ -1,8 +1,8 @@
-"""The modelling choices of the event-based models, by name: where rigid-body mechanics, or
-rounding, leaves more than one answer or none.
+"""The modelling choices of the event-based models, by name.
 
-Each has one home in the code, is counted in every run (`History.cost.rules`), and has a paragraph
-in docs/limits.md.
+They are made where rigid-body mechanics, or rounding, leaves more than one answer or none. Each has
+one home in the code, is counted in every run (`History.cost.rules`), and has a paragraph in
+docs/limits.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,9 @@
-"""Taylor polynomials: evaluation and the first root. A polynomial is a row of a two-dimensional
-array: the coefficients a[row, 0..n] of 1, tau, tau^2, ..., n <= ORDER. (Rows are addressed in
-place; views of them would cost more than the sums.) They are worked on in two halves of eight, each
-at once (see ebm.core.lanes). What stands behind a[row, n] does not matter.
+"""Taylor polynomials: evaluation and the first root.
+
+A polynomial is a row of a two-dimensional array: the coefficients a[row, 0..n] of 1, tau, tau^2,
+..., n <= ORDER. (Rows are addressed in place; views of them would cost more than the sums.) They
+are worked on in two halves of eight, each at once (see ebm.core.lanes). What stands behind a[row,
+n] does not matter.
 
 Everything that the event-based model follows in time (rotation, position, contact forces, gaps) is
 one such polynomial a step, so an event is the root of a polynomial and can be located to rounding,
@@ -86,11 +88,11 @@ def slope(a, row, n, tau):
 
 @inner_kernel
 def least_change(low, high, h):
-    """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0; of the polynomial with
-    these halves.
+    """A bound from below on c(tau) - c(0) for 0 <= tau <= h, at most 0.
 
-    Negative terms count in full. Positive terms may only cancel negative terms of higher order: c_1
-    those of c_2 and all others, c_2 those of the others. NaN in the input gives no bound.
+    `low` and `high` are the halves of c. Negative terms count in full. Positive terms may only
+    cancel negative terms of higher order: c_1 those of c_2 and all others, c_2 those of the others.
+    NaN in the input gives no bound.
     """
     low, high = low * powers(h), high * (eighth(h) * powers(h))
     least = total(above(falls(low), 2) + falls(high))
@@ -128,8 +130,7 @@ def size_of(a, one, other, k):
 
 @inner_kernel
 def step_size(a, one, other, order, last_term, reach):
-    """The step at which the last two terms of two series stay below `last_term`, at most
-    `reach`."""
+    """The step, at most `reach`, whose last two terms of two series stay below `last_term`."""
     return longest_step(
         size_of(a, one, other, order), size_of(a, one, other, order - 1), order, last_term, reach
     )
@@ -137,11 +138,10 @@ def step_size(a, one, other, order, last_term, reach):
 
 @inner_kernel
 def longest_step(last, before, order, last_term, reach):
-    """The step at which the last two terms of a series, of these sizes, stay below `last_term`, at
-    most `reach`.
+    """The step, at most `reach`, at which the last two terms of a series stay below `last_term`.
 
-    The term before the last one bounds it, as long as terms fall: the logarithm of the other is
-    then not needed.
+    `last` and `before` are the sizes of these terms. The term before the last one bounds the step,
+    as long as terms fall: the logarithm of the other is then not needed.
     """
     longest = _step_of_term(before, order - 1, last_term)
     if not last * longest <= before:
@@ -164,8 +164,9 @@ def _step_of_term(size, k, last_term):
 
 @inner_kernel
 def force_step(a, row, order, tolerance, reach):
-    """The step at which the last two terms of a force stay below the tolerance, at most `reach`. An
-    error of its rate moves nothing.
+    """The step at which the last two terms of a force stay below the tolerance, at most `reach`.
+
+    An error of its rate moves nothing.
 
     Friction that winds up under a constant acceleration is a series of every fourth power. So the
     two terms before count, too. Limit of term k: tolerance^(k/(order-1)), for geometric decay.
@@ -181,8 +182,10 @@ def force_step(a, row, order, tolerance, reach):
 
 @inner_kernel
 def leading(a, row, n, floor, ahead):
-    """The sign with which c leaves tau = 0: +1, -1, or 0 where it is zero throughout the time
-    `ahead`, at most AHEAD."""
+    """The sign with which c leaves tau = 0: +1 or -1; 0 where c is zero throughout `ahead`.
+
+    `ahead` is at most AHEAD.
+    """
     k = _order_of_zero(a, row, n, floor, ahead)
     if k > n:
         return 0
@@ -191,8 +194,10 @@ def leading(a, row, n, floor, ahead):
 
 @inner_kernel
 def leads_up(begin, rate, half_bend, floor, ahead):
-    """Whether the first three coefficients show that c leaves tau = 0 upward: as `leading`, where c
-    is positive beyond all noise."""
+    """Whether the first three coefficients show that c leaves tau = 0 upward.
+
+    As `leading`, where c is positive beyond all noise.
+    """
     noise = _ERROR * max(begin, ahead * abs(rate), ahead * ahead * abs(half_bend))
     return max(floor, noise) < begin < math.inf
 
@@ -237,13 +242,12 @@ def _order_of_zero(a, row, n, floor, ahead):
 
 @called_kernel
 def first_root(a, row, n, h, until, floor, ahead, stack):
-    """The first tau in [0, h] at which c turns negative, or NO_ROOT; where that is after `until`,
-    either.
+    """The first tau in [0, h] at which c turns negative, or NO_ROOT.
 
-    A zero at tau = 0 (within `floor`) is divided out: 0.0 comes back only where c leaves it
-    downward. `stack` is scratch of shape (>= 48, WIDTH). The search is complete: an interval is
-    dropped only where a bound on the polynomial, or on its slope and end value, shows that it holds
-    no root. Touching zero without crossing is no root.
+    A root after `until` may also be NO_ROOT. A zero at tau = 0 (within `floor`) is divided out: 0.0
+    comes back only where c leaves it downward. `stack` is scratch of shape (>= 48, WIDTH). The
+    search is complete: an interval is dropped only where a bound on the polynomial, or on its slope
+    and end value, shows that it holds no root. Touching zero without crossing is no root.
     """
     if a[row, 0] > floor:
         low, high = halves(a, row, n)
@@ -269,10 +273,10 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
 
 @inner_kernel
 def _isolate(stack, n):
-    """First root on [0, 1] of the polynomial in stack[0], positive at 0; halves intervals, left
-    ones first. NaN if it is not finite.
+    """First root on [0, 1] of the polynomial in stack[0], positive at 0; NaN if not finite.
 
-    Below the top, the stack holds left halves whose right halves are still to be looked at.
+    Halves intervals, left ones first. Below the top, the stack holds left halves whose right halves
+    are still to be searched.
     """
     top = 0
     stack[0, _SPAN], stack[0, _START] = 1.0, 0.0
@@ -331,11 +335,10 @@ def _halve(stack, top, n):
 
 @inner_kernel
 def _falling_root(stack, row, n, end):
-    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0: Newton from a
-    parabola's, kept inside its bracket.
+    """The root in [0, 1] of a polynomial that falls from positive to `end` <= 0.
 
-    It ends where the step after the next one, if they go on shrinking quadratically, would be below
-    rounding.
+    Newton's method from the root of a parabola, kept inside its bracket. It ends where the step
+    after the next one, if they go on shrinking quadratically, would be below rounding.
     """
     low, high = halves(stack, row, n)
     low_slope = upto(load(stack, row, 1), n - 1) * (ramp() + 1.0)

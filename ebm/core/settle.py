@@ -16,8 +16,8 @@ from rockcheck.scenes.compiled import inner_kernel
 
 #: The settling speed, sqrt(g R): 1e-7 rad/s for the paper's block.
 SETTLE = 5e-8
-# This many impacts within this time raise it tenfold, up to a bound. After a quiet of that time it
-# falls back. After this many such rises all impacts are plastic.
+# This many impacts within this time raise it tenfold, up to a bound. After as long without impacts
+# it falls back. After this many such rises all impacts are plastic.
 _IMPACTS, _QUIET, _FASTEST, _TIMES = 100, 2.5e-2, 2.5e-3, 500
 #: After this many impacts at one instant the next ones are plastic.
 _AT_ONCE = 20

@@ -142,8 +142,11 @@ class Base(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What runs are given, a row each: a SETTING, two FORMs, the MOTION at the start, how long they
-    last, and the spacing of their rows; and the samples of all."""
+    """The input of runs, a row each.
+
+    A SETTING, two FORMs, the MOTION at the start, the duration and the spacing of the output rows;
+    and the samples of all.
+    """
 
     settings: NDArray[np.void]
     horizontal: NDArray[np.void]
@@ -155,8 +158,10 @@ class Rows(NamedTuple):
 
 
 class Records(NamedTuple):
-    """Where a run writes: rows of states, their modes, the log of events; arrays of these where
-    there are several runs."""
+    """Where a run writes: rows of states, their modes, the log of events.
+
+    Arrays of these where there are several runs.
+    """
 
     out: Numbers
     out_mode: NDArray[np.int8]
@@ -164,8 +169,7 @@ class Records(NamedTuple):
 
 
 class Run(NamedTuple):
-    """A run: its state, the series of its step and the stack of the search for roots, and where it
-    writes."""
+    """A run: its state, the series `a` of its step, the root search's `stack`, and its records."""
 
     state: np.record
     a: Numbers
@@ -175,8 +179,10 @@ class Run(NamedTuple):
 
 @kernel
 def workspace():
-    """Scratch for one trajectory: the series (G = 1: no vertical motion), and the stack of the root
-    search."""
+    """Scratch for one trajectory: the series and the stack of the root search.
+
+    The series of G is 1: no vertical motion.
+    """
     series = np.zeros((ROWS, WIDTH))
     series[Row.G, 0] = series[Row.ANGLE, 2] = 1.0
     return series, np.zeros((48, WIDTH))

@@ -1,4 +1,4 @@
-"""How scenes, histories, spectra and comparisons show themselves in a notebook, and as a figure."""
+"""Notebook tables and figures of scenes, histories, spectra and comparisons."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What `.plot()` draws.
+"""Figures of scenes, histories, comparisons and recordings, as `.plot()` returns them.
 
-Imports matplotlib, and is therefore imported only where something is drawn.
+Import this module only to draw: it imports matplotlib, which takes a second.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ from rockcheck.validation.discrepancy import Discrepancy
 from rockcheck.validation.discrepancy.figures import Pair
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
-#: Where the axis of rotation ends for a block that falls, alpha.
+#: Limit of the rotation axis where a block overturns, either way, in alpha.
 FALLEN = 1.3
-#: Where a kind of event is drawn, from the top, and how.
+#: Marker of each kind of event, in the order of their tracks from the top.
 TRACKS = {"wall impact": "v", "floor impact": "^", "slip": "_", "landing": "x", "lift-off": "+"}
 
 
 class NotebookFigure(Figure):
-    """A matplotlib figure that a notebook shows without a display and without pyplot, which would
-    keep it for ever.
+    """A matplotlib figure that a notebook shows as PNG, without a display.
+
+    It is made without pyplot, which would hold every figure in memory.
     """
 
     def _repr_png_(self) -> bytes:
@@ -37,12 +38,12 @@ class NotebookFigure(Figure):
 
 
 def new_figure(width: float = 7.0, height: float = 3.5) -> NotebookFigure:
-    """An empty figure, sizes in inches."""
+    """An empty figure of this width and height, in inches."""
     return NotebookFigure(figsize=(width, height), layout="constrained")
 
 
 def scene_figure(scene: Scene) -> Figure:
-    """The block on its floor, beside its walls, and the acceleration of the base."""
+    """Sketch of the block, its floor and walls, and the acceleration of the base over time."""
     figure = new_figure(7.0, 3.0)
     sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
     draw_block(sketch, scene)
@@ -61,7 +62,7 @@ def scene_figure(scene: Scene) -> Figure:
 
 
 def draw_block(axes: Any, scene: Scene) -> None:
-    """Block (tilted as it starts), floor and walls to scale, in m."""
+    """Draw block (at its initial position and rotation), floor and walls to scale, in m."""
     block = scene.block
     x, y, theta = scene.initial_state[:3]
     turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
@@ -86,7 +87,7 @@ def draw_block(axes: Any, scene: Scene) -> None:
 
 
 def history_figure(history: History) -> Figure:
-    """Rotation, position of the pivot corner, and events over time."""
+    """Rotation, slip of the pivot (mm) and events over time (s)."""
     figure = new_figure(7.0, 4.2)
     rotation, slip, tracks = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
     time = history.channels["t"]
@@ -102,7 +103,7 @@ def history_figure(history: History) -> Figure:
 
 
 def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> None:
-    """Theta of some histories over time, in alpha where all blocks are known."""
+    """Draw theta of each history over time, in alpha if all have one, else in rad."""
     known = all(history.alpha is not None for history in histories)
     for history, colour in zip(histories, colours, strict=True):
         unit = (history.alpha if known else None) or 1.0
@@ -115,7 +116,7 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
         )
     if known and any(
         history.overturned_at is not None for history in histories
-    ):  # beyond the balance point it only falls
+    ):  # beyond the balance point the motion is only the fall
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -FALLEN), min(high, FALLEN))
     axes.set_ylabel("θ / α" if known else "θ, rad")
@@ -133,9 +134,9 @@ def _tracks(axes: Any, history: History) -> None:
 
 
 def discrepancy_figure(found: Discrepancy) -> Figure:
-    """Rotation of both histories, and their difference over the time that was compared.
+    """Rotation of both histories, and candidate minus reference over the compared time.
 
-    Raises `InputError` where they were not kept.
+    Raises `InputError` if the comparison has not kept its histories.
     """
     if found.histories is None:
         raise InputError("this comparison has not kept its histories")
@@ -156,8 +157,10 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
 
 
 def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
-    """Acceleration (g) and velocity (m/s) of each recording over time, and its spectral
-    acceleration at 5 % damping.
+    """Acceleration, velocity and spectral acceleration of named recordings, a row each.
+
+    Acceleration is in g, velocity in m/s, both over time in s. Spectral acceleration, in g at
+    5 % damping, is over the period in s.
     """
     figure = new_figure(9.0, 1.9 * len(recordings) + 0.4)
     for (name, record), (acceleration, velocity, spectrum) in zip(

@@ -1,4 +1,4 @@
-"""Draws overturning spectra in the paper's colours, and writes what their page is clicked on."""
+"""Overturning spectra in the paper's colours, and the scripts of their interactive page."""
 
 from __future__ import annotations
 
@@ -26,9 +26,10 @@ COLOURS = {
     "overturned": "#e8833a",
     "undecided": "#9a9a9a",
 }
-#: Of the letters of a plot's nodes (`validation.studies.spectrum.tiles`), beside a wall too; and of
-#: those of `validation.paper.blocks`.
+#: Names in `COLOURS` of the outcome letters (`validation.studies.spectrum.tiles`), without a wall
+#: or with one.
 LETTERS = {"S": "safe", "L": "counterclockwise", "R": "clockwise", "U": "undecided"}
+#: Colours of the letters of `validation.paper.measures`: FALLEN, STANDS, GAINED, LOST.
 MARKED = {"F": "#e9e9e9", "T": "#a9c1df", "G": "#009168", "X": "#c4342d"}
 #: The mark of a node whose outcome depends on the law of impacts.
 LAW_MARK: dict[str, Any] = {
@@ -52,7 +53,7 @@ OWN_MARK: dict[str, Any] = {
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
-    """The spectrum as a figure of its own."""
+    """One overturning spectrum as a figure."""
     from rockcheck.reports.show.drawing import new_figure
 
     figure = new_figure(4.5, 3.6)
@@ -61,10 +62,10 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
 
 
 def draw(spectrum: Spectrum, axes: Any) -> None:
-    """Draws a spectrum into matplotlib axes in the paper's colours.
+    """Draw a spectrum into matplotlib axes in the paper's colours.
 
-    Blue is safe. Without a wall orange is overturned counterclockwise and yellow clockwise; with a
-    wall orange is overturned. Grey is undecided, a black ring around a node says that its outcome
+    Blue is safe, grey undecided. Without a wall, orange is overturned counterclockwise and yellow
+    clockwise; with a wall, orange is overturned either way. A black ring marks a node whose outcome
     depends on the law of impacts.
     """
     letters = np.array(["L", "S", "R"])[spectrum.outcomes - LEFT]
@@ -94,8 +95,10 @@ def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> 
 
 
 def axis_labels(record: bool) -> tuple[str, str]:
-    """What the axes of a spectrum show, in plain text: frequency and amplitude ratio, or with a
-    record the block's size and the record's scale.
+    """Plain-text labels of a spectrum's horizontal and vertical axes.
+
+    Frequency and amplitude ratio of a pulse; for a record, the size of the block relative to its
+    own and the scale of the record.
     """
     if record:
         return "size of the block / its own", "scale of the record"
@@ -103,8 +106,9 @@ def axis_labels(record: bool) -> tuple[str, str]:
 
 
 def figure(plot: Plot) -> Figure:
-    """Spectra of a plot of the kind "spectra" (see `validation.studies.spectrum`), each where its
-    `place` is: row, rows and column.
+    """The figure of a plot of the kind "spectra" (see `validation.studies.spectrum`).
+
+    Each panel's `place` is its first row, its number of rows and its column.
     """
     from matplotlib.figure import Figure
 
@@ -125,7 +129,8 @@ def figure(plot: Plot) -> Figure:
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            # Beside a panel without a wall, two rows high, the column next to it is named, too.
+            # Where panels are two grid rows high, column 0 holds the panel without a wall, midway
+            # between the rows of the others: it is labelled below, and column 1 beside, too.
             below, beside = row + high == rows or column < high - 1, column < high
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=not data["record"])
@@ -143,7 +148,7 @@ def figure(plot: Plot) -> Figure:
 
 
 def _units(axes: Any, data: Any) -> None:
-    """The pulses of the axes in Hz and g, too."""
+    """Add axes with the frequency (Hz) and the peak acceleration (g) of the pulses."""
     hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
     g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
     above = axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz))
@@ -153,7 +158,7 @@ def _units(axes: Any, data: Any) -> None:
 
 
 def outcome_key(panels: Any) -> dict[str, str]:
-    """What the colours of some spectra mean, by their names in `COLOURS`."""
+    """Legend texts of the panels' colours, by the colours' names in `COLOURS`."""
     free, walled = (any(panel["free"] is wall for panel in panels) for wall in (True, False))
     key = {"safe": "safe"}
     if free:
@@ -183,8 +188,10 @@ def _legend(figure: Figure, data: Any) -> None:
 
 
 def write_scripts(plot: Plot, folder: Path) -> list[str]:
-    """Write what the page's script needs to be clicked on: `<name>.nodes.js`, small, which the page
-    reads at once, and `<name>.histories.js`, read when a node is played. Returns the scripts.
+    """Write the data of an interactive spectrum to `folder`; returns the scripts its page loads.
+
+    `<name>.nodes.js` is small, and the page loads it at once. `<name>.histories.js` is loaded when
+    a node is played, and is not among the scripts returned.
     """
     data = dict(plot.data, stem=plot.name, axes=axis_labels(plot.data["record"]))
     panels = data["panels"]
@@ -203,5 +210,5 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
 
 
 def _runs(letters: str) -> str:
-    """Letters run-length encoded: each run as its length and its letter."""
+    """Run-length encoding of the letters: "SSL" gives "2S1L"."""
     return "".join(f"{len(list(same))}{letter}" for letter, same in itertools.groupby(letters))

@@ -1,6 +1,4 @@
-"""How scenes, histories and whatever else holds figures show themselves in a notebook: escaped
-HTML, and a few words; numbers and names as people read them.
-"""
+"""Readable numbers, units and facts, and the escaped HTML tables that notebooks show."""
 
 from __future__ import annotations
 
@@ -23,8 +21,9 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number for people: a few digits, a true minus sign, powers of ten where it is very large or
-    small.
+    """A number with `digits` significant digits and a true minus sign; "–" for None.
+
+    Very large and very small numbers have a power of ten: 1.2·10⁻⁵.
     """
     if value is None:
         return "–"
@@ -74,7 +73,7 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 
 
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
-    """A scene in a few words: block, floor, walls, excitation, duration."""
+    """(label, text) of a scene's block, floor, walls, excitation and duration."""
     block = scene.block
     floor = f"μ {number(scene.floor.friction)}"
     if scene.floor.mu_s != scene.floor.friction:
@@ -109,7 +108,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
 
 
 def mass_facts(block: Block) -> list[tuple[str, str]]:
-    """Where the mass of a block is that is not homogeneous, and the slenderness of both pivots."""
+    """Centre of mass, radius of gyration and alpha of both pivots; empty if homogeneous."""
     if block.homogeneous:
         return []
     (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
@@ -125,7 +124,7 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
 
 
 def history_facts(history: History) -> list[tuple[str, str]]:
-    """A history in a few words: outcome, peak, impacts, time, cost, notes."""
+    """(label, text) of a history's outcome, peak, impacts, time, settings, cost and notes."""
     time, alpha = history.channels["t"], history.alpha
     peak = (
         f"{number(history.peak_rotation)} rad"
@@ -154,17 +153,17 @@ def history_facts(history: History) -> list[tuple[str, str]]:
 
 
 def scene_html(scene: Scene) -> str:
-    """A scene as a notebook shows it."""
+    """The table of a scene in a notebook."""
     return html_table(scene.name, scene_facts(scene))
 
 
 def history_html(history: History) -> str:
-    """A history as a notebook shows it."""
+    """The table of a history in a notebook."""
     return html_table(f"{history.name}, {history.model}", history_facts(history))
 
 
 def discrepancy_html(found: Discrepancy) -> str:
-    """A comparison as a notebook shows it."""
+    """The table of a comparison in a notebook."""
     rows = [(f.label, number(f.value), f.unit, f.note) for f in found.figures]
     caption = f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s"
     return html_table(
@@ -175,7 +174,7 @@ def discrepancy_html(found: Discrepancy) -> str:
 
 
 def spectrum_html(spectrum: Spectrum) -> str:
-    """A spectrum as a notebook shows it."""
+    """The table of a spectrum in a notebook: shares of outcomes, runs and scene."""
     shares = (
         f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %"
         for side in (SAFE, LEFT, RIGHT)
@@ -194,7 +193,7 @@ _MINUS = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
 
 
 def readable(text: str) -> str:
-    """A sentence whose numbers do not break at a hyphen: -1.2e-3 as −1.2·10⁻³."""
+    """A sentence whose numbers do not break at a hyphen: −1.2·10⁻³ for -1.2e-3."""
     shown = _POWER.sub(
         lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text
     )
@@ -202,19 +201,19 @@ def readable(text: str) -> str:
 
 
 def unit(name: str) -> str:
-    """A unit for people."""
+    """A unit as printed: α for "alpha", nothing for "1"."""
     return {"alpha": "α", "1": ""}.get(name, name)
 
 
 def duration(seconds: float) -> str:
-    """A time in s or ms."""
+    """A time as text: in s from 1 s on, else in ms."""
     return f"{seconds:.1f} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
 
 
 def moment(created: str) -> str:
     """An ISO 8601 time to the minute.
 
-    Any other text, as a run from elsewhere may hold, is returned unchanged.
+    Any other text, as a run made elsewhere may hold, is returned unchanged.
     """
     try:
         return f"{datetime.fromisoformat(created):%Y-%m-%d %H:%M %Z}"
@@ -223,7 +222,7 @@ def moment(created: str) -> str:
 
 
 def ratio(value: float | None) -> str:
-    """A ratio with its sign of multiplication."""
+    """A ratio followed by a multiplication sign; "–" for None."""
     if value is None:
         return "–"
     return f"{value:,.0f}×".replace(",", "\u202f") if value >= 100.0 else f"{number(value, 2)}×"
@@ -239,5 +238,5 @@ def window(figure: Figure) -> str:
 
 
 def dash_array(look: Look) -> str:
-    """The dash pattern of a model as SVG has it."""
+    """The dash pattern of a model's line, as SVG's `stroke-dasharray`."""
     return " ".join(f"{2.0 * length:g}" for length in look.dash) or "none"

@@ -1,9 +1,9 @@
-"""Impacts where the floor can only push: Newton's restitution with Coulomb friction at every
-contact that is touched.
+"""Impacts where the floor can only push: Newton's restitution with Coulomb friction.
 
-In the pivot's frame (see ebm.core.motion), natural units. Six contacts: the pivot F and the other
-bottom corner E on the floor, the top and bottom corner on the tip wall, the bottom and top corner
-on the far wall; E and the second corner of a wall touch only at theta = 0.
+They hold at every contact that is touched. In the pivot's frame (see ebm.core.motion), natural
+units. Six contacts: the pivot F and the other bottom corner E on the floor, the top and bottom
+corner on the tip wall, the bottom and top corner on the far wall; E and the second corner of a wall
+touch only at theta = 0.
 
 Contacts that touch at one instant strike in *stages*, until none approaches. A law of impacts says
 which contacts take part in a stage, the set A. In it the impulses p_j and the velocities u_j across
@@ -11,18 +11,17 @@ the contacts obey
 
     0 <= p_j  complementary to  u_j+ - e_j max(-u_j-, 0) >= 0,    |T| <= mu sum P on the floor.
 
-- "moreau": whatever touches takes part; at an elastic wall (e = 1), where nothing rests, only the
-  corners that approach. The first of
-  these is the branch "closed", the second "open", whatever e.
+- "moreau": every touching contact takes part; at an elastic wall (e = 1), where nothing rests, only
+  the corners that approach. The branch "closed" follows the first of these whatever e, the branch
+  "open" the second.
 - "floor-first": one contact after another, in the order of neighbouring trajectories: first the
-  floor, then each wall corner when
-  it would arrive had the wall stood a little farther off.
+  floor, then each wall corner when it would arrive had the wall stood a little farther off.
 - "leading-first", "trailing-first": as "moreau", but of two bottom corners that approach the floor
-  together only one takes part, that on the side to which the block slides or the other one. On a
+  together only one takes part, the one on the side to which the block slides or the other one. On a
   floor that does not bounce they are the limits of trajectories with a tilt to either side.
 
 The first two differ where a block lands flush against a bouncing wall, the last two from these
-where it lands flat while it slides. No law that is right there follows from rigid-body mechanics.
+where it lands flat while it slides. Rigid-body mechanics does not say which law is right there.
 """
 
 from __future__ import annotations
@@ -77,10 +76,13 @@ class Impact(NamedTuple):
 
 
 class Stage(NamedTuple):
-    """What a stage of an impact works on: rows of the contacts, a linear system, of a trial the
-    impulses and the velocities; of each contact its restitution, the velocity that it is to leave
-    with, its impulse, its approach, how far its next impact is ahead, whether it takes part, and
-    its full rebound; the velocities after the stage."""
+    """What a stage of an impact works on.
+
+    `rows` of the contacts, a linear `system`; of a trial the impulses `lam` and the velocities
+    `trial`. Of each contact its restitution, the velocity that it is to leave with (`target`), its
+    impulse (`part`), its approach, how far its next impact is `ahead`, whether it takes part
+    (`taking`), and its `full` rebound. `after` has the velocities after the stage.
+    """
 
     rows: Numbers
     system: Numbers
@@ -98,8 +100,10 @@ class Stage(NamedTuple):
 
 @inner_kernel
 def contact_rows(b, sense, phi, rows):
-    """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent, for a
-    block that tips by phi to `sense`."""
+    """Writes rows (xi, y, phi) of the six normal contacts and, last, of the floor's tangent.
+
+    The block tips by phi to `sense`.
+    """
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
     rows[:] = 0.0
@@ -134,8 +138,10 @@ def _mass_dot(spin, row, column):
 
 @inner_kernel
 def kinetic_energy(spin, v):
-    """Kinetic energy of velocities (xi, y, phi), per unit mass; `spin` is one over the moment of
-    inertia."""
+    """Kinetic energy of velocities (xi, y, phi), per unit mass.
+
+    `spin` is one over the moment of inertia.
+    """
     return 0.5 * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2] / spin)
 
 
@@ -146,11 +152,10 @@ def _size(v):
 
 @inner_kernel
 def solve(system, n):
-    """Solves the n x n system whose right-hand side is column n, in place, by elimination; False
-    where it is singular.
+    """Solves an n x n system in place, by elimination; False where it is singular.
 
-    The residual is rounding even where the solution is ill-conditioned, which an inverse does not
-    give.
+    The right-hand side is column n, which gets the solution. The residual is rounding even where
+    the solution is ill-conditioned, which an inverse does not give.
     """
     for k in range(n):
         if not _pivots(system, n, k):
@@ -180,8 +185,11 @@ def _pivots(system, n, k):
 
 @inner_kernel
 def _fits(number, friction, slippery):
-    """Whether a set is to be tried with this friction: at most three unknowns, friction where the
-    floor is in it."""
+    """Whether a set is to be tried with this friction.
+
+    It has at most three unknowns, and friction where a floor contact is in it. Where the floor is
+    slippery (mu_s = 0), it is tried without friction, too.
+    """
     on_floor = _SETS[number, 4] & _ON_FLOOR != 0
     if friction == Friction.HELD:
         return on_floor and _SETS[number, 0] <= 2
@@ -190,8 +198,10 @@ def _fits(number, friction, slippery):
 
 @inner_kernel
 def _push(rows, index, kappa, k):
-    """What a contact's impulse does to velocity k, times the mass: its row, and of a slipping
-    floor's the friction."""
+    """The effect of a contact's unit impulse on velocity k, times the mass.
+
+    It is the contact's row; a slipping floor's has friction, too.
+    """
     return rows[index, k] - (kappa * rows[Contact.TANGENT, k] if index <= Contact.OTHER else 0.0)
 
 
@@ -203,8 +213,7 @@ def _unknown(number, i):
 
 @inner_kernel
 def _try_set(block, stage, v, number, friction):
-    """The impulses of the contacts in the set, and the velocities after them; False where there are
-    none."""
+    """The impulses of the contacts in the set and the velocities after them; False if singular."""
     rows, system, lam, trial, spin = stage.rows, stage.system, stage.lam, stage.trial, block.spin
     n = _SETS[number, 0] + (1 if friction == Friction.HELD else 0)
     mu_k = block.mu_k
@@ -233,8 +242,11 @@ def _try_set(block, stage, v, number, friction):
 
 @inner_kernel
 def _violation(block, stage, number, friction, rounding):
-    """By how much a solution violates the law, 0 within the rounding: a pull, a contact that still
-    closes, friction beyond its cone or in the wrong sense."""
+    """By how much a solution violates the law, 0 within the rounding.
+
+    Violations are a pull, a contact that still closes, friction beyond its cone or in the wrong
+    sense.
+    """
     rows, lam, trial = stage.rows, stage.lam, stage.trial
     count = _SETS[number, 0]
     worst = 0.0
@@ -256,12 +268,11 @@ def _violation(block, stage, number, friction, rounding):
 
 @called_kernel
 def _strike(block, stage, v):
-    """One stage over the contacts that take part: writes the velocities after it and the impulses;
-    False where only the least wrong fits.
+    """One stage over the contacts that take part: writes the velocities and impulses after it.
 
     Every set of contacts is tried with every friction. Of those that obey the law the one that
-    leaves the least energy is taken; where none does, but for rounding or for friction that jams
-    (Painleve), the one that contradicts it least.
+    leaves the least energy is taken. Where none does, by rounding or by friction that jams
+    (Painleve), the one that contradicts it least is taken, and the result is False.
     """
     least, lowest = np.inf, np.inf
     bits = _bits_of(stage.taking)
@@ -316,8 +327,7 @@ def _moreau(law, stage, touching, rounding):
 
 @inner_kernel
 def _one_corner(law, stage, slip):
-    """Of two bottom corners that approach the floor only the one that the law puts first takes
-    part.
+    """Of two bottom corners that approach the floor only the law's first one takes part.
 
     F stands on the side of negative slip. Without slip neither leads, and both take part.
     """
@@ -341,8 +351,7 @@ def _soonest(approach, ahead, rounding):
 
 @inner_kernel
 def _floor_first(stage, touching, number, rounding):
-    """The contacts that are struck next, in the order of a neighbouring trajectory, and those that
-    rest meanwhile.
+    """The contacts that are struck next in a neighbouring trajectory, and those that rest.
 
     `ahead` keeps how far each contact is from its next impact there: where the floor is struck
     first, a wall is one unit away.
@@ -381,8 +390,10 @@ def _approaches(block, impact, stage, plastic, rounding):
 
 @inner_kernel
 def _choose(law, impact, stage, number, rounding):
-    """Writes which contacts take part in stage `number` by this law, and the velocities that they
-    are to leave with."""
+    """Writes which contacts take part in stage `number` by this law, and their targets.
+
+    A target is the velocity with which a contact is to leave.
+    """
     if law == Law.FLOOR_FIRST:
         _floor_first(stage, impact.touching, number, rounding)
     else:
@@ -479,8 +490,10 @@ def _strike_without_gain(block, stage, v, before):
 
 @called_kernel
 def _close(spin, stage, impact):
-    """Contacts that part more slowly than `resting` are closed: the velocity is projected onto
-    them, mass-orthogonally."""
+    """Closes the contacts that part more slowly than `resting`.
+
+    The velocity is projected onto them, mass-orthogonally.
+    """
     rows, v = stage.rows, impact.v
     members, count = stage.lam, 0
     for j in range(CONTACTS):
@@ -494,8 +507,10 @@ def _close(spin, stage, impact):
 
 @inner_kernel
 def _project(spin, stage, v, count):
-    """Takes the rates of the first so many of the contacts in `lam` out of the velocity; False
-    where their rows are parallel."""
+    """Takes the rates of the first `count` contacts in `lam` out of the velocity.
+
+    False where their rows are parallel.
+    """
     rows, system, members = stage.rows, stage.system, stage.lam
     for i in range(count):
         row = rows[int(members[i])]

@@ -1,5 +1,6 @@
-"""The paper's impact laws, for the pivot that never leaves the floor: floor impact and the wall
-impact cascade of Fig. 3.
+"""The paper's impact laws, for the pivot that never leaves the floor.
+
+They are the floor impact and the wall impact cascade of Fig. 3.
 
 Natural units (lengths in R, accelerations in g, unit mass), base frame. S is the pivot (+1 lower
 left), Sw the wall (+1 left), w the angular velocity, xdot the horizontal velocity of the mass's
@@ -23,8 +24,10 @@ from rockcheck.scenes.compiled import inner_kernel
 
 
 class Corner(NamedTuple):
-    """A corner that strikes a wall, and the pivot: S, Sw, s, c, C = S Sw c', the pivot's k, and
-    `spin`."""
+    """A corner that strikes a wall, and the pivot.
+
+    S, Sw, s, c, C = S Sw c', the pivot's k (`share`), and `spin`.
+    """
 
     S: float
     Sw: float
@@ -70,11 +73,11 @@ def floor_slip(on, d, mu_k, w1, v1):
 
 @inner_kernel
 def floor_impact(b, S1, w1, v1, mu_s, mu_k):
-    """Floor impact as theta passes zero, from pivot S1 of the block b (a `Setting`) to -S1: form (a
-    Landing), w2, v2, P.
+    """Floor impact as theta passes zero, from pivot S1 to -S1: form (a Landing), w2, v2, P.
 
-    Sticks if it can, else slips against the friction; where neither lets the block turn on it stays
-    flat (squat blocks, much friction), and v2 is then the velocity with which it slides.
+    `b` is the block, a `Setting`. The new pivot sticks if it can, else slips against the friction.
+    Where neither lets the block turn on, it stays flat (squat blocks, much friction), and v2 is
+    then the velocity with which it slides.
     """
     S2 = -S1
     new = side_of(b, S2)
@@ -118,8 +121,10 @@ def wall_stick(corner, e, w1, xdot1):
 
 @inner_kernel
 def wall_slip(corner, e, w1, xdot1, kappa):
-    """(30): the corner rebounds with e, the pivot slips toward Sr under a P of sign sy: w2, xdot2,
-    P, Q = -kappa P, with kappa = mu_k Sr sy."""
+    """(30): the corner rebounds with e, the pivot slips: w2, xdot2, P, Q = -kappa P.
+
+    It slips toward Sr under a P of sign sy, with kappa = mu_k Sr sy.
+    """
     S, s, c, C, spin = corner.S, corner.s, corner.c, corner.C, corner.spin
     k = S * s + (c + C) * kappa
     w2 = (w1 / spin + k * S * s * w1 - e * C * C * w1 + (1.0 + e) * C * xdot1) / (
@@ -137,11 +142,11 @@ def _stops(branch, corner, w1, xdot1):
 
 @inner_kernel
 def wall_impact(b, corner, e, w1, xdot1):
-    """A corner strikes the wall, case I (top, S = Sw) or II (bottom): branch, w2, xdot2, N, P, v2,
-    after the cascade of Fig. 3.
+    """A corner strikes the wall, by the cascade of Fig. 3: branch, w2, xdot2, N, P, v2.
 
-    N >= 0 is the wall's impulse. (31) is the identity map while the pivot is on the floor, so it
-    does not appear. Of `b` (a `Setting`) friction is used.
+    Case I is the top corner (S = Sw), case II the bottom one. N >= 0 is the wall's impulse. (31) is
+    the identity map while the pivot is on the floor, so it does not appear. Of `b` (a `Setting`)
+    friction is used.
     """
     Sw = corner.Sw
     rounding = NOISE[Kind.POSITION] * (abs(w1) + abs(xdot1))

@@ -1,5 +1,4 @@
-"""What an impact does to a block: the floor impact, a wall impact, or all contacts that touch at
-one instant.
+"""Resolves an impact: on the floor, on a wall, or at all contacts that touch at one instant.
 
 The bilateral pivot follows the paper's laws (`impacts`), one impact at a time. With the unilateral
 one every contact that touches takes part (`contact_impacts`). Either way slow rebounds end by the
@@ -49,8 +48,10 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 @inner_kernel
 def strike(block, base, run, resting):
-    """Resolves the impact at the gap that has closed: what it was, an Event, and whether the mode
-    is already the one that follows. What is slower than `resting` comes to rest."""
+    """Resolves the impact at the gap that has closed: the Event, and whether the mode is known.
+
+    A known mode is already the one that follows. Rebounds slower than `resting` end in rest.
+    """
     state, mode, motion = run.state, run.state.mode, run.state.motion
     which = state.guard
     touch(block, mode, motion, which)
@@ -92,12 +93,11 @@ def _lands_along(block, state):
 
 @inner_kernel
 def touch(block, mode, motion, which):
-    """Puts the block onto the contact whose gap has just closed: the series knows the gap to the
-    tolerance only.
+    """Puts the block onto the contact whose gap has just closed.
 
-    A standing pivot keeps its place if the rotation can take up the correction. Otherwise the pivot
-    would creep, impact by impact. It stands after it, too: else it would approach the floor, or
-    leave it, by as much as the correction.
+    The series knows the gap to the tolerance only. A standing pivot keeps its place if the rotation
+    can take up the correction. Otherwise the pivot would creep, impact by impact. It stands after
+    it, too: else it would approach the floor, or leave it, by as much as the correction.
     """
     phi = abs(motion.theta)
     if which == Guard.LANDING:
@@ -128,8 +128,10 @@ def touch(block, mode, motion, which):
 
 @inner_kernel
 def _settle_flat(block, state, resting):
-    """An upright block with a spin below the settling speed lies flat. Along a wall such a spin is
-    a slip, too, and is dropped with it."""
+    """An upright block with a spin below the settling speed lies flat.
+
+    Along a wall such a spin is a slip, too, and is dropped with it.
+    """
     motion = state.motion
     state.rules[Rule.SETTLES] += 1
     v = slip_velocity(block, motion)
@@ -141,8 +143,10 @@ def _settle_flat(block, state, resting):
 
 @inner_kernel
 def _floor_impact(block, state, resting):
-    """Bilateral pivot: the block lands at theta = 0. Returns whether it is already known to rock on
-    in the state's mode."""
+    """Bilateral pivot: the block lands at theta = 0.
+
+    Returns whether it is already known to rock on in the state's mode.
+    """
     mode, motion = state.mode, state.motion
     w1, v1 = motion.w, slip_velocity(block, motion)
     S1, c = mode.sense, block.height
@@ -173,8 +177,10 @@ def _floor_impact(block, state, resting):
 
 @inner_kernel
 def _wall_impact(block, state, tip, resting):
-    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall. Returns whether
-    the mode is already right."""
+    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall.
+
+    Returns whether the mode is already right.
+    """
     mode, motion = state.mode, state.motion
     # Wedged: between both walls at once nothing rebounds.
     if between_walls(block, motion) or on_wall(mode):
@@ -193,8 +199,10 @@ def _wall_impact(block, state, tip, resting):
 
 @inner_kernel
 def _corner_impact(block, state, sw, e, resting):
-    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1), in the
-    pivot's frame."""
+    """The paper's cascade for the corner at the tip wall (sw = 1) or the far wall (-1).
+
+    It works in the pivot's frame.
+    """
     mode, motion = state.mode, state.motion
     phi, sign = abs(motion.theta), float(mode.sense)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
