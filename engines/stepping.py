@@ -24,8 +24,8 @@ Velocity = tuple[float, float, float]  # along x, y and theta
 
 # Lengths in units of the block's radius R, times in units of 1/p.
 CLOSED = 5e-9  # a corner nearer than this touches
-# of the longest step: a corner that rests may leave its surface by so much in one, and touches from
-# there if it is more
+# Per longest step: how far a resting corner may drift from its surface in one step; it sets the
+# contact distance where it exceeds CLOSED.
 DRIFT = 3e-6
 EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
 PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
@@ -35,8 +35,8 @@ LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only tru
 RESTING = (
     0.001  # of g times the longest step: slower approaches and departures are not told from rest
 )
-# of corners that strike at one moment, one may be so many times as fast as another: the slenderness
-# of a slender block
+# Largest ratio of the speeds of corners that strike at the same time: the slenderness of a slender
+# block.
 TOGETHER = 20.0
 SETTLING_GAP = 2e-6
 # A corner that leaves and is back within twice this share of a step is taken to stay: of the
@@ -45,22 +45,22 @@ SETTLING_TIME = 0.2
 
 #: Contacts with the floor, the first rows of `corners`; all others are with walls.
 FLOOR = 2
-#: What a step answers: the run is over, it goes on, or it has blown up.
+#: Results of a step: the run has ended, continues, or has blown up.
 OVER, GOES_ON, LOST = 0, 1, 2
-#: Of a row of the march: time, state (6), felt acceleration (2).
+#: Columns of a row of the march: time, state (6), felt acceleration (2).
 COLUMNS = 9
 # The state: pose, velocity; mean acceleration and length of the step before, and whether they are
 # known; time, velocity of the base then.
 X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T, BASE_X, BASE_Y = range(14)
-# What is asked of the engine: mean pose, velocity, length of the step, felt acceleration, and
-# whether it is an impact.
+# The request to the engine: mean pose, velocity, length of the step, felt acceleration, and whether
+# the step is an impact.
 POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 
 class Limits(NamedTuple):
     """Thresholds for near, short, long and slow in a scene, in R, s and R/s.
 
-    `gravity` is the scene's; `standing` is the block's height when it stands.
+    `gravity` is the scene's; `standing` is the height of the centre of mass at rest.
     """
 
     longest: float
