@@ -1,5 +1,7 @@
-"""A finding as a terminal's tables, CSV, Markdown and a page: each block is rendered from one
-description. All pages have one look, made of the templates in `data/templates`.
+"""A finding as a terminal's tables, CSV, Markdown and a page.
+
+Each block is rendered from one description. All pages have one look, made of the templates in
+`data/templates`.
 """
 
 from __future__ import annotations
@@ -188,8 +190,9 @@ def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
 
 
 def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
-    """Write `run.json`, a CSV a table, `summary.md`, the figures, the scenes of failures and
-    `index.html`; returns the page.
+    """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
+
+    The scenes of failures are written beside them.
     """
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
@@ -233,8 +236,9 @@ PAGES = "pages"
 
 @dataclass(frozen=True)
 class Site:
-    """A folder of pages with one look; `links` are its parts for the navigation, (title, address
-    from the index).
+    """A folder of pages with one look.
+
+    `links` are its parts for the navigation: (title, address from the index).
     """
 
     folder: Path
@@ -242,8 +246,9 @@ class Site:
     links: tuple[tuple[str, str], ...] = ()
 
     def page(self, address: str, template: str, **context: Any) -> Path:
-        """Write the page `address` (relative to the folder, with slashes) from a template of
-        `data/templates/`.
+        """Write the page `address` from a template of `data/templates/`.
+
+        The address is relative to the folder, with slashes.
         """
         root = "../" * address.count("/")
         text = (

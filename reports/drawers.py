@@ -1,5 +1,6 @@
-"""How the plots of a finding are drawn: lines over axes, and by `DRAWERS` what needs a drawer of
-its own.
+"""How the plots of a finding are drawn.
+
+Lines over axes, and by `DRAWERS` what needs a drawer of its own.
 """
 
 from __future__ import annotations
@@ -107,8 +108,9 @@ def lines(plot: Plot) -> Figure:
 
 
 def stable_steps(plot: Plot) -> Figure:
-    """A panel an axis: the largest stable step of each model with its settings, by colour and
-    number.
+    """A panel an axis: the largest stable step of each model with its settings.
+
+    Colour and number say which.
     """
     import numpy as np
     from matplotlib.figure import Figure
@@ -219,8 +221,9 @@ def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
 
 
 def colours(panel: Panel) -> list[tuple[str, str]]:
-    """The colours of a panel's series, by day and by night; those of one label, as a line and its
-    fit, share theirs.
+    """The colours of a panel's series, for light and dark pages.
+
+    Series with one label, such as a line and its fit, share a colour.
     """
     own: dict[str, tuple[str, str]] = {}
     found = []
@@ -279,8 +282,9 @@ def _short(values: Any) -> list[float | None]:
 
 
 def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
-    """Do these calls, in `jobs` processes (default: one a core) if they are at least so many: a
-    process takes a second to have what draws.
+    """Make these calls, in `jobs` processes (default: one a core) if there are at least `least`.
+
+    A process takes a second to import what draws.
     """
     waiting = deque(calls)
     jobs = min(jobs or cores(), len(waiting))

@@ -1,6 +1,4 @@
-"""What is shown of an ensemble: the distribution of peak rotation by model, and how models agree
-scene by scene.
-"""
+"""Views of an ensemble: peak rotations by model, and agreement of models scene by scene."""
 
 from __future__ import annotations
 
@@ -107,9 +105,7 @@ class EnsembleView:
 
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
-        """By model: the peaks of the blocks that stay, in order, and the share of scenes up to
-        each.
-        """
+        """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
         found = {}
         for model, sample in self.samples.items():
             peaks = np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
@@ -169,8 +165,7 @@ class EnsembleView:
         return facts + [fact for fact in scene_facts(base) if fact[0] not in hidden]
 
     def distributions(self) -> Plot:
-        """The share of scenes whose peak is below each value, by model, and the difference from the
-        reference.
+        """Share of scenes with a peak below each value, by model; difference from the reference.
 
         Shaded: where the Kolmogorov-Smirnov test finds no difference at its level.
         """

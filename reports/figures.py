@@ -1,5 +1,6 @@
-"""Figures of one scene for a paper: the quantities of its Figs. 4 and 5 for all models, and their
-differences below each.
+"""Figures of one scene for a paper.
+
+They show the quantities of its Figs. 4 and 5 for all models, and their differences below each.
 """
 
 from __future__ import annotations
@@ -35,8 +36,9 @@ TOLERANCE = "#009168"
 def histories_figure(
     view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS
 ) -> Figure:
-    """Each channel of all models over time, under each the difference from `against` with the
-    tolerances shaded, then impacts.
+    """Each channel of all models over time, below it the difference from `against`, then impacts.
+
+    Tolerances are shaded.
 
     `against` None: the first reference of the scene; where there is none the differences are left
     out.
@@ -125,8 +127,10 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
 
 
 def write_figures(view: SceneView, folder: Path) -> None:
-    """Write the figures of a scene into `folder`: a thumbnail of all rotations, and where the run
-    asks for them those for a paper, one a reference.
+    """Write the figures of a scene into `folder`.
+
+    A thumbnail of all rotations, and where the run asks for them those for a paper, one a
+    reference.
     """
     known = looks(view.run.models)
     curves = [(view.t, view.drawn[m]["theta"], known[m]) for m in known if m in view.values]
@@ -175,8 +179,9 @@ def _largest(values: np.ndarray) -> float:
 
 
 def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
-    """One channel of all models, the first reference drawn wide below the others; wall impacts on
-    each model's own curve.
+    """One channel of all models, the first reference drawn wide below the others.
+
+    Wall impacts are marked on each model's own curve.
     """
     for order, (model, look) in enumerate(looks(view.run.models).items()):
         if model not in view.values:
@@ -277,8 +282,9 @@ def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> N
 
 
 def _decades(fine: float, largest: float) -> dict[float, str]:
-    """Places and words of at most five ticks of an asinh axis: zero, and plus and minus two
-    decades.
+    """Places and words of at most five ticks of an asinh axis.
+
+    They are zero, and plus and minus two decades.
     """
     top = math.floor(math.log10(max(largest, fine)))
     low = max(math.ceil(math.log10(fine)), top - 2)

@@ -1,5 +1,6 @@
-"""A scene's page as data: what it draws, as a script file, since a page opened from the file system
-cannot fetch data; and the scene as the files it could have come from, to be played again.
+"""A scene's page as data: the script file it draws from, and the scene as files to be played.
+
+It is a script since a page opened from the file system cannot fetch data.
 
 Values of the script are float32 (rounded to 6e-8 of their size), a line of `rows` values for the
 ground, each
@@ -35,8 +36,10 @@ def packed(values: ArrayLike) -> str:
 
 
 def packed_lines(lines: Sequence[ArrayLike]) -> str:
-    """Lines of values as base64 of a deflated stream: of each little-endian float32 the first byte,
-    then of each the second, and so on.
+    """Lines of values as base64 of a deflated stream.
+
+    The stream holds of each little-endian float32 the first byte, then of each the second, and so
+    on.
 
     A line shorter than others ends with NaN. Neighbours share their sign and exponent, so bytes of
     one place compress well: a page takes half of what plain values take.
@@ -128,8 +131,9 @@ def _spells(view: SceneView, model: str) -> list[list[Any]]:
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
-    """Write the scene as `<slug>.toml` with its records as CSV beside it; returns file names and
-    texts, the TOML first.
+    """Write the scene as `<slug>.toml` with its records as CSV beside it.
+
+    Returns file names and texts, the TOML first.
 
     `load_scene` reads the file back to a scene that moves in the same way.
     """
@@ -151,8 +155,9 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
 
 
 def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Record]]:
-    """A scene as the tables of a scene file, what is at its default left out, and its records by
-    file name.
+    """A scene as the tables of a scene file, and its records by file name.
+
+    What is at its default is left out.
     """
     records: dict[str, Record] = {}
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)

@@ -1,5 +1,6 @@
-"""The pages of a finished run: one folder that opens from the file system and asks nothing of any
-other place.
+"""The pages of a finished run.
+
+They are one folder that opens from the file system and needs no other place.
 """
 
 from __future__ import annotations
@@ -65,8 +66,9 @@ View = SceneView | EnsembleView
 
 
 def write_figure(folder: Path, name: str, path: Path, against: str | None = None) -> Path:
-    """Draw a finished run's scene or ensemble into the file `path`, whose ending is one of
-    `style.FORMATS`; returns it.
+    """Draw a finished run's scene or ensemble into the file `path`; returns it.
+
+    The file name ends in one of `style.FORMATS`.
 
     `against`: the model whose differences a scene's figure shows, by default its first reference.
     Raises `InputError` for what the run does not have.
@@ -103,8 +105,9 @@ def write_site(
     wanted: Sequence[str] = (),
     on_progress: OnProgress = unheard,
 ) -> Path:
-    """Write `index.html` and a page a scene and an ensemble, with figures and data, beside a
-    finished run; returns the index.
+    """Write `index.html` and a page a scene and an ensemble, beside a finished run.
+
+    Figures and data are written with them. Returns the index.
 
     In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are
     made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now.
@@ -130,8 +133,9 @@ def write_site(
 
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp, and last the index, in processes of their own where
-    that is quicker.
+    """Write these pages, each with its stamp, and last the index.
+
+    They are made in processes of their own where that is quicker.
     """
     work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
     if work < FEW:
@@ -143,8 +147,9 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
 
 
 class _Pages:
-    """The pages of a finished run, by name of the scene or the ensemble: of those that are shown,
-    and those that are wanted.
+    """The pages of a finished run, by name of the scene or the ensemble.
+
+    They are those that are shown, and those that are wanted.
     """
 
     def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
@@ -166,9 +171,7 @@ class _Pages:
         self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
 
     def write(self, name: str, stamp: str) -> None:
-        """Figures, data, and last the page, which names the stamp of what it shows (`stamp`); or
-        the page to open, `INDEX`.
-        """
+        """Write figures and data, and last the page, with its `stamp`; or the index (`INDEX`)."""
         if name == INDEX:
             self._write_index()
             return
@@ -236,8 +239,9 @@ class _Pages:
         )
 
     def stamp(self, view: View) -> str:
-        """Hash of all that a page shows and of the code that draws it; not when the run was, nor
-        what was read back.
+        """Hash of all that a page shows and of the code that draws it.
+
+        When the run was, and what was read back, does not count.
         """
         run = self.run
         shown = {

@@ -33,8 +33,9 @@ FORMATS = ("svg", "png", "pdf")
 
 @dataclass(frozen=True)
 class Look:
-    """A model's label, its colour on white and on black (hex), its dash pattern (line widths on,
-    off) and its marker.
+    """A model's label, colours, dash pattern and marker.
+
+    Colours are on white and on black (hex); the dash pattern is in line widths, on and off.
 
     `key` names the colour in style sheets.
     """
@@ -88,8 +89,9 @@ BY_KEY = LOOKS | {look.key: look for look in SPARE}
 
 
 def looks(models: Iterable[str]) -> dict[str, Look]:
-    """The look of each of a run's models; a model without one of its own gets a spare colour, by
-    its place among such.
+    """The look of each of a run's models.
+
+    A model without one of its own gets a spare colour, by its place among such.
     """
     found: dict[str, Look] = {}
     for model in models:
@@ -100,8 +102,9 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """The common style of all figures, for a `with` block: sizes for a journal's page, light grid,
-    reproducible SVG.
+    """The common style of all figures, for a `with` block.
+
+    Sizes for a journal's page, a light grid, reproducible SVG.
 
     Figures made inside need no display: build them with `matplotlib.figure.Figure`.
     """
@@ -145,8 +148,9 @@ def figure_style() -> Iterator[None]:
 
 
 def log_scales(ax: Axes, *, decades: int = 7) -> None:
-    """Logarithmic axes in powers of ten, at most so many, written out: `figure_style` leaves the $
-    of matplotlib's labels as it is.
+    """Logarithmic axes in powers of ten, at most `decades` of them, written out.
+
+    `figure_style` leaves the $ of matplotlib's labels as it is.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -175,8 +179,9 @@ def save(
     stamp: str = "",
     named: bool = False,
 ) -> list[Path]:
-    """Write a figure as `<stem>.svg`, `.png` and `.pdf`; the same figure gives the same bytes, for
-    no date is written.
+    """Write a figure as `<stem>.svg`, `.png` and `.pdf`.
+
+    The same figure gives the same bytes, for no date is written.
 
     `stamp` says what an SVG shows, see `stamp_of`; `named` that the user chose these very files.
     """
@@ -197,8 +202,9 @@ def save(
 
 
 def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
-    """The `formats` in which there is no `<stem>` yet that shows what `stamp` says; a file of any
-    format is removed where it shows something else.
+    """The `formats` in which no `<stem>` shows what `stamp` says.
+
+    A file of any format is removed where it shows something else.
     """
     paths = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
     if stamp_in(paths["svg"]) == stamp:

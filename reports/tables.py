@@ -1,5 +1,7 @@
-"""The tables of a run's pages, and first the answer: how far each model lies from the run's
-reference, scene by scene, and over all scenes.
+"""The tables of a run's pages.
+
+First the answer: how far each model lies from the run's reference, scene by scene and over all
+scenes.
 """
 
 from __future__ import annotations
@@ -80,9 +82,7 @@ def worst_table(run: Run, links: Mapping[str, str]) -> Table:
 
 
 def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
-    """One check: what was expected, what came out, the limit, how much of it is used, and why it
-    is not a pass.
-    """
+    """One check: expected and actual value, limit, share of it used, and why it is no pass."""
     figure, waits = check.figure, check.words == "no tolerance yet"
     against = f"against {_label(figure.against)}, " if figure.against else ""
     return [
@@ -113,8 +113,9 @@ def formula(measure: str) -> str:
 
 
 def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
-    """What is not within tolerance: cells without a history, then checks by how far they are out,
-    then those that changed.
+    """What is not within tolerance, the worst first.
+
+    Cells without a history, then checks by how far they are out, then those that changed.
 
     A figure that has no tolerance yet is not out of one; the page counts these.
     """
@@ -145,8 +146,9 @@ def use(check: Check) -> float:
 
 
 def times_table(run: Run) -> Table:
-    """Run times relative to the reference in the same scene, and their geometric mean; the seconds
-    below.
+    """Run times relative to the reference in the same scene, and their geometric mean.
+
+    The seconds stand below.
     """
     cells = run.by_scene()
     rows = []
@@ -170,8 +172,9 @@ def times_table(run: Run) -> Table:
 
 
 def measures_table(view: SceneView, against: str) -> Table:
-    """All figures of a scene that are held against `against`, a row a measure and window, a column
-    a model.
+    """All figures of a scene that are held against `against`.
+
+    A row a measure and window, a column a model.
     """
     found: dict[tuple[str, str], dict[str, tuple[Figure, Check | None]]] = {}
     for cell in view.cells:
@@ -206,9 +209,7 @@ def _measured(figure: Figure | None, check: Check | None) -> Any:
 
 
 def uncertainty_table(view: SceneView) -> Table:
-    """The differences of a scene's models from their references, and what is known of their
-    uncertainty.
-    """
+    """Differences of a scene's models from their references, and their known uncertainty."""
     rows = [
         [
             cell.model,
@@ -238,8 +239,10 @@ def uncertainty_table(view: SceneView) -> Table:
 def runs_table(
     run: Run, cells: Sequence[Cell], root: str = "", histories: Mapping[str, Any] | None = None
 ) -> Table:
-    """Settings, run times and outcomes of a place's cells; of an ensemble (no `histories`) the CPU
-    time of all its scenes. `root` is the way to the run's folder.
+    """Settings, run times and outcomes of a place's cells.
+
+    Of an ensemble (no `histories`) the CPU time of all its scenes. `root` is the way to the run's
+    folder.
     """
     of = "cpu_seconds" if histories is None else "wall_seconds"
     base = next((cell for cell in cells if cell.model == run.reference), None)
@@ -294,8 +297,9 @@ PEAKS = "overview-peaks"
 
 @dataclass(frozen=True)
 class Entry:
-    """One model in one scene: the RMS difference of the rotation and the ratio of the peaks, both
-    against the run's reference.
+    """One model in one scene: RMS difference of rotation and ratio of peaks.
+
+    Both are against the run's reference.
 
     `rms` is the judged figure of the shortest window, else the one of the whole time, which is
     `whole`. `u_num` is the model's numerical uncertainty of `whole` (alpha), where it is known.
@@ -321,8 +325,9 @@ class Entry:
 
     @property
     def why_apart(self) -> str:
-        """Why an outcome other than the reference's is within tolerance; "" where it is not, or
-        both are the same.
+        """Why an outcome other than the reference's is within tolerance.
+
+        "" where it is not, or both are the same.
         """
         if not self.apart or not self.cell.checks or self.cell.verdict != "pass":
             return ""
@@ -350,9 +355,11 @@ class Row:
 
 @dataclass(frozen=True)
 class Glance:
-    """What most readers ask: the entry farthest from the reference, the scenes whose outcome
-    depends on the model, and what is no longer as it was accepted (the farthest first; `judged`
-    were looked at). A figure that is out of a limit but as it was accepted has not changed.
+    """What most readers ask of a run.
+
+    The entry farthest from the reference, the scenes whose outcome depends on the model, and what
+    has changed since it was accepted (the farthest first; `judged` were looked at). A figure that
+    is out of a limit but as it was accepted has not changed.
     """
 
     farthest: Entry | None
@@ -373,8 +380,9 @@ def matrix(run: Run) -> list[Row]:
 
 
 def glance(run: Run, rows: Sequence[Row] | None = None) -> Glance:
-    """The answers that the index gives first; `rows` are those of the run's `matrix`, where they
-    are known.
+    """The answers that the index gives first.
+
+    `rows` are those of the run's `matrix`, where they are known.
     """
     rows = matrix(run) if rows is None else rows
     entries = [
@@ -444,9 +452,7 @@ def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
 
 
 def outcome_of(cell: Cell) -> str:
-    """What became of the block; "falling left" or "falling right" where the run ends while it
-    falls.
-    """
+    """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall."""
     figures = (*(check.figure for check in cell.checks), *cell.figures)
     last = value_of((f for f in figures if f.unit == "alpha"), "last_rotation")
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:
@@ -461,8 +467,10 @@ def _side(outcome: str) -> str:
 
 
 def accuracy(run: Run) -> list[Block]:
-    """Peak rotation by each model against the reference's, over all scenes: a point a scene, lines
-    for the bias and two standard deviations; bias and scatter of this run and of all suites.
+    """Peak rotation by each model against the reference's, over all scenes.
+
+    A point a scene, lines for the bias and two standard deviations; bias and scatter of this run
+    and of all suites.
 
     Nothing where neither is known.
     """

@@ -1,6 +1,4 @@
-"""What is shown of one scene: all histories on one time axis, their differences, tolerances and
-horizon.
-"""
+"""The view of one scene: histories on one time axis, differences, tolerances and horizon."""
 
 from __future__ import annotations
 
@@ -35,8 +33,9 @@ MEASURED = {"file", "offset"}
 
 @dataclass(frozen=True)
 class Channel:
-    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of the measures
-    that limit its difference.
+    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of its measures.
+
+    These measures limit its difference.
 
     `scale` turns the unit of its measures into `unit` (1000: from m to mm).
     """
@@ -68,8 +67,9 @@ PAPER_CHANNELS = CHANNELS[:4]
 
 @dataclass(frozen=True)
 class Band:
-    """A tolerance on the difference of one channel of one model: |d| (or its RMS) at most `limit`
-    from 0 to `until` s.
+    """A tolerance on the difference of one channel of one model.
+
+    Its difference |d| (or its RMS) is at most `limit` from 0 to `until` s.
     """
 
     channel: str
@@ -82,8 +82,9 @@ class Band:
 
 @dataclass(frozen=True)
 class Hop:
-    """How the block leaves the floor: its lowest corner's greatest height (m), by which model, and
-    its longest flight (s).
+    """How the block leaves the floor.
+
+    Its lowest corner's greatest height (m), by which model, and its longest flight (s).
     """
 
     height: float
@@ -113,9 +114,7 @@ class SceneView:
 
     @cached_property
     def moved(self) -> list[dict[str, Any]]:
-        """Slip, top displacement and speed at the wall by model (label, unit, values), where one is
-        known.
-        """
+        """Slip, top displacement, speed at the wall by model: (label, unit, values) where known."""
         motions = {model: motion_of(one, self.scene) for model, one in self.histories.items()}
         rows: list[dict[str, Any]] = [
             {
@@ -153,8 +152,9 @@ class SceneView:
 
     @cached_property
     def outside(self) -> list[str]:
-        """The axes on which the scene lies outside of what the suites cover; empty where nothing is
-        known of them.
+        """The axes on which the scene lies outside of what the suites cover.
+
+        Empty where nothing is known of them.
         """
         return experience.outside(self.scene) if experience.known().domain else []
 
@@ -192,8 +192,9 @@ class SceneView:
         return {c.name: c.scale * found[c.name] for c in CHANNELS} | {"x": x, "y": y}
 
     def _on_axis(self, history: History, name: str) -> Array:
-        """A column on `t`, linear between its rows, NaN outside them and where there is no such
-        column.
+        """A column on `t`, linear between its rows.
+
+        NaN outside them and where there is no such column.
         """
         if name not in history.channels:
             return np.full(len(self.t), math.nan)
@@ -298,9 +299,7 @@ class SceneView:
 
     @property
     def references(self) -> tuple[str, ...]:
-        """Models that others are held against here and that have a history; the run's own reference
-        first.
-        """
+        """Models with a history that others are held against here, the run's reference first."""
         named = [
             self.run.reference,
             self.run.model_form,
@@ -310,14 +309,16 @@ class SceneView:
 
     @property
     def figure_references(self) -> tuple[str | None, ...]:
-        """References that have a figure of their own: all where a wall makes them differ in form,
-        else the first; None without any.
+        """References that have a figure of their own.
+
+        All where a wall makes them differ in form, else the first; None without any.
         """
         return (self.references if self.model_form_matters else self.references[:1]) or (None,)
 
     def differences(self, channel: str, against: str) -> dict[str, Array]:
-        """Candidate minus reference by model up to the first fall of the two, in the channel's
-        unit.
+        """Candidate minus reference by model, in the channel's unit.
+
+        The difference ends with the first fall of the two.
         """
         reference = self.drawn[against][channel]
         return {
@@ -327,8 +328,9 @@ class SceneView:
         }
 
     def running_rms(self, band: Band) -> Array:
-        """The RMS difference from 0 up to each time, to `band.until`: what its limit holds for at
-        the end. NaN where it is not known.
+        """The RMS difference from 0 up to each time, to `band.until`.
+
+        Its limit holds for the end. NaN where it is not known.
         """
         both = [
             self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)
@@ -381,8 +383,9 @@ class SceneView:
 
     @property
     def agreement(self) -> dict[str, tuple[float, str, str]]:
-        """By model: the time up to which its events agree with those of its first reference, what
-        comes then, and that reference.
+        """How long events agree with those of the first reference, by model.
+
+        The time, what comes then, and that reference.
         """
         found: dict[str, tuple[float, str, str]] = {}
         for against in self.references:
@@ -464,8 +467,9 @@ def scene_views(
 
 
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
-    """A file name for each scene: safe on any system, different for different scenes also where
-    case does not count.
+    """A file name for each scene, safe on any system.
+
+    The names differ for different scenes also where case does not count.
     """
     slugs: dict[str, str] = {}
     taken: set[str] = set()
