@@ -110,7 +110,7 @@ def lines(plot: Plot) -> Figure:
 def stable_steps(plot: Plot) -> Figure:
     """A panel an axis: the largest stable step of each model with its settings.
 
-    Colour and number say which.
+    Each cell shows the step by its colour and as a number.
     """
     import numpy as np
     from matplotlib.figure import Figure

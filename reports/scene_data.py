@@ -3,9 +3,8 @@
 It is a script since a page opened from the file system cannot fetch data.
 
 Values of the script are float32 (rounded to 6e-8 of their size), a line of `rows` values for the
-ground, each
-channel and each running figure. All lines of a page are packed together, and each place holds its
-line's number: what models agree on is kept once, nearly.
+ground, each channel and each running figure. All lines of a page are packed together, and each
+place holds the number of its line, so that lines on which models agree are kept once.
 """
 
 from __future__ import annotations

@@ -91,7 +91,7 @@ BY_KEY = LOOKS | {look.key: look for look in SPARE}
 def looks(models: Iterable[str]) -> dict[str, Look]:
     """The look of each of a run's models.
 
-    A model without one of its own gets a spare colour, by its place among such.
+    Models without one of their own get the spare colours, in order.
     """
     found: dict[str, Look] = {}
     for model in models:

@@ -330,7 +330,7 @@ class SceneView:
     def running_rms(self, band: Band) -> Array:
         """The RMS difference from 0 up to each time, to `band.until`.
 
-        Its limit holds for the end. NaN where it is not known.
+        The band's limit applies to the last value. NaN where it is not known.
         """
         both = [
             self.values.get(model, {}).get(band.channel) for model in (band.model, band.against)

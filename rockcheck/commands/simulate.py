@@ -74,7 +74,7 @@ def run(
         raise InputError(f"{printable(path.parent)}: no such folder", "--output")
     check_format(path)
     check_picture(plot)
-    slow = ", a first run compiles" if compiles(model, given) else ""
+    slow = ", may compile first" if compiles(model, given) else ""
     with progress(f"{what.name}, {model}{slow}") as on_progress, listening(on_progress):
         history = player.simulate(what) if player else _played_apart(what, model, given)
     try:

@@ -99,10 +99,7 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     outside = check.verdict == "fail" and not new
     worse = outside or check.verdict == "changed"
     if worse and not reason:
-        return (
-            f"{check.reason};"
-            f" {'loosening a limit' if outside else 'moving what is expected'} needs --reason"
-        )
+        return f"{check.reason}; moving what is expected needs --reason"
     measure = MEASURES[check.figure.measure]
     limit, drift = _room(check, value)
     tighter = check.verdict == "better" and measure.role == "error"

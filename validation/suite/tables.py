@@ -79,7 +79,7 @@ def finding_of(run: Run) -> Finding:
         Text(of_better if better else ""),
         Text(items=better, verdict="fail" if run.strict == "both" else "pass"),
         Text(f"{of_waiting} expected ones" if waits else ""),
-        Text(f"{count}; {run.wall_seconds:.1f} s"),
+        Text(f"{count}; played and judged in {run.wall_seconds:.1f} s"),
     ]
     return Finding("run", run.suite, f"verdict: {run.words}", blocks)
 

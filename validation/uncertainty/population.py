@@ -423,7 +423,13 @@ def quantities_of(
         columns = [text("name", "quantity"), *(Column(name, name, digits=4) for name in names)]
         columns += [text("unit"), text("verdict")]
         rows = [[one[column.name] for column in columns] for one in quantities]
-        table = Table("numerical", columns, rows, "Numerical uncertainty", f"{scene}, {model}.")
+        table = Table(
+            "numerical",
+            columns,
+            rows,
+            "Numerical uncertainty under the scene's own motion",
+            f"{scene}, {model}.",
+        )
         blocks += [table, Text(items=numerical.reasons)]
     if parts is not None:
         law = f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)"

@@ -57,10 +57,11 @@ CONTRIBUTIONS = {
 
 #: The questions whose answers lead, as one would write them in a report.
 LEADS = ("Does it fall?", "How far does it move?", "Which gap is safe?")
-#: The options that ask for an answer.
+#: What is said where there is no answer.
 ASKS = {
-    "Which gap is safe?": "--gaps 0,0.05,0.1",
-    "At which intensity does it fall?": "--levels pga:0.05:2:40",
+    "How far does it move?": "No run stands.",
+    "Which gap is safe?": "Not asked for: --gaps 0,0.05,0.1.",
+    "At which intensity does it fall?": "Not asked for: --levels pga:0.05:2:40.",
 }
 
 
@@ -228,6 +229,7 @@ def gaps_of(found: Found) -> dict[str, Any]:
     """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
 
     `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
+    It has the reach of blocks that fall, `free_overturned` of the runs without the wall.
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
     whether a wider gap never lets fewer runs overturn.
     """
@@ -258,6 +260,7 @@ def gaps_of(found: Found) -> dict[str, Any]:
     return {
         "gaps": rows,
         "clearance": max(reaches, default=None),
+        "free_overturned": sum(run.fell for run in found.free),
         "none_overturns_up_to": max(safe, default=None),
         "monotonic": [row["overturned"] for row in rows]
         == sorted(row["overturned"] for row in rows),
@@ -429,7 +432,8 @@ def gap_sentences(gaps: Mapping[str, Any]) -> list[str]:
         if not gaps["monotonic"]:
             said.append("A larger gap is not always worse: see each.")
     if gaps["clearance"] is not None:
-        said.append(f"It would need {gaps['clearance']:.3g} m not to strike the wall.")
+        falls = f"; {gaps['free_overturned']} fall" if gaps["free_overturned"] else ""
+        said.append(f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}.")
     return said
 
 
@@ -452,7 +456,7 @@ def certainty_sentences(found: Found, own: Sure | None) -> list[str]:
             one.depends_on_law_from_s is not None for case, one in found.sure.items() if case
         )
         said = [f"{len(judged) - len(unsure)} of {len(judged)} runs are numerically converged."]
-        return said + ([f"{laws} depend on the law of impacts."] if laws else [])
+        return said + ([f"The law of impacts matters in {laws}."] if laws else [])
     if own is None or own.numerical is None:
         return [f"{found.model} has no step or tolerance: its numerical error is not known."]
     converged = own.numerical.converged and own.depends_on_law_from_s is None
@@ -497,8 +501,7 @@ def input_shares(found: Found) -> dict[str, float]:
 def answers_table(answers: Mapping[str, Sequence[str]]) -> Table:
     """The questions with their answers, or what asks for one."""
     rows = [
-        [question, " ".join(said) or f"Not asked for: {ASKS.get(question, 'no run stands')}."]
-        for question, said in answers.items()
+        [question, " ".join(said) or ASKS.get(question, "")] for question, said in answers.items()
     ]
     return Table("answers", [text("question"), text("answer")], rows)
 
