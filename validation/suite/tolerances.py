@@ -329,15 +329,16 @@ def _nearer(value: float, expected: float, perfect: float | None) -> float:
 
 def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
     """Why a figure is beyond its limit, empty if not; `moved` is its distance from `expected`."""
-    limit = line.limit
+    limit, unit = line.limit, "" if figure.unit == "1" else f" {figure.unit}"
     if measure.sense == "at least":
-        return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}"
+        return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}{unit}"
     ideal = measure.ideal if measure.role == "error" else line.expected
     away = math.inf if ideal is None else abs(value - ideal) if measure.role == "error" else moved
     if away <= limit:
         return ""
     if limit:
-        return f"{value:.4g} is more than {limit:.4g}" + (f" from {ideal:.6g}" if ideal else "")
+        beyond = f"{value:.4g} is more than {limit:.4g}" + (f" from {ideal:.6g}" if ideal else "")
+        return beyond + unit
     return f"{value:.6g}, not {ideal:.6g}" + (f" ({figure.note})" if figure.note else "")
 
 
