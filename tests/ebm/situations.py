@@ -29,6 +29,20 @@ PIVOTS = ["bilateral", "unilateral"]
 ORDER = 8
 
 
+def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
+    """Shenton (1996): the mode into which a block at rest goes under a constant base acceleration.
+
+    `a` is over gravity, `slope` is tan(alpha).
+    """
+    if a <= min(slope, mu_s):
+        return "rest"
+    if mu_s < slope:
+        return "slide"
+    if mu_s >= (a * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (4.0 + slope**2 + 3.0 * a * slope):
+        return "rock"
+    return "slide-rock" if mu_k > slope else "slide"
+
+
 class Mode(NamedTuple):
     """Contacts of a mode in the frame of its pivot, in which a tilted block tips to the left."""
 

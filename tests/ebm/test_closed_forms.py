@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from situations import shentons
 from stepping import block_of
 
 from rockcheck.ebm import EventBasedModel
@@ -191,18 +192,6 @@ def test_bounce_heights(restitution, block):
 # --- Shenton (1996): how a block at rest starts to move
 
 
-def first_mode_by_shenton(mu_s: float, mu_k: float, slope: float, a: float) -> str:
-    """The mode into which a block at rest goes under a constant base acceleration a (in g); `slope`
-    is tan(alpha)."""
-    if a <= min(slope, mu_s):
-        return "rest"
-    if mu_s < slope:
-        return "slide"
-    if mu_s >= (a * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (4.0 + slope**2 + 3.0 * a * slope):
-        return "rock"
-    return "slide-rock" if mu_k > slope else "slide"
-
-
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("friction", ["equal", "static above kinetic"])
 def test_shentons_map(friction, pivot):
@@ -231,7 +220,7 @@ def test_shentons_map(friction, pivot):
         )
         history = model.simulate(scene.replace(floor=Floor(friction=mu_k, static_friction=mu_s)))
         found = history.channels["mode"][1]
-        expected = first_mode_by_shenton(mu_s, mu_k, math.tan(alpha), a)
+        expected = shentons(mu_s, mu_k, math.tan(alpha), a)
         assert found == expected, (mu_s, mu_k, alpha, a)
         if "rock" in expected:
             assert np.sign(history.channels["theta"][-1]) == side

@@ -13,6 +13,7 @@ from situations import (
     candidates,
     margin,
     random_tilt,
+    shentons,
     upright,
 )
 from stepping import TILTED, run_at
@@ -26,18 +27,6 @@ from rockcheck.ebm.core.names import Family, Kind, Pivot
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.state import code_of
 from rockcheck.scenes import Wall
-
-
-def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
-    """Shenton (1996): the mode into which a block at rest goes under a base acceleration a over
-    gravity."""
-    if a <= min(slope, mu_s):
-        return "rest"
-    if mu_s < slope:
-        return "slide"
-    if mu_s >= (a * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (4.0 + slope**2 + 3.0 * a * slope):
-        return "rock"
-    return "slide-rock" if mu_k > slope else "slide"
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
     History,
     InputError,
@@ -116,8 +117,8 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 FINE, MOST_ROWS = 64, 4000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
-#: Motions below this (R) are not resolved: a contact that parts with a settling speed stays closed.
-SETTLED = 1e-7
+#: Motions below this (R) are not resolved: a contact that parts at the settling speed stays closed.
+SETTLED = 2.0 * SETTLE
 #: The reach of a block is known where it is this many times the largest change between two rows.
 RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
