@@ -7,16 +7,19 @@ import io
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.experience import WIDTH, known, outside
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
+from rockcheck.validation.execute.models import build
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -30,12 +33,13 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.studies.population.runs import Played, Ran, Sure
+from rockcheck.validation.studies.population.runs import Numbers, Played, Ran, Side, Sure
+from rockcheck.validation.studies.population.study import Population
 from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
 
-if TYPE_CHECKING:
-    from rockcheck.validation.studies.population.assess import Assessment
-
+#: The model of runs that are drawn or have another gap.
+SWIFT = "ebm-unilateral"
+_SEED = 1
 #: Name of the runs by the other law of impacts, among the models.
 LAW = "impact law"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
@@ -81,6 +85,56 @@ ASKS = {
 
 
 @dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What an assessment is asked for.
+
+    `cases` are the scene under each of its motions, by their names. `own` is the
+    scene with its own excitation. The first of `models` plays each case; the others are compared
+    with it; `settings` are theirs, by model. `gaps` (m) are those of the walls on `sides`.
+    `samples` numbers are drawn for each case and gap, or, without records, for the single run.
+    `levels` is the population over intensities.
+    """
+
+    own: UncertainScene
+    cases: Mapping[str, UncertainScene]
+    models: Sequence[str] = (SWIFT,)
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    gaps: Sequence[float] = ()
+    sides: Sequence[Side] = ()
+    samples: int = 0
+    recorded: bool = False
+    levels: Population | None = None
+    left_out: Sequence[str] = ()
+
+    @property
+    def model(self) -> str:
+        """The model that plays each case."""
+        return self.models[0]
+
+    @property
+    def swift(self) -> str:
+        """The event-based model that plays draws and gaps."""
+        return self.model if isinstance(build(self.model, {}), EventBasedModel) else SWIFT
+
+    @cached_property
+    def draws(self) -> tuple[Numbers, ...]:
+        """The numbers of each draw, the same for every case.
+
+        Empty without records: the numbers are then drawn about the single run.
+        """
+        first = next(iter(self.cases.values()))
+        if not (self.samples and self.recorded):
+            return ()
+        from scipy.stats import qmc
+
+        chance = np.random.default_rng(_SEED)
+        points = qmc.Sobol(len(first.spreads), seed=chance).random(self.samples)
+        for row in (values := first.values(points)):
+            first.at(row)  # names a draw that is no scene
+        return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())
+
+
+@dataclass(frozen=True, kw_only=True)
 class Found:
     """The runs of an assessment, by the case: the scene under each of its motions.
 
@@ -89,7 +143,7 @@ class Found:
     "" the scene's own.
     """
 
-    study: Assessment
+    study: Asked
     shown: Mapping[str, Played]
     drawn: Mapping[str, Sequence[Ran]]
     at_gaps: Mapping[float, Sequence[Ran]]

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import InputError, Scene, Wall
-from rockcheck.scenes.files import UncertainScene
-from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.execute.models import family
 from rockcheck.validation.finding import Finding
-from rockcheck.validation.studies.population.answers import LAW, Found, finding_of
+from rockcheck.validation.studies.population.answers import LAW, SWIFT, Asked, Found, finding_of
 from rockcheck.validation.studies.population.runs import (
     A_RUN,
     SOON,
@@ -33,66 +31,21 @@ from rockcheck.validation.studies.population.runs import (
     Sure,
     effort,
 )
-from rockcheck.validation.studies.population.study import Population
 from rockcheck.validation.study import Study, Task
 from rockcheck.validation.uncertainty.population import Runs
 
-#: The model of runs that are drawn or have another gap, and its law of impacts that is compared.
-SWIFT, OTHER_LAW = "ebm-unilateral", {"impacts": "floor-first"}
+#: The law of impacts that is compared.
+OTHER_LAW = {"impacts": "floor-first"}
 #: Runs of one task, at the most.
 MOST_RUNS = 256
-_SEED = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Assessment(Study):
-    """An assessment of a scene: `cases` are the scene under each of its motions, by their names.
+class Assessment(Asked, Study):
+    """An assessment of a scene."""
 
-    `own` is the scene with its own excitation. The first of `models` plays each case; the others
-    are compared with it; `settings` are theirs, by model. `gaps` (m) are those of the walls on
-    `sides`. `samples` numbers are drawn for each case and gap, or, without records, for the single
-    run. `levels` is the population over intensities.
-    """
-
-    own: UncertainScene
-    cases: Mapping[str, UncertainScene]
-    models: Sequence[str] = (SWIFT,)
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    gaps: Sequence[float] = ()
-    sides: Sequence[Side] = ()
-    samples: int = 0
-    recorded: bool = False
-    levels: Population | None = None
-    left_out: Sequence[str] = ()
     record = Runs | Played | Sure
     name = "assess"
-
-    @property
-    def model(self) -> str:
-        """The model that plays each case."""
-        return self.models[0]
-
-    @property
-    def swift(self) -> str:
-        """The event-based model that plays draws and gaps."""
-        return self.model if isinstance(build(self.model, {}), EventBasedModel) else SWIFT
-
-    @cached_property
-    def draws(self) -> tuple[Numbers, ...]:
-        """The numbers of each draw, the same for every case.
-
-        Empty without records: the numbers are then drawn about the single run.
-        """
-        first = next(iter(self.cases.values()))
-        if not (self.samples and self.recorded):
-            return ()
-        from scipy.stats import qmc
-
-        chance = np.random.default_rng(_SEED)
-        points = qmc.Sobol(len(first.spreads), seed=chance).random(self.samples)
-        for row in (values := first.values(points)):
-            first.at(row)  # names a draw that is no scene
-        return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())
 
     def _runs(
         self,
