@@ -7,6 +7,7 @@ more for print without colour.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import math
@@ -18,6 +19,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
 from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute.provenance import digest
@@ -29,6 +32,7 @@ if TYPE_CHECKING:
 #: Widths of a text column and of a page of text in common journals, inches.
 COLUMN, PAGE = 3.5, 7.1
 FORMATS = ("svg", "png", "pdf")
+ENDINGS = ", ".join(f".{kind}" for kind in FORMATS)
 
 
 @dataclass(frozen=True)
@@ -98,6 +102,11 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
         spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
         found[model] = LOOKS[model] if model in LOOKS else replace(spare, label=model)
     return found
+
+
+def label_of(model: str) -> str:
+    """A model's label: its name where it has no look of its own."""
+    return LOOKS[model].label if model in LOOKS else model
 
 
 @contextmanager
@@ -171,6 +180,22 @@ def power_of_ten(value: float) -> str:
     )
 
 
+def kind_of(path: Path) -> str:
+    """The format of a figure's file, one of `FORMATS`; raises `InputError` for another ending."""
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise InputError(
+            f"{printable(path)}: a figure is written as {ENDINGS}, not as"
+            f" {printable(path.suffix)!r}"
+        )
+    return kind
+
+
+def save_as(figure: Figure, path: Path) -> Path:
+    """Write a figure into the file that the user chose; returns it."""
+    return save(figure, path.with_suffix(""), [kind_of(path)], named=True)[0]
+
+
 def save(
     figure: Figure,
     stem: Path,
@@ -216,13 +241,16 @@ def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
 
 def stamp_of(shown: object) -> str:
     """Two short hashes: of what a figure shows, and of what draws it."""
-    return f"{digest(json.dumps(shown, sort_keys=True))} {_drawn_by()}"
+    return f"{digest(json.dumps(shown, sort_keys=True))} {drawn_by()}"
 
 
 @cache
-def _drawn_by() -> str:
-    sources = sorted(Path(__file__).parent.rglob("*.py"))
-    return digest("\n".join([version("matplotlib"), *(one.read_text("utf-8") for one in sources)]))
+def drawn_by() -> str:
+    """Hash of all that draws figures and pages: code, templates, scripts, styles, matplotlib."""
+    places = sorted(Path(__file__).parent.rglob("*"))
+    files = (path for path in places if path.is_file() and path.suffix != ".pyc")
+    hashes = (hashlib.sha256(path.read_bytes()).hexdigest() for path in files)
+    return digest("\n".join([version("matplotlib"), *hashes]))
 
 
 def stamp_in(path: Path) -> str:
