@@ -216,15 +216,14 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
     Series with one label, such as a line and its fit, share a colour.
     """
     own: dict[str, tuple[str, str]] = {}
-    found = []
-    for series in panel.series:
-        if series.look in BY_KEY:
-            found.append((BY_KEY[series.look].light, BY_KEY[series.look].dark))
-        elif series.style == "thin":
-            found.append(GREY)
-        else:
-            found.append(own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)]))
-    return found
+    return [
+        (BY_KEY[series.look].light, BY_KEY[series.look].dark)
+        if series.look in BY_KEY
+        else GREY
+        if series.style == "thin"
+        else own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)])
+        for series in panel.series
+    ]
 
 
 def live_data(plot: Plot) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -69,17 +70,14 @@ _UP = {400: "up", 401: "down"}
 def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
     only_for_tables(path, reading, "a PEER file")
-    header = match = None
-    for index, line in enumerate(lines[:20]):
-        if match := AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line):
-            header = index
-            break
-    if header is None or match is None:
+    found = (AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in lines[:20])
+    header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
+    if match is None:
         raise fault(path, "no header line with NPTS and DT within the first 20 lines")
     stated = next(
         filter(
             None,
-            (known_unit(word) for line in lines[: header + 1] for word in _UNITS.findall(line)),
+            (known_unit(word) for line in lines[:header] for word in _UNITS.findall(line)),
         ),
         "",
     )
@@ -90,11 +88,11 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
             f" {option('unit', 'cm/s2')}",
         )
     unit = settled_unit(path, stated, reading)
-    count = checked_count(path, header + 1, "NPTS", match[1])
-    step = settled_step(path, checked_step(path, header + 1, "DT", match[2]), reading)
-    values = numbers(path, enumerate(lines[header + 1 :], header + 2), count)
+    count = checked_count(path, header, "NPTS", match[1])
+    step = settled_step(path, checked_step(path, header, "DT", match[2]), reading)
+    values = numbers(path, enumerate(lines[header:], header + 1), count)
     if len(values) != count:
-        raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header + 1)
+        raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header)
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=step,
@@ -117,13 +115,9 @@ def _at2_component(lines: list[str]) -> str:
 def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
     """ESM (DYNA 1.2): lines of KEY: value, then one acceleration a line."""
     only_for_tables(path, reading, "an ESM file")
-    header: dict[str, tuple[int, str]] = {}
-    first = len(lines)
-    for n, line in enumerate(lines, 1):
-        if not (match := _ESM_LINE.match(line)):
-            first = n
-            break
-        header[match[1]] = n, match[2].strip()
+    said = [match for match in takewhile(bool, map(_ESM_LINE.match, lines)) if match]
+    header = {match[1]: (n, match[2].strip()) for n, match in enumerate(said, 1)}
+    first = min(len(said) + 1, len(lines))
 
     def stated(key: str) -> tuple[int, str]:
         if not header.get(key, (0, ""))[1]:
@@ -139,22 +133,18 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
     if not re.fullmatch(r"[0-9]++", count_word):
         raise fault(path, f"NDATA {printable(count_word, 30)!r} is not a count", place)
     count = checked_count(path, place, "NDATA", count_word)
-    step_line, step_word = stated("SAMPLING_INTERVAL_S")
-    step = settled_step(
-        path, checked_step(path, step_line, "SAMPLING_INTERVAL_S", step_word), reading
-    )
-    units = header.get("UNITS", (0, ""))
-    unit = settled_unit(path, known_unit(units[1]), reading)
+    line, word = stated("SAMPLING_INTERVAL_S")
+    step = settled_step(path, checked_step(path, line, "SAMPLING_INTERVAL_S", word), reading)
+    unit = settled_unit(path, known_unit(header.get("UNITS", (0, ""))[1]), reading)
     values = numbers(path, enumerate(lines[first - 1 :], first))
     if len(values) != count:
         raise fault(path, f"NDATA says {count}, the file has {len(values)} samples", place)
-    stream = printable(header.get("STREAM", (0, ""))[1], 30)
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=step,
         unit=unit,
         form="ESM ASCII",
-        component=stream,
+        component=printable(header.get("STREAM", (0, ""))[1], 30),
     )
 
 
@@ -189,16 +179,14 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
     unit = settled_unit(path, "gal", reading)
     samples = values * (factor / counts * UNITS[unit])
     mean = float(np.mean(samples))
-    step = settled_step(path, 1.0 / hertz, reading)
-    found = Recording(
+    said = f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+    return Recording(
         samples=samples - mean,
-        time_step=step,
+        time_step=settled_step(path, 1.0 / hertz, reading),
         unit=unit,
         form="K-NET ASCII",
         component=printable(header.get("Dir.", (0, ""))[1], 30),
-    )
-    return found.noted(
-        f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+        notes=(said,),
     )
 
 

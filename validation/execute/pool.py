@@ -290,12 +290,12 @@ def _follow(run: Any) -> None:
 
 def death(code: int) -> str:
     """How a process ended, from its exit code."""
-    if code < 0:
-        try:
-            return f"crashed: {signal.Signals(-code).name}"
-        except ValueError:
-            return f"crashed: signal {-code}"
-    return f"the process ended with code {code}"
+    names = {-one: one.name for one in signal.Signals}
+    return (
+        f"crashed: {names.get(code, f'signal {-code}')}"
+        if code < 0
+        else f"the process ended with code {code}"
+    )
 
 
 class Cluster(Pool):
@@ -316,9 +316,8 @@ class Cluster(Pool):
     def __exit__(self, *fault: Any) -> None:
         self._stack.__exit__(*fault)
 
-    def _workers(self) -> dict[str, Any]:
-        found: dict[str, Any] = self._pool.scheduler_info(n_workers=-1)["workers"]
-        return found
+    def _workers(self) -> Any:
+        return self._pool.scheduler_info(n_workers=-1)["workers"]
 
     def _room(self) -> int:
         return AHEAD * max(1, sum(about["nthreads"] for about in self._workers().values()))
