@@ -25,7 +25,7 @@ from rockcheck.reports.figures import (
 )
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import FORMATS, drawn_by, looks, save
+from rockcheck.reports.style import FORMATS, drawn_by, looks, save, stamp_in
 from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError, experience
@@ -119,13 +119,13 @@ def write_site(
     waiting = {
         name: stamp
         for name, stamp in stamps.items()
-        if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp
+        if afresh or stamp_in(folder / _address(pages.views[name])) != stamp
     }
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting) + 1)
     current = {f"{view.slug}.html" for view in pages.views.values()}
     for page in (folder / PAGES).glob("*.html"):
-        if page.name not in current and _stamp_of(page):
+        if page.name not in current and stamp_in(page):
             for name in (page.name, *_belongings(page)):
                 (folder / PAGES / name).unlink(missing_ok=True)
     return folder / INDEX
@@ -265,20 +265,12 @@ def _address(view: View) -> str:
     return f"{PAGES}/{view.slug}.html"
 
 
-@cache
-def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
-    """Start a process of the pool: it reads the run once for all its pages."""
-    return _Pages(folder, wanted)
+#: A process of the pool reads the run once for all its pages.
+_pages_of = cache(_Pages)
 
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-def _stamp_of(page: Path) -> str:
-    """The stamp that a page names, empty where there is no such page."""
-    found = re.search(r'<meta name="rockcheck-stamp" content="(\w+)">', head_of(page, 2000))
-    return found[1] if found else ""
 
 
 def _belongings(page: Path) -> set[str]:

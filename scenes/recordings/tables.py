@@ -249,20 +249,12 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, st
 
 
 def _unclear(cells: _Cells) -> InputError:
-    if not cells.names:
-        return fault(
-            cells.path,
-            f"{cells.width} columns; give that of the accelerations: {option('column', 2)}",
-            cells.rows[0][0],
-        )
-    line = cells.rows[0][0] - 1 if cells.rows else 1
-    shown = printable(", ".join(cells.names))
-    return fault(
-        cells.path,
-        f"columns {shown!r}; name them time_s and exactly one of {', '.join(NAMED)}, or give the"
-        f" column: {option('column', 2)}",
-        line,
-    )
+    line = cells.rows[0][0] - bool(cells.names) if cells.rows else 1
+    said = f"{cells.width} columns; give that of the accelerations"
+    if cells.names:
+        said = f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
+        said += f" {', '.join(NAMED)}, or give the column"
+    return fault(cells.path, f"{said}: {option('column', 2)}", line)
 
 
 def _chosen(cells: _Cells, column: int | str) -> int:
