@@ -140,29 +140,24 @@ class EnsembleView:
     def facts(self) -> list[tuple[str, str]]:
         """The ensemble in a few words: what is drawn, and the scene that it is drawn from."""
         drawn = Ensemble(**self.record.definition)
-        facts = [("scenes", f"{drawn.count}, seed {drawn.seed}")]
-        hidden = set()
-        for name, of, fact in (
-            ("friction", drawn.friction, "floor"),
-            ("gap (m)", drawn.gap, "wall"),
-        ):
-            facts += [(name, _distribution(of))] if of else []
-            hidden |= {fact} if of else set()
-        if drawn.pulse:
-            facts += [
-                ("pulse", "Ricker, of random phase"),
-                ("its period (s)", _distribution(drawn.pulse.period)),
-            ]
-        if noise := drawn.noise:
-            words = f"{number(noise.frequency)} Hz, damping {number(noise.damping)}"
-            facts.append(("noise", f"Kanai-Tajimi, {words}, {number(noise.strong)} s"))
-        if motion := drawn.pulse or drawn.noise:
-            facts.append(("its peak (m/s²)", _distribution(motion.amplitude)))
-            hidden.add("base")
+        pulse, noise, motion = drawn.pulse, drawn.noise, drawn.pulse or drawn.noise
+        facts = {
+            "scenes": f"{drawn.count}, seed {drawn.seed}",
+            "friction": _distribution(drawn.friction),
+            "gap (m)": _distribution(drawn.gap),
+            "pulse": pulse and "Ricker, of random phase",
+            "its period (s)": pulse and _distribution(pulse.period),
+            "noise": noise
+            and f"Kanai-Tajimi, {number(noise.frequency)} Hz, damping {number(noise.damping)},"
+            f" {number(noise.strong)} s",
+            "its peak (m/s²)": motion and _distribution(motion.amplitude),
+        }
+        known = [(name, said) for name, said in facts.items() if said]
         if "excitation" in drawn.scene:
-            return facts
-        base = Scene(**{"name": self.name, **drawn.scene})
-        return facts + [fact for fact in scene_facts(base) if fact[0] not in hidden]
+            return known
+        instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
+        base = scene_facts(Scene(**{"name": self.name, **drawn.scene}))
+        return known + [fact for fact in base if not instead.get(fact[0])]
 
     def distributions(self) -> Plot:
         """Share of scenes with a peak below each value, by model; difference from the reference.
@@ -271,7 +266,9 @@ class EnsembleView:
         return Table("", list(map(Column, ["scene", *names])), rows, on="file")
 
 
-def _distribution(of: Distribution) -> str:
+def _distribution(of: Distribution | None) -> str:
+    if of is None:
+        return ""
     if of.uniform is not None:
         return f"uniform {number(of.uniform[0])} to {number(of.uniform[1])}"
     assert of.lognormal is not None

@@ -210,10 +210,9 @@ class SceneView:
         """
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
-            sizes = [np.nan_to_num(np.abs(columns[name])) for columns in self.drawn.values()]
-            least = STILL * max((float(size.max()) for size in sizes), default=0.0)
-            for size in sizes:
-                moving |= size > max(least, 1e-9)
+            drawn = [columns[name] for columns in self.drawn.values()]
+            sizes = np.nan_to_num(np.abs(np.array(drawn).reshape(-1, len(self.t))))
+            moving |= (sizes > max(STILL * sizes.max(initial=0.0), 1e-9)).any(axis=0)
         rows, whole = np.flatnonzero(moving), (float(self.t[0]), float(self.t[-1]))
         if not len(rows):
             return whole
@@ -363,8 +362,7 @@ class SceneView:
                 wide += [_least(x - across), -_least(-x - across)]
                 tall += [_least(y - up), -_least(-y - up)]
         for wall in self.scene.walls:
-            face = (block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0)
-            wide.append(face)
+            wide.append((block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0))
         return min(wide), max(wide), min(tall), max(tall)
 
 
