@@ -147,7 +147,7 @@ def test_what_is_no_format_of_a_history_is_refused_before_the_run(type_):
     _, err = type_("simulate", "fig5a", "-o", "x.xlsx", code=2)
     assert err == (
         "rockcheck: x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
-        " not as .xlsx\n"
+        " not as .xlsx; its figure as .svg, .png, .pdf\n"
     )
     assert not Path("x.xlsx").exists()
 
@@ -219,19 +219,36 @@ def test_compare_says_first_what_matters(type_):
 
 
 def test_simulate_and_compare_draw(type_):
-    out = simulated(type_, "Falls", "a.csv", "--plot", "a.png")
-    assert "picture: a.png" in out
+    out = simulated(type_, "Falls", "a.csv", "-o", "a.png", "-o", "a.pdf")
+    assert "figure: a.png" in out
+    assert History.load("a.csv").outcome == "overturned left"
     simulated(type_, "Still", "b.csv")
-    out, _ = type_("compare", "a.csv", "b.csv", "--plot", "c.png")
+    out, _ = type_("compare", "a.csv", "b.csv", "--plot", "c.svg")
     assert out.startswith("outcomes differ, ")
-    for name in ("a.png", "c.png"):
-        assert Path(name).read_bytes().startswith(b"\x89PNG")
+    for name, start in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("c.svg", b"<?xml")):
+        assert Path(name).read_bytes().startswith(start)
         assert Path(name).stat().st_size > 5000
+
+
+def test_a_figure_alone_writes_no_history(type_):
+    write("rack.toml", SCENE)
+    words = ("simulate", "rack.toml", "--model", "faulty:Still", *CODE, "-o", "a.svg", "--json")
+    out, _ = type_(*words)
+    assert json.loads(out)["files"] == ["a.svg"]
+    assert json.loads(out)["history"] is None
+    assert [path.name for path in Path().glob("*.csv")] == []
 
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [("a.pdf", "a.pdf: give a name that ends in .png"), ("no/a.png", "no: no such folder")],
+    [
+        (
+            "a.gif",
+            "a.gif: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .gif;"
+            " its figure as .svg, .png, .pdf",
+        ),
+        ("no/a.png", "--output: no: no such folder"),
+    ],
 )
 def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name, said):
     _, err = type_(
@@ -240,11 +257,11 @@ def test_a_picture_that_cannot_be_written_is_refused_before_the_run(type_, name,
         "--model",
         "faulty:Still",
         *CODE,
-        "--plot",
+        "-o",
         name,
         code=2,
     )
-    assert err == f"rockcheck: --plot: {said}\n"
+    assert err == f"rockcheck: {said}\n"
     assert not Path("rack--faulty_Still.csv").exists()
 
 

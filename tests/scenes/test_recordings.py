@@ -300,12 +300,12 @@ def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
         "Sa(T)",
         "1 s: ",
         "█",
-        "picture: a.png",
+        "figure: a.png",
     ):
         assert part in said, part
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
     assert main(["record", "a.AT2", "--plot", "a.jpg"]) == 2
-    assert "ends in .png" in capsys.readouterr().err
+    assert ".svg, .png, .pdf" in capsys.readouterr().err
 
 
 def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
