@@ -141,8 +141,8 @@ def _grid(table: Table) -> Grid:
 
 def csv(table: Table) -> str:
     """A table as CSV with all digits."""
-    rows = ([plain(cell) for cell in row] for row in table.rows)
-    return table_text([column.name for column in table.columns], rows)
+    heads = [column.name for column in table.columns]
+    return table_text(heads, ([plain(cell) for cell in row] for row in table.rows))
 
 
 def markdown(found: Finding) -> str:

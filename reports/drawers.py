@@ -125,7 +125,6 @@ def stable_steps(plot: Plot) -> Figure:
                     aspect="auto",
                 )
             for (row, column), step in np.ndenumerate(steps):
-                colour = "#1b1b1b" if step >= tried[2] or not step else "w"
                 ax.text(
                     column,
                     row,
@@ -133,7 +132,7 @@ def stable_steps(plot: Plot) -> Figure:
                     ha="center",
                     va="center",
                     fontsize=6,
-                    color=colour,
+                    color="#1b1b1b" if step >= tried[2] or not step else "w",
                 )
             ax.set_xticks(range(len(values)), [f"{value:g}" for value in values])
             ax.set_yticks(range(len(models)), models)

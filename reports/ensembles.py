@@ -106,12 +106,17 @@ class EnsembleView:
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
         """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
-        found = {}
-        for model, sample in self.samples.items():
-            peaks = np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
-            shares = np.arange(1, len(peaks) + 1) / len(sample.peaks)
-            found[model] = peaks.tolist(), shares.tolist()
-        return found
+        known = {
+            model: np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
+            for model, sample in self.samples.items()
+        }
+        return {
+            model: (
+                peaks.tolist(),
+                (np.arange(1, len(peaks) + 1) / len(self.samples[model].peaks)).tolist(),
+            )
+            for model, peaks in known.items()
+        }
 
     def page(self) -> Finding:
         """All that its page shows."""
@@ -203,13 +208,8 @@ class EnsembleView:
 
     def by_scene(self) -> Plot:
         """Peak rotation of each scene by each model against the reference's."""
-        reference, *candidates = (
-            self.references[0],
-            *(model for model in self.samples if model != self.references[0]),
-        )
-        known = looks(self.run.models)
-        panels = []
-        for model in candidates:
+        reference, known, panels = self.references[0], looks(self.run.models), []
+        for model in [one for one in self.samples if one != reference]:
             pair = Samples(self.samples[reference], self.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LEAST, MOST * 1.6))
@@ -238,8 +238,10 @@ class EnsembleView:
                 continue
             theirs, own = self.samples[against].fallen, self.samples[cell.model].fallen
             counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
-            statistics = (figures[name] for name in STATISTICS_SHOWN)
-            shown = (Mark(one.value, more=one.note.replace("], ", "]\n")) for one in statistics)
+            shown = (
+                Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
+                for name in STATISTICS_SHOWN
+            )
             rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
         falls = ("both fall", "only the reference falls", "only the model falls", "both stay")
         columns = [

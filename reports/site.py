@@ -134,8 +134,8 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     if work < FEW:
         yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
         return
-    of = pages.folder, pages.wanted
-    calls = [Call(_write_page, (*of, *one)) for one in (*stamps.items(), (INDEX, ""))]
+    every = (*stamps.items(), (INDEX, ""))
+    calls = [Call(_write_page, (pages.folder, pages.wanted, *one)) for one in every]
     yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
 
 
@@ -154,10 +154,11 @@ class _Pages:
             if name not in slugs:
                 raise unknown_name("scene of the run", name, slugs)
         chosen = {*shown(self.run), *wanted}
-        found: list[View] = [
-            *scene_views(self.run, folder, chosen),
-            *(EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles),
+        self.scenes = scene_views(self.run, folder, chosen)
+        self.ensembles = [
+            EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles
         ]
+        found: list[View] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
         links = [(view.name, _address(view)) for view in found]
         links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
@@ -185,7 +186,7 @@ class _Pages:
         write_figures(view, made(self.folder, PAGES, FIGURES))
         write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
-        beside = [None, *(one for one in self.views.values() if isinstance(one, SceneView)), None]
+        beside = [None, *self.scenes, None]
         place = beside.index(view)
         return {"files": files, "previous": beside[place - 1], "following": beside[place + 1]}
 
@@ -214,8 +215,8 @@ class _Pages:
         self.site.page(
             INDEX,
             "index.html",
-            scenes=[view for view in self.views.values() if isinstance(view, SceneView)],
-            ensembles=[view for view in self.views.values() if isinstance(view, EnsembleView)],
+            scenes=self.scenes,
+            ensembles=self.ensembles,
             worst=tables.worst_table(self.run, links),
             hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
             times=tables.times_table(self.run),

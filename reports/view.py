@@ -235,8 +235,7 @@ class SceneView:
         if not height:
             return None
         flights = (end - start for start, end, mode in self.spells(model) if mode == "flight")
-        longest = max(flights, default=0.0)
-        return {"height": height, "model": model, "longest": longest}
+        return {"height": height, "model": model, "longest": max(flights, default=0.0)}
 
     def spells(self, model: str) -> list[tuple[float, float, str]]:
         """The modes of motion of a model as (start in s, end in s, mode), one for each change."""
@@ -271,9 +270,8 @@ class SceneView:
 
         The difference ends with the first fall of the two.
         """
-        reference = self.drawn[against][channel]
         return {
-            model: columns[channel] - reference
+            model: columns[channel] - self.drawn[against][channel]
             for model, columns in self.drawn.items()
             if model != against
         }

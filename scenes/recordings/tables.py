@@ -136,12 +136,8 @@ class _Cells:
         for n, line in self.rows:
             cells = self.layout.words(self.path, n, line)
             if len(cells) != self.width:
-                said = (
-                    f"the header names {self.width}"
-                    if self.names
-                    else f"the first line has {self.width}"
-                )
-                raise fault(self.path, f"{len(cells)} fields where {said}", n)
+                whose = "the header names" if self.names else "the first line has"
+                raise fault(self.path, f"{len(cells)} fields where {whose} {self.width}", n)
             if time is not None:
                 times.append(number(self.path, n, cells[time]))
                 words.append(cells[time])

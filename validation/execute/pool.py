@@ -208,8 +208,7 @@ class Pool:
             first = bool(call.compiles) and call.compiles not in self._compiled
             compiling |= {call.compiles} if first else set()
             seconds = call.seconds + COMPILING if first else call.seconds
-            futures = self._schedule(call, seconds, first)
-            running.update(dict.fromkeys(futures, (call, seconds)))
+            running |= dict.fromkeys(self._schedule(call, seconds, first), (call, seconds))
         waiting.extendleft(reversed(held))
 
     def _room(self) -> int:

@@ -212,10 +212,10 @@ def matters_most(paper: Paper, most: str) -> Measured:
 
     By parameter; the one called `most` must have the largest mean.
     """
-    means = {}
-    for k, axis in enumerate(AXES):
-        two = combinations(np.moveaxis(paper.safe, k, 0), 2)
-        means[axis] = float(np.mean([np.mean(one != other) for one, other in two]))
+    means = {
+        axis: float(np.mean([np.mean(one != other) for one, other in combinations(safe, 2)]))
+        for axis, safe in ((axis, np.moveaxis(paper.safe, k, 0)) for k, axis in enumerate(AXES))
+    }
     rows = [Row(most, f"{share(means[most])} of the nodes")]
     rows += [Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most]
     return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
@@ -544,8 +544,7 @@ def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
     ]
     size = f"{len(paper.amplitudes)} x {len(paper.frequencies)}"
     note = f"Each sentence of section 5 and the conclusions, judged by spectra of {size} nodes."
-    title = "What the paper says of them, checked"
-    yield Table("claims", columns, rows, title, note)
+    yield Table("claims", columns, rows, "What the paper says of them, checked", note)
     yield _areas(paper)
     yield _rows(
         "claim-figures",
