@@ -82,10 +82,10 @@ def _ks_distance(samples: Samples) -> tuple[float, str]:
     return float(found.statistic), f"p = {found.pvalue:.2g}"
 
 
-def _area_metric(samples: Samples) -> float:
+def _area_metric(samples: Samples) -> tuple[float, str]:
     from scipy.stats import wasserstein_distance
 
-    return float(wasserstein_distance(*_distributions(samples, 1.0)))
+    return float(wasserstein_distance(*_distributions(samples, 1.0))), ""
 
 
 def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
