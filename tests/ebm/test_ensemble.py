@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.ensemble import play_ensemble
+from rockcheck.ebm.batch import play_ensemble
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Ricker, Scene, Wall
 
 MODEL = EventBasedModel(pivot="unilateral", tolerance=1e-9)
