@@ -23,8 +23,6 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
@@ -172,12 +170,7 @@ class _Run:
         self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
         self.force, self.heard = force, heard
         self.began = time.monotonic()
-        try:
-            self.store = Store(folder, study.kinds)
-        except OSError as error:
-            raise InputError(
-                f"{printable(folder)}: cannot be used as the output folder: {error.strerror}"
-            ) from None
+        self.store = Store(folder, study.kinds)
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
 
@@ -213,14 +206,26 @@ class _Run:
         workers: Pool | None = None
         while waiting := self._next():
             self._estimate(waiting)
-            elsewhere = [task for task in waiting if self._elsewhere(task)]
+            elsewhere = [
+                task
+                for task in waiting
+                if (
+                    task.where == "worker" and self.jobs > 0
+                    if self.scheduler is None
+                    else task.where != "timed"
+                )
+            ]
             for task in waiting:
                 if task not in elsewhere and time.monotonic() < until:
                     self._end(task, guarded(self.study.play, task))
             if not elsewhere:
                 continue
             if workers is None:
-                workers = stack.enter_context(self._workers())
+                workers = stack.enter_context(
+                    Pool(self.jobs, self.study.memory_mb)
+                    if self.scheduler is None
+                    else Cluster(self.scheduler, self.study.memory_mb)
+                )
             calls = (
                 Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
                 for task in elsewhere
@@ -252,18 +257,6 @@ class _Run:
         else:
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)
-
-    def _elsewhere(self, task: Task) -> bool:
-        if self.scheduler is not None:
-            return task.where != "timed"
-        return task.where == "worker" and self.jobs > 0
-
-    def _workers(self) -> Pool:
-        return (
-            Cluster(self.scheduler, self.study.memory_mb)
-            if self.scheduler is not None
-            else Pool(self.jobs, self.study.memory_mb)
-        )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
         seconds = sum(
