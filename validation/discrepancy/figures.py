@@ -66,6 +66,16 @@ class Figure(Stored):
     note: str = ""
 
     @property
+    def windowed(self) -> str:
+        """Measure and window, as tolerances name them."""
+        return f"{self.measure}@{self.window}" if self.window else self.measure
+
+    @property
+    def title(self) -> str:
+        """Measure, window and reference, as tolerances name them."""
+        return f"{self.windowed} against {self.against}" if self.against else self.windowed
+
+    @property
     def undefined(self) -> bool:
         """Whether the measure is undefined here, so that nothing is judged; the note says why."""
         return self.value is None and self.note.startswith(NOT_DEFINED)
@@ -241,19 +251,11 @@ class Pair:
     def channels(self, name: str) -> tuple[Array, Array]:
         """One column of both on `time`: reference, candidate."""
         if name not in self.cache:
-            for history in (self.reference, self.candidate):
-                if name not in history.channels:
-                    raise Unavailable(f"{history.model} has no column {name}")
+            both = [WindowedHistory(one) for one in (self.reference, self.candidate)]
+            curves = [(one.channel("t"), one.channel(name)) for one in both]
             if len(self.time) == 0:
                 raise Unavailable("the histories have no time in common")
-            self.cache[name] = tuple(
-                np.interp(
-                    self.time,
-                    np.asarray(h.channels["t"], dtype=float),
-                    np.asarray(h.channels[name], dtype=float),
-                )
-                for h in (self.reference, self.candidate)
-            )
+            self.cache[name] = tuple(np.interp(self.time, *curve) for curve in curves)
         return self.cache[name]
 
     @cached_property
@@ -377,9 +379,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         for left, events, matched in zip(alone, both, taken, strict=True):
             weak = WEAK_IMPACT * max((abs(e.impulse) for e in events), default=0.0)
             left += [e for n, e in enumerate(events) if n not in matched and abs(e.impulse) >= weak]
-    in_time = attrgetter("t")
     return MatchedImpacts(
-        sorted(pairs, key=lambda two: two[0].t), *(sorted(some, key=in_time) for some in alone)
+        sorted(pairs, key=lambda two: two[0].t),
+        *(sorted(some, key=attrgetter("t")) for some in alone),
     )
 
 

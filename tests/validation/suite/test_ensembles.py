@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import InputError
+from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.motions import Distribution
@@ -126,7 +127,8 @@ def test_statistics_of_known_samples():
         falls.reference,
         Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")),
     )
-    assert math.isnan(STATISTICS["ks_distance"].evaluate(lost)[0])
+    unknown = evaluate(STATISTICS["ks_distance"], lost, "alpha")
+    assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
 
 def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
+from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 
 
@@ -51,9 +52,9 @@ def test_only_scenes_in_which_both_rock_have_a_ratio():
     both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
     assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
     for name in ("peak_bias", "peak_scatter"):
-        value, remark = STATISTICS[name].evaluate(samples([0.1, 0.2], [0.1, 1e-4]))
-        assert np.isnan(value)
-        assert remark == "fewer than two scenes in which both rock and neither falls"
+        found = evaluate(STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
+        assert found.value is None
+        assert found.note == "fewer than two scenes in which both rock and neither falls"
 
 
 def test_shares_have_wilsons_interval():
