@@ -29,11 +29,6 @@ from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS, Record
 from rockcheck.scenes.writing import write_whole
 
 
-def packed(values: ArrayLike) -> str:
-    """Values as base64 of little-endian float32."""
-    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
-
-
 def packed_lines(lines: Sequence[ArrayLike]) -> str:
     """Lines of values as base64 of a deflated stream.
 
