@@ -10,7 +10,6 @@ place holds the number of its line, so that lines on which models agree are kept
 from __future__ import annotations
 
 import base64
-import json
 import re
 import zlib
 from collections.abc import Sequence
@@ -106,12 +105,6 @@ def payload(view: SceneView) -> dict[str, Any]:
         ],
     }
     return {**data, "lines": packed_lines(lines)}
-
-
-def script(view: SceneView) -> str:
-    """The payload as a script that assigns it to `rockcheck`, written in ASCII."""
-    text = json.dumps(payload(view), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    return f"window.rockcheck = {text};\n"
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

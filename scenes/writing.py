@@ -178,6 +178,12 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def script_text(place: str, value: Any) -> str:
+    """A value as a script that assigns it to `place`; a page may hold it."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return f"{place} = {text};\n"
+
+
 def json_text(value: Any) -> str:
     """A value as indented JSON (see `finite`).
 
