@@ -101,11 +101,13 @@ class SuiteStudy(Study):
 
     def __init__(self, suite: Suite, folder: Path) -> None:
         self.suite, self.store = suite, Store(folder)
-        limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
+        limits = [suite.suite_of(name).given.limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
         asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
         self.cells = [
-            self._planned(scene, variant, asked if suite.suite_of(scene.name).uncertainty else {})
+            self._planned(
+                scene, variant, asked if suite.suite_of(scene.name).given.uncertainty else {}
+            )
             for scene, variant in suite.cells()
         ]
         self.batches = [
@@ -137,9 +139,9 @@ class SuiteStudy(Study):
             variant,
             variant.label,
             provenance.cell_key(scene, kind, settings, variant.search_path),
-            own.uncertainty,
+            own.given.uncertainty,
             **of,
-            seconds=own.limits.seconds,
+            seconds=own.given.limits.seconds,
             compiles=compiles(kind, variant.settings),
         )
 
@@ -226,7 +228,7 @@ class SuiteStudy(Study):
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
-            description=suite.description,
+            description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             reference=suite.reference,
             model_form=suite.model_form,
@@ -235,7 +237,9 @@ class SuiteStudy(Study):
             cells=tuple(cells),
             ensembles=tuple(ensembles),
             inputs=inputs,
-            printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
+            printed=tuple(
+                name for name in suite.scenes if suite.suite_of(name).given.print_figures
+            ),
             faults=tuple(
                 f"tolerance [{place}] has no cell in the suite"
                 for place in suite.tolerances

@@ -51,6 +51,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -140,7 +141,9 @@ class SuiteFile(Frozen):
     limits: Limits = Limits()
     ensemble: tuple[Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
+    #: Whether the numerical error of each cell is estimated (three coarser runs a cell).
     uncertainty: bool = False
+    #: Whether each scene's figure for a paper is drawn.
     print_figures: bool = False
 
 
@@ -161,13 +164,12 @@ class Suite:
 
     name: str
     path: Path
-    description: str
+    #: The keys of its file, such as the limits, and what it requires.
+    given: SuiteFile = field(repr=False)
     reference: str
     model_form: str
     scenes: Mapping[str, Scene]
     models: Mapping[str, ModelVariant]
-    require: Require
-    limits: Limits
     tolerances: Tolerances = field(repr=False)
     #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table
     #: `[tolerances]`.
@@ -176,15 +178,11 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is estimated (three coarser runs a cell), and scenes
-    #: with uncertain numbers, by name.
-    uncertainty: bool = False
+    #: Scenes with uncertain numbers, by name.
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.
     left_out: tuple[str, ...] = ()
     judged: bool = True
-    #: Whether each scene's figure for a paper is drawn.
-    print_figures: bool = False
 
     @cached_property
     def _judged(self) -> dict[tuple[str, str], list[Place]]:
@@ -247,7 +245,7 @@ class Suite:
     def required(self, scene: str, model: str) -> dict[Place, Kind]:
         """The checks of a cell, with their kinds: those required or given a tolerance."""
         own = self.suite_of(scene)
-        require = own.require
+        require = own.given.require
         if scene in own.ensembles:
             require = Require(difference=require.ensemble)
         places = [
@@ -341,18 +339,14 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     return Suite(
         name=path.stem,
         path=path,
-        description=given.description,
+        given=given,
         reference=given.reference,
         model_form=given.model_form,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
-        require=given.require,
-        limits=given.limits,
         tolerances=_tolerances(tolerances_path, tables, scenes, models),
         tolerances_path=tolerances_path,
-        uncertainty=given.uncertainty,
-        print_figures=given.print_figures,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
         left_out=tuple(left_out),
     )
@@ -463,35 +457,28 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
         for name in given.include
     ]
-    scenes: dict[str, Scene] = {}
-    ensembles: dict[str, tuple[Ensemble, Scene]] = {}
-    models: dict[str, ModelVariant] = {}
+    names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
+    for name in (name for name, count in names.items() if count > 1):
+        raise InputError(f"scene {name!r} is in two of the suites", "include")
     for suite in included:
-        for name in {*suite.scenes, *suite.ensembles} & {*scenes, *ensembles}:
-            raise InputError(f"scene {name!r} is in two of the suites", "include")
         if suite.reference != included[0].reference:
             raise InputError(
                 f"{suite.name} and {included[0].name} have different references", "include"
             )
-        scenes |= suite.scenes
-        ensembles |= suite.ensembles
-        models |= suite.models
+    whole: dict[str, Any] = {
+        what: {key: one for suite in included for key, one in getattr(suite, what).items()}
+        for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
+    }
     return Suite(
         name=path.stem,
         path=path,
-        description=given.description,
+        given=given,
         reference=included[0].reference,
         model_form=next((suite.model_form for suite in included if suite.model_form), ""),
-        scenes=scenes,
-        ensembles=ensembles,
-        models=models,
-        require=Require(),
-        limits=given.limits,
-        tolerances={place: line for suite in included for place, line in suite.tolerances.items()},
         tolerances_path=path,
-        uncertain={name: scene for suite in included for name, scene in suite.uncertain.items()},
         left_out=tuple(name for suite in included for name in suite.left_out),
         included=tuple(included),
+        **whole,
     )
 
 
