@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import csv
 import importlib.util
-import json
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -88,25 +87,3 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     )
     assert len(rows) == 2 * 2 * 8  # components, directions, intensities
     assert {row["record"] for row in rows} == {"station 360 deg", "station 90 deg"}
-
-
-def test_a_folder_of_24_files_in_eight_formats_shakes_the_rack(type_):
-    made = makers()
-    Path("records").mkdir()
-    assert len(made.folder_of_records(Path("records"))) == 24
-    type_("new rack.toml")
-    told = json.loads(type_("assess rack.toml records --levels 0.1:0.6:3 --json"))
-    assert len(told["left_out"]) == 8
-    assert all("U-D" in name for name in told["left_out"])
-    assert len(told["tables"]["motions"]) == 16
-    for record in told["tables"]["motions"]:
-        (peak,) = (abs(peak) for name, peak in made.PEAKS.items() if name in record["motion"])
-        assert record["own"] == pytest.approx(peak, abs=3e-4), record["motion"]
-    least = [
-        row for row in told["tables"]["ida"] if row["direction"] == 1 and row["intensity"] == 0.1
-    ]
-    # Every format holds one motion, so that the block does the same under all of them (K-NET's
-    # takes out its mean).
-    for component in ("N-S", "E-W"):
-        peaks = [row["peak_rotation_alpha"] for row in least if component in row["record"]]
-        assert peaks == pytest.approx([peaks[0]] * 8, abs=5e-3)

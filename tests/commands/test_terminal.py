@@ -263,15 +263,6 @@ def test_the_time_left_counts_what_is_done_here(monkeypatch, capsys):
     assert 60 * int(minutes) + int(seconds) >= 39
 
 
-@pytest.mark.parametrize(
-    ("name", "page"),
-    [("assess", "index.html"), ("spectrum", "index.html"), ("validate", "index.html")],
-)
-def test_the_help_names_the_page_that_is_written(name, page, capsys):
-    main([name, "--help"])
-    assert f"the page to open is {page} in it" in " ".join(capsys.readouterr().out.split())
-
-
 def test_on_a_terminal_colour_progress_and_its_width():
     main(["new", "mine.toml", "-q"])
     said = on_a_terminal(

@@ -16,7 +16,7 @@ from loaded import RACK, G, random_scene, scene_of
 from scipy.integrate import quad, solve_ivp
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Record, Rest, Ricker, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import Block, Record, Ricker, Scene, Sine, Wall, kinematics
 
 
 class Lagrangian:
@@ -269,4 +269,3 @@ def test_unilateral_walls_conserve_momentum_about_the_right_corners():
     assert history.channels["mode"][-1] == "lean"
     theta, x = float(history.channels["theta"][-1]), float(history.channels["x"][-1])
     assert kinematics.wall_gap(scene, "left", x, theta) == pytest.approx(0.0, abs=1e-9)
-    assert isinstance(scene.vertical, Rest)

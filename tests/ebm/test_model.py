@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -192,12 +190,3 @@ def test_restitution_of_one_and_walls_that_touch():
         hits = [e.t for e in history.event_list if e.kind == "wall impact"]
         np.testing.assert_allclose(hits, [0.3, 0.7, 1.1, 1.5, 1.9], rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(np.abs(history.channels["x_dot"]), 1.0, rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("package", ["ebm", "scenes", "cm"])
-def test_import_is_light(package):
-    """Importing a package loads neither the compiler, nor tables, nor pictures, nor engines."""
-    heavy = "{'numba', 'pandas', 'matplotlib', 'mujoco', 'pybullet', 'scipy'}"
-    code = f"import sys, {package}; print(sorted({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "[]"

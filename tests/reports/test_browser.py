@@ -132,7 +132,6 @@ def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
     box = page.locator("#plots .u-over").nth(3)
     box.scroll_into_view_if_needed()
     place = box.bounding_box()
-    assert place is not None
     y = place["y"] + place["height"] / 2
     page.mouse.move(place["x"] + 0.25 * place["width"], y)
     page.mouse.down()
@@ -207,7 +206,6 @@ def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
         "(m => rockcheckPage.store.at(m, 'theta', rockcheckPage.store.time))(rockcheck.models[0])"
     )
     angle = re.search(r"rotate\((\S+)\)", block.get_attribute("transform") or "")
-    assert angle is not None
     assert float(angle[1]) == pytest.approx(
         expected * page.evaluate("rockcheck.alpha") * 180.0 / 3.141592653589793
     )
@@ -378,7 +376,6 @@ def test_a_measured_history_is_dots(
     )
     table.save(tmp_path / "histories" / "table.csv")
     cell = finished.cell("free", "cm")
-    assert cell is not None
     cells = (
         cell.model_copy(update={"model": "table", "history": "histories/table.csv"}),
         *finished.cells,

@@ -60,7 +60,6 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
     canvas = page.locator(".panel canvas").nth(panel)
     canvas.scroll_into_view_if_needed()
     box = canvas.bounding_box()
-    assert box is not None
     wide, high = box["width"] - 48.0, box["height"] - 30.0
     return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (
         1.0 - (row + 0.5) / SIZE

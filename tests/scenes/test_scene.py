@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Block, Floor, InputError, Scene, Sine, Wall, kinematics
+from rockcheck.scenes import Block, Floor, InputError, Scene, Wall, kinematics
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -355,23 +355,3 @@ def test_replace_validates():
     assert scene().replace(duration=2.0).duration == 2.0
     with pytest.raises(InputError, match=r"^duration: -1.0 is not allowed"):
         scene().replace(duration=-1.0)
-
-
-def test_mirrored():
-    made = scene(
-        initial_rotation=-0.02,
-        initial_angular_velocity=0.1,
-        initial_velocity=-0.3,
-        vertical=Sine(amplitude=1.0, period=0.3),
-    )
-    image = made.mirrored()
-    assert image.wall("right").gap == 0.053
-    assert image.wall("left") is None
-    assert image.excitation.amplitude == -6.0
-    assert image.vertical == made.vertical
-    assert (image.initial_rotation, image.initial_angular_velocity, image.initial_velocity) == (
-        0.02,
-        -0.1,
-        0.3,
-    )
-    assert image.mirrored() == made
