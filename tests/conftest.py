@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import Event, History
 from rockcheck.scenes.errors import NotInstalled
 from rockcheck.validation.execute.models import not_installed
@@ -107,6 +109,36 @@ def pytest_make_collect_report() -> Iterator[None]:
 def but_progress() -> Callable[[str], list[str]]:
     """The lines on stderr that do not say how far a long work is: on a slow machine any is long."""
     return lambda err: [line for line in err.splitlines() if not HOW_FAR.search(line)]
+
+
+@pytest.fixture
+def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
+    """What a command says on stdout and stderr, once its exit code is as expected."""
+
+    def say(*words: str, code: int = 0) -> tuple[str, str]:
+        capsys.readouterr()
+        assert main(list(words)) == code
+        return capsys.readouterr()
+
+    return say
+
+
+@pytest.fixture
+def told(typed: Callable[..., tuple[str, str]]) -> Callable[..., Any]:
+    """What a command says as JSON."""
+    return lambda *words, code=0: json.loads(typed(*words, "--json", code=code)[0])
+
+
+@pytest.fixture
+def refused(typed: Callable[..., tuple[str, str]]) -> Callable[..., str]:
+    """The one line on stderr of a command that refuses what it is given."""
+
+    def say(*words: str) -> str:
+        (line,) = typed(*words, code=2)[1].splitlines()
+        assert line.startswith("rockcheck: ")
+        return line
+
+    return say
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ def lean(offset: str) -> None:
 
 
 @pytest.mark.usefixtures("in_an_empty_folder")
-def test_a_better_step_passes_and_is_accepted_without_a_reason(capsys):
+def test_a_better_step_passes_and_is_accepted_without_a_reason(typed):
     """The peak falls from 3.1e-4 to 7.7e-5 alpha, nearer to that of a reference that stands: to
     which no ratio is defined."""
     lean("8e-5")
@@ -42,9 +42,7 @@ def test_a_better_step_passes_and_is_accepted_without_a_reason(capsys):
     assert "peak_ratio" not in first
     assert main(["validate", *WORDS, "--no-report", "--strict"]) == 0
     lean("2e-5")
-    capsys.readouterr()
-    assert main(["validate", *WORDS, "--no-report", "--strict"]) == 0
-    out = capsys.readouterr().out
+    out = typed("validate", *WORDS, "--no-report", "--strict")[0]
     assert "verdict: pass" in out
     for better in ("theta_rms against still", "peak_rotation", "last_rotation"):
         assert f"short, leans: {better}: 7.67" in out
@@ -52,13 +50,9 @@ def test_a_better_step_passes_and_is_accepted_without_a_reason(capsys):
     assert main(["validate", "--strict", *WORDS, "--no-report"]) == 0, (
         "the suite is no value of --strict"
     )
-    capsys.readouterr()
-    assert main(["accept", *WORDS]) == 0
-    out = capsys.readouterr().out
+    out = typed("accept", *WORDS)[0]
     assert out.count(": tightened: ") == 3
     assert main(["validate", *WORDS, "--no-report", "--strict", "both"]) == 0
     lean("8e-5")
     assert main(["validate", *WORDS, "--no-report"]) == 1, "back where it was is worse"
-    capsys.readouterr()
-    assert main(["accept", *WORDS]) == 1
-    assert "--reason" in capsys.readouterr().out
+    assert "--reason" in typed("accept", *WORDS, code=1)[0]

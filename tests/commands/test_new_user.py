@@ -11,7 +11,6 @@ from types import ModuleType
 
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.scenes import load_scene
 from rockcheck.validation.suite.results import Run
 
@@ -32,16 +31,15 @@ def makers() -> ModuleType:
 
 
 @pytest.fixture
-def type_(capsys, but_progress):
+def type_(typed, but_progress):
     """Types a command, which must end well; what it said on stdout."""
 
-    def typed(line: str) -> str:
-        assert main(line.split()) == 0
-        heard = capsys.readouterr()
-        assert but_progress(heard.err) == []
-        return str(heard.out)
+    def line(words: str) -> str:
+        out, err = typed(*words.split())
+        assert but_progress(err) == []
+        return out
 
-    return typed
+    return line
 
 
 @pytest.mark.long

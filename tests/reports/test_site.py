@@ -265,7 +265,7 @@ def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) 
 
 
 def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
-    tmp_path: Path, finished: Run, capsys
+    tmp_path: Path, finished: Run, refused
 ) -> None:
     """The page of a scene without them says how to get one, and the command draws it: the same
     figure."""
@@ -305,7 +305,6 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
         == 0
     )
     assert (tmp_path / "other.svg").read_bytes() != drawn
-    capsys.readouterr()
     for words, said in (
         (
             ["--scene", "nowhere", "-o", "one.pdf"],
@@ -325,8 +324,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
             "--against: an ensemble's figure shows differences from its reference",
         ),
     ):
-        assert main(["report", str(tmp_path), *words]) == 2
-        assert said in capsys.readouterr().err
+        assert said in refused("report", str(tmp_path), *words)
 
 
 def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:

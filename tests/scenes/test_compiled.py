@@ -20,7 +20,6 @@ import numpy as np
 import pytest
 
 from rockcheck import ebm
-from rockcheck.commands.cli import main
 from rockcheck.commands.warm import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
@@ -367,12 +366,10 @@ def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
 
 
 @pytest.mark.long
-def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
+def test_what_is_compiled_ahead_is_not_compiled_again(typed):
     """`rockcheck warm` covers what commands need; a second time all of it is there."""
-    assert main(["warm"]) == 0
-    assert "the continuous model" in capsys.readouterr().out
-    assert main(["warm", "--json", "--jobs", "1"]) == 0
-    said = capsys.readouterr()
+    assert "the continuous model" in typed("warm")[0]
+    said = typed("warm", "--json", "--jobs", "1")
     assert list(json.loads(said.out)["seconds"]) == list(PARTS)
     assert said.err == ""
     code = (

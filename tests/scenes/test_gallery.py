@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import History, Scene, load_scene, named_scenes
 from rockcheck.scenes.excitations import Ricker
@@ -25,10 +24,9 @@ def hits(history: History) -> int:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_each_stands_in_the_list_and_on_the_page_with_a_line(name, capsys):
+def test_each_stands_in_the_list_and_on_the_page_with_a_line(name, typed):
     description = load_scene(name).description
-    assert main(["scenes"]) == 0
-    listed = " ".join(capsys.readouterr().out.split())
+    listed = " ".join(typed("scenes")[0].split())
     assert f"{name} {description}" in listed
     page = (Path(__file__).parents[2] / "docs" / "gallery.md").read_text(encoding="utf-8")
     assert f"| `{name}` |" in page

@@ -4,7 +4,6 @@ maps."""
 from __future__ import annotations
 
 import csv
-import json
 from collections import Counter
 
 import numpy as np
@@ -225,11 +224,10 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
         )
 
 
-def test_the_command(tmp_path, capsys):
+def test_the_command(tmp_path, told):
     """All that a run has is in its files."""
     words = ["--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--seed", "4"]
-    assert main(["stress", "runs", "--model", "ebm", *words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = told("stress", "runs", "--model", "ebm", *words)
     assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
     assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
     assert "| ebm | " in (tmp_path / "summary.md").read_text()

@@ -242,24 +242,21 @@ def written_by(folder, histories, names, units):
         frame.to_csv(folder / f"{name}.csv", index=False)
 
 
-def test_another_program_takes_part_by_files(exported, histories, tmp_path, capsys):
+def test_another_program_takes_part_by_files(exported, histories, tmp_path, told):
     names = {"t": "t_s", "x": "x_mm", "y": "y_m", "theta": "theta_deg"}
     written_by(exported, histories, names, [1.0, 1e3, 1.0, 180.0 / math.pi])
     words = ["conformance", "--histories", str(exported), "--out", str(tmp_path / "out")]
-    words += ["--json", "--jobs", "1"]
-    assert main(words) == 0
-    (card,) = json.loads(capsys.readouterr().out)["cards"]
+    words += ["--jobs", "1"]
+    (card,) = told(*words)["cards"]
     assert (card["engine"], card["settings"]) == ("my engine", "as it comes")
     assert (card["counts"]["pass"], card["counts"]["total"]) == (len(PHENOMENA) - 1, len(PHENOMENA))
     (exported / "coast.csv").unlink()
-    assert main(words) == 1
-    (card,) = json.loads(capsys.readouterr().out)["cards"]
+    (card,) = told(*words, code=1)["cards"]
     assert [row["id"] for row in card["phenomena"] if row["verdict"] == "error"] == ["RC-05"]
 
 
 @pytest.mark.parametrize("units", [[1.0, 1e3, 1.0, 1.0], [1e3, 1.0, 1.0, 1.0], [1, 1, 1, 57.3]])
 def test_a_column_in_other_units_is_told(exported, histories, units):
-    # t in ms, y in mm, theta in degrees, none of them named so: no figure of it is believed.
     names = {"t": "t_s", "y": "y_m", "x": "x_m", "theta": "theta_rad"}
     written_by(exported, histories, names, units)
     rows = played(written(exported)).table("rows").records()
@@ -289,16 +286,13 @@ def test_a_column_in_other_units_is_told(exported, histories, units):
         (["--tune", "0.5", "--set", "step=1"], "'step'"),
     ],
 )
-def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, capsys):
+def test_wrong_input_is_one_line(arguments, words, tmp_path, monkeypatch, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "engine.toml").write_text('engine = "mine"\ncolour = "red"\n', encoding="utf-8")
-    assert main(["conformance", *arguments]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert words in line
+    assert words in refused("conformance", *arguments)
 
 
-def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
-    # A fault in it costs what needs it only; its settings are named; it is played once.
+def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, told, refused):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "halfway.py").write_text(
         "from pathlib import Path\nfrom typing import ClassVar\n"
@@ -314,8 +308,7 @@ def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
     )
     own = ["conformance", "--engine", "halfway:Halfway", "--allow-code", "halfway:Halfway"]
     flawed = [*own, "--set", "cone_correction=false", "--jobs", "1"]
-    assert main([*flawed, "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
+    found = told(*flawed, code=1)
     (card,) = found["cards"]
     assert (card["version"], card["settings"]) == ("7", "as it comes, cone_correction=False")
     failed = {row["id"]: row["verdict"] for row in card["phenomena"] if row["verdict"] != "pass"}
@@ -326,5 +319,4 @@ def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, capsys):
     assert main([*flawed, "--quiet"]) == 1
     scenes = (tmp_path / "played").read_text(encoding="utf-8").splitlines()
     assert (scenes.count("coast"), scenes.count("rest"), scenes.count("uplift")) == (2, 1, 1)
-    assert main([*own, "--set", "colour=red"]) == 2
-    assert "colour" in capsys.readouterr().err
+    assert "colour" in refused(*own, "--set", "colour=red")

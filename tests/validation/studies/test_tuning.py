@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import json
-
 import mujoco
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.models import engine_names, not_installed
 from rockcheck.validation.studies.conformance.tuning import KNOBS, Knob, Tune, Tuning
@@ -64,10 +61,9 @@ def test_mujocos_parameters_do_it_in_a_file_that_owes_nothing_else_to_rockcheck(
     assert max(heights[400:]) == pytest.approx(0.25 * 0.5, abs=0.01)
 
 
-def test_the_command(tmp_path, capsys):
+def test_the_command(tmp_path, told):
     words = ["conformance", "--tune", "0.5", "--engine", "mujoco", "--out", str(tmp_path)]
-    assert main([*words, "--set", "penetration=1e-6", "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
+    found = told(*words, "--set", "penetration=1e-6", code=1)
     assert found["engines"]["mujoco"]["reached"] is False
     assert {row["where"] for row in found["tables"]["parameters"]} == KNOBS["mujoco"].words.keys()
     assert (tmp_path / "tuned" / "index.html").is_file()
