@@ -16,9 +16,13 @@ import numpy as np
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import Event, History
+from rockcheck.scenes import Block, Event, History
 from rockcheck.scenes.errors import NotInstalled
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import not_installed
+
+# What tests of several folders share beside fixtures.
+sys.path.insert(0, str(Path(__file__).parent / "ebm"))
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -103,6 +107,12 @@ def pytest_make_collect_report() -> Iterator[None]:
     report = yield
     _judged(report)
     return report
+
+
+@pytest.fixture(scope="session")
+def block() -> Block:
+    """The paper's block, alpha = 0.25."""
+    return PAPER_BLOCK
 
 
 @pytest.fixture

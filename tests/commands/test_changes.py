@@ -1,8 +1,6 @@
 """What changed: `rockcheck compare` between two finished runs, and `validate --history` over
 many."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

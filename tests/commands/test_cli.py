@@ -1,7 +1,5 @@
 """The command line: exit codes, and errors of the user as one line without a traceback."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Exit codes mean one thing each: whoever reads what is said, and whatever goes wrong inside."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,8 +1,6 @@
 """What a user types on the first day with a block, a wall and a test of one's own: what goes wrong
 is named, and mended by what is said."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

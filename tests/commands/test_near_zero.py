@@ -1,8 +1,6 @@
 """A model that comes nearer to its reference, where next to nothing rotates: from `accept` over
 `validate --strict` to `accept`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,8 +1,6 @@
 """A new user: an own block, an own wall and a record of three components, to a report with several
 models and an IDA curve."""
 
-from __future__ import annotations
-
 import csv
 import importlib.util
 import sys

@@ -1,8 +1,6 @@
 """Nothing that is read is run: a model of the user's own is imported only where the command line
 allows it, and only by a worker."""
 
-from __future__ import annotations
-
 import ast
 import os
 import shutil

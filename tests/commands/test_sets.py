@@ -1,8 +1,6 @@
 """Sets of records: one scene by all models under each of them, however the files are named; nothing
 is judged."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 """The terminal: help with examples, --quiet, --json, progress, width, colour, completion, new scene
 files, nearest names."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

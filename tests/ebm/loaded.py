@@ -1,7 +1,5 @@
 """Blocks that are not homogeneous, and scenes of them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall

@@ -1,7 +1,5 @@
 """Runs of the event core, as its parts take them, for tests that call these one by one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +11,7 @@ from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
 from rockcheck.ebm.packed import pack, state_for
-from rockcheck.scenes import Block, Scene
+from rockcheck.scenes import Block, History, Scene, kinematics
 
 
 def nothing() -> Records:
@@ -60,6 +58,15 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     records = Records(*(part[None] for part in nothing()))
     march.play(packed.rows, states, work or workspace(), records, np.empty(1, FOUND))
     return states[0]
+
+
+def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) -> None:
+    """Finite rows, and no corner by more than `reach` m in the floor or in a wall."""
+    x, y, theta = (history.channels[name] for name in ("x", "y", "theta"))
+    assert np.all(np.isfinite([x, y, theta]))
+    assert np.min(kinematics.pivot_height(scene.block, y, theta)) > -reach
+    for wall in scene.walls:
+        assert np.min(kinematics.wall_gap(scene, wall.side, x, theta)) > -reach
 
 
 TILTED = {"family": Family.TILT, "pull": 1}

@@ -1,7 +1,5 @@
 """The error falls with the tolerance, and does not depend on what ran before."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

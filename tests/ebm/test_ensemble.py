@@ -1,7 +1,5 @@
 """Histories of many scenes at once are those of one at a time, to the bit."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Impacts of random blocks, homogeneous or loaded, against the balances of momentum and the laws of
 restitution and friction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ The other side is written from the positions of corners and mass's centre in the
 matrices; it shares nothing with the models but the scene.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

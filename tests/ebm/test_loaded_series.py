@@ -1,7 +1,5 @@
 """The series of loaded blocks against Newton and Euler."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the event-based models accept, refuse and report."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -40,6 +38,17 @@ def scene_of(**change: object) -> Scene:
             {"pivot": "unilateral"},
             {"floor": Floor(friction=0.3, restitution=1.0)},
             "floor.restitution: 1 is not allowed",
+        ),
+        ({"friction": "no-slip"}, {"initial_velocity": 0.1}, "initial_velocity"),
+        (
+            {"friction": "bouc-wen"},
+            {"floor": Floor(friction=0.3, static_friction=0.4)},
+            "floor.static_friction",
+        ),
+        (
+            {"friction": "bouc-wen"},
+            {"floor": Floor(friction=0.3, restitution=0.2)},
+            "floor.restitution",
         ),
     ],
 )

@@ -1,14 +1,11 @@
 """Overturning spectra: against reference runs at their nodes, refinement against the full grid,
 records, and bad input."""
 
-from __future__ import annotations
-
-import csv
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
 import pytest
+from cases import BILATERAL
 
 from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
@@ -17,7 +14,6 @@ from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-DATA = Path(__file__).parents[1] / "data" / "ebm_ricker_cases.csv"
 SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 
@@ -34,13 +30,12 @@ def scene(*walls, friction=0.3, excitation=None):
 
 
 def reference_runs():
-    with DATA.open(encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
-
     def setting(row):
         return row["side"], row["gap"], row["e_w"], row["mu"]
 
-    return [(key, list(group)) for key, group in groupby(sorted(rows, key=setting), key=setting)]
+    return [
+        (key, list(group)) for key, group in groupby(sorted(BILATERAL, key=setting), key=setting)
+    ]
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,12 @@
 """How far the engines are from exact motions, and at which order they come nearer."""
 
-from __future__ import annotations
-
-import csv
-import math
-from pathlib import Path
-
 import numpy as np
 import pytest
+from cases import UNAMBIGUOUS, peak_errors
 
 from rockcheck.engines import MuJoCo, PyBullet
-from rockcheck.scenes import Floor, Ricker, Scene, Wall
+from rockcheck.scenes import Wall
 
-CASES = Path(__file__).parents[1] / "data" / "unilateral_ricker_cases.csv"
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
 PULSES = (
     (1.5, 3.0),
@@ -97,63 +91,20 @@ def test_a_stock_engine_is_far_off(stock, free_rocking, rotation_error):
     assert rotation_error(stock(time_step=2e-4).simulate(scene).channels["theta"], scene) < 1e-3
 
 
-def cases(every: int) -> list[dict[str, str]]:
-    """Rows of the table of an independent event-driven implementation, those left out where rigid
-    bodies have no answer."""
-    with CASES.open(encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if row["depends_on_rule"] == "0"]
-    return rows[::every]
-
-
-def peak_errors(engine, block, rows) -> list[float]:
-    """Errors of the peak of |theta|, in alpha, of the runs that end safe; asserts all outcomes."""
-    errors = []
-    for row in rows:
-        period = 2 * math.pi / (float(row["wp_over_p"]) * block.frequency_parameter)
-        walls = (
-            []
-            if row["side"] == "none"
-            else [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
-        )
-        scene = Scene(
-            name="case",
-            block=block,
-            floor=Floor(friction=float(row["mu"])),
-            walls=walls,
-            excitation=Ricker(
-                amplitude=float(row["ap_ratio"]) * 9.81 * math.tan(block.alpha), period=period
-            ),
-            duration=4 * period + 20.0,
-            output_step=1e-3,  # peaks at a wall are sharp
-        )
-        history = engine.simulate(scene)
-        outcome = {"overturned left": "ccw", "overturned right": "cw"}.get(history.outcome, "safe")
-        assert outcome == row["outcome"], row
-        if outcome == "safe":
-            errors.append(
-                abs(history.peak_rotation / block.alpha - float(row["peak_theta_over_alpha"]))
-            )
-    return errors
-
-
-def test_walls_and_slip(varying_engine, block):
+@pytest.mark.parametrize(
+    ("every", "least", "bounds"),
+    [
+        (41, 7, {0.5: 2e-5, 1.0: 5e-4}),
+        pytest.param(5, 60, {0.5: 1e-5, 0.95: 1.5e-4, 1.0: 1e-3}, marks=pytest.mark.slow),
+    ],
+)
+def test_walls_and_slip(varying_engine, every, least, bounds):
     """Outcomes and peaks beside walls with e = 0, 0.5 and 1, with and without slip."""
-    errors = peak_errors(
-        varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=41)
-    )
-    assert len(errors) >= 7
-    assert np.median(errors) < 2e-5
-    assert np.max(errors) < 5e-4
-
-
-@pytest.mark.slow
-def test_walls_and_slip_throughout(varying_engine, block):
-    errors = peak_errors(
-        varying_engine(time_step="adaptive", largest_step=2e-3), block, cases(every=5)
-    )
-    assert np.median(errors) < 1e-5
-    assert np.quantile(errors, 0.95) < 1.5e-4
-    assert np.max(errors) < 1e-3
+    engine = varying_engine(time_step="adaptive", largest_step=2e-3)
+    errors, missed = peak_errors(engine, UNAMBIGUOUS[::every], rest=20.0, output_step=1e-3)
+    assert missed == []
+    assert len(errors) >= least
+    assert all(np.quantile(errors, share) < bound for share, bound in bounds.items())
 
 
 def test_the_engines_agree(pulse):

@@ -1,7 +1,5 @@
 """Settings, events, notes, failures and everything else that a user of an engine relies on."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

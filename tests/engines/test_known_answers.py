@@ -1,7 +1,5 @@
 """Scenes with a known answer, which each engine that is installed meets at its own tolerance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

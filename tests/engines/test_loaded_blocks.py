@@ -1,8 +1,6 @@
 """A block whose mass lies low and to the right, by every model: two pivots, slip, a wall on either
 side."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Engines in single precision: how near they come, what they cannot do, and what they do as they
 come."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """What CI installs and what a night tells: the lock file, `.ci/nightly.py`, and the page that shows
 its last results."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import re

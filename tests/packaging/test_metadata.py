@@ -1,8 +1,6 @@
 """What goes into the wheel, and what it needs. That it installs and runs elsewhere is what
 `.ci/wheel` shows."""
 
-from __future__ import annotations
-
 import ast
 import importlib
 import re

@@ -1,8 +1,6 @@
 """What is skipped in CI is a failure, unless `tests/conftest.py` lists its reason: the hook, in a
 pytest of its own."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The pages in a real browser, opened from the file system."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Callable

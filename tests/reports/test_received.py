@@ -1,8 +1,6 @@
 """A run's folder that somebody sent: nothing of it is written through, waited for, or shown as
 anything but text."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,8 +1,6 @@
 """Pages of a finished run: complete, escaped, offline; the scene file plays the same scene; figures
 are reproducible."""
 
-from __future__ import annotations
-
 import re
 from html.parser import HTMLParser
 from pathlib import Path

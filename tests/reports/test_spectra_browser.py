@@ -1,8 +1,6 @@
 """The pages of spectra, fragility and incremental dynamic analysis in a real browser: hover, click,
 keys, accessibility."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace

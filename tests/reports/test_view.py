@@ -1,7 +1,5 @@
 """What is shown of a scene: its data, its figures, and what is read off them."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

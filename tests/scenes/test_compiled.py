@@ -1,8 +1,6 @@
 """The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own,
 and whole."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os

@@ -1,8 +1,6 @@
 """The scenes that are not the paper's teach what their description, and docs/gallery.md, says they
 do: played by the reference."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Histories: tables, saving and loading, and files that are not histories."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

@@ -1,8 +1,6 @@
 """Numbers that are not known exactly: how they are distributed, what is refused, where they stand
 in a scene."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

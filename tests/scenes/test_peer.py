@@ -1,7 +1,5 @@
 """PEER files: numbers that run together, and the units that a header may spell."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

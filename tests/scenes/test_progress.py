@@ -1,8 +1,6 @@
 """Threads that run kernels: what a call gives, and what Ctrl-C leaves of it; and what workers
 announce."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

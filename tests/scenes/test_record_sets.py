@@ -1,8 +1,6 @@
 """Sets of recorded motions: which files are meant, which components shake a block, and which
 vertical one goes with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Records as tables: what is read of them, what has to be told, and how their times are judged."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """Records as they come: one motion of three components, whose peaks are known, in every format that
 is read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass

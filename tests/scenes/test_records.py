@@ -1,7 +1,5 @@
 """Readers of recorded ground motions: what they read, and how they name what is wrong."""
 
-from __future__ import annotations
-
 from importlib import metadata
 from pathlib import Path
 

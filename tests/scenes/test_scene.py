@@ -1,7 +1,5 @@
 """Scenes: what they accept, what they refuse, what follows from them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ They are pinned as scene files with every digit: a new draw of the generator or 
 changes none of them.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

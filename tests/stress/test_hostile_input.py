@@ -6,8 +6,6 @@ shape that a valid one has; `fuzz.py` beside this file makes a hundred thousand 
 follows which lines of the readers they reach.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import gzip

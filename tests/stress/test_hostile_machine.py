@@ -4,8 +4,6 @@ Ctrl-C.
 Each time: a clear end in one line, nothing that was computed is lost, and the next run is right.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import signal

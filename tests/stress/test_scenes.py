@@ -1,7 +1,5 @@
 """The scenes of the stress study: what a seed gives, and what occurs among them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 """The stress study: its work, what its runs add up to, failures with their smallest scenes,
 maps."""
 
-from __future__ import annotations
-
 import csv
 from collections import Counter
 

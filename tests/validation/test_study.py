@@ -1,8 +1,6 @@
 """The shape of every study: what the one runner does for a made-up one, and that the real ones have
 the shape."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import replace

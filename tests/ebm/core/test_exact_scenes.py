@@ -1,16 +1,15 @@
 """Round numbers, ties and motions as small as noise: what once found no mode, no impact or went
 through a wall now runs, contacts held."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
 import pytest
+from stepping import assert_contacts_hold
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import rules
-from rockcheck.scenes import Block, Floor, Record, Scene, Wall, kinematics, load_scene
+from rockcheck.scenes import Block, Floor, Record, Scene, Wall, load_scene
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -88,11 +87,7 @@ SCENES = {
 
 def played(scene: Scene, **settings: object) -> None:
     history = EventBasedModel(**settings).simulate(scene)
-    motion, reach = history.channels, 1e-9 * scene.block.radius
-    assert all(np.all(np.isfinite(motion[name])) for name in ("x", "y", "theta"))
-    assert np.min(kinematics.pivot_height(scene.block, motion["y"], motion["theta"])) > -reach
-    for wall in scene.walls:
-        assert np.min(kinematics.wall_gap(scene, wall.side, motion["x"], motion["theta"])) > -reach
+    assert_contacts_hold(scene, history, 1e-9 * scene.block.radius)
 
 
 #: A pivot that never slips does not start with slip.

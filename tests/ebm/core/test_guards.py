@@ -1,7 +1,5 @@
 """The guards of a mode and the series that they follow, against Newton and Euler."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,8 +1,6 @@
 """What the impact laws decide: the branches of the wall cascade, the energy cap, and when a block
 lies still."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 

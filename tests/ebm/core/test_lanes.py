@@ -1,8 +1,6 @@
 """Lanes: the compiled code does what the plain functions say, to the bit; polynomials in two
 halves."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

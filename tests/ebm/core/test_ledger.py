@@ -1,8 +1,6 @@
 """The event core stays small: few numbers, one zero of a kind, few modelling choices with a home
 and a paragraph each; short functions."""
 
-from __future__ import annotations
-
 import ast
 import collections
 import enum

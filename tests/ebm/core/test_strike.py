@@ -1,8 +1,6 @@
 """What an impact does to a block: onto its contact, landings, rebounds from walls, and the Zeno
 rule."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Closed forms against the event-based model, which must meet them, and scenes that have none."""
 
-from __future__ import annotations
-
 import pytest
 
 from rockcheck.ebm import EventBasedModel

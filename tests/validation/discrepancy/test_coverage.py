@@ -1,7 +1,5 @@
 """Printed intervals cover as often as they say: samples of known distributions, seeded."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

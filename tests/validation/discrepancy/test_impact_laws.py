@@ -1,7 +1,5 @@
 """Which law of impacts a history followed at a flush landing, or at a flat one."""
 
-from __future__ import annotations
-
 import pytest
 
 from rockcheck import engines

@@ -1,7 +1,5 @@
 """Measured histories: units by column, an offset in time, judged like a model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

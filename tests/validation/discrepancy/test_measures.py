@@ -1,7 +1,5 @@
 """Each measure against a case that can be worked out by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

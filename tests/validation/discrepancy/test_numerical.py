@@ -1,7 +1,5 @@
 """u_num on problems with a known answer."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """How sure a figure is: draws of inputs, repeats, verdicts."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The same spectra by the other models."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

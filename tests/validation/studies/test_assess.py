@@ -1,7 +1,5 @@
 """An assessment against a loop of one's own, and what it says."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math

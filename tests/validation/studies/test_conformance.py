@@ -1,7 +1,5 @@
 """Conformance cards: planted faults fail just what they should, and outside engines take part."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,8 +1,6 @@
 """Populations: what is scaled and played, what is said of a block that overturns, curves and
 fits."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Spectra as a study: tiles that are kept, the law of impacts, refinement, the other models, the
 command."""
 
-from __future__ import annotations
-
 import base64
 import io
 import json

@@ -1,7 +1,5 @@
 """An engine's own parameters for a wanted restitution: what is printed does what it says."""
 
-from __future__ import annotations
-
 import mujoco
 import pytest
 

@@ -1,8 +1,6 @@
 """The same cells on a Dask cluster of two local workers: the same run, and failures that stay in
 their cells."""
 
-from __future__ import annotations
-
 import shutil
 import sys
 from pathlib import Path

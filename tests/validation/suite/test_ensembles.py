@@ -1,8 +1,6 @@
 """Ensembles: drawing is repeatable, statistics are right on samples that are known, and a run holds
 them against tolerances."""
 
-from __future__ import annotations
-
 import math
 import shutil
 import sys

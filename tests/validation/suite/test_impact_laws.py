@@ -1,8 +1,6 @@
 """The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by
 the nearest law."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

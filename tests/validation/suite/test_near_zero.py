@@ -1,8 +1,6 @@
 """What is judged near zero: errors, quantities and counts, their floors, what is better, and ratios
 to nothing."""
 
-from __future__ import annotations
-
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path

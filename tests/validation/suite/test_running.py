@@ -1,8 +1,6 @@
 """Suites end to end: cells in workers that crash, hang and eat memory; results kept and read
 back."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math

@@ -1,7 +1,5 @@
 """The statistics of an ensemble against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import ttest_1samp

@@ -1,7 +1,5 @@
 """Tolerances: what passes, what has changed, what fails; and how `accept` may rewrite them."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from pathlib import Path

@@ -1,8 +1,6 @@
 """What is read back is not trusted: a result that was damaged, edited or exchanged is found, and
 played or compared again."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
