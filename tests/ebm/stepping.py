@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
 from rockcheck.ebm.packed import pack, state_for
-from rockcheck.scenes import Block, History, Scene, kinematics
+from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
 def nothing() -> Records:
@@ -75,3 +75,18 @@ ROCKS = TILTED | {"pivot": Pivot.STICK}
 
 def block_of(alpha: float, radius: float = 1.0) -> Block:
     return Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
+
+
+def setting_of(
+    block: float | Block,
+    friction: float = 0.5,
+    restitution: float = 0.0,
+    walls: Sequence[Wall] = (),
+    **how: Any,
+) -> Any:
+    """A block, or one of R = 1 m and this alpha, as the compiled code has it: free to hop."""
+    shape = block if isinstance(block, Block) else block_of(block)
+    floor = Floor(friction=friction, restitution=restitution)
+    scene = Scene(name="block", block=shape, floor=floor, walls=walls, duration=1.0)
+    free = {"unilateral": True, "no_slip": False, "energy_cap": False}
+    return natural.setting_of(scene, **free | how)

@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from stepping import play, six
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.core.state import workspace
 from rockcheck.scenes import Block, Floor, History, ModelFailure, Scene, Sine
 
 CASES = {
@@ -102,10 +104,6 @@ def test_a_run_leaves_no_trace(pivot, pulse_scene):
 
 def test_compiled_scratch_is_scratch(pulse_scene):
     """What the loop finds in its work arrays, however wild, does not matter."""
-    from stepping import play, six
-
-    from rockcheck.ebm.core.state import workspace
-
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     model = EventBasedModel(pivot="unilateral")
     found = []

@@ -14,6 +14,7 @@ from loaded import RACK, G, random_scene, scene_of
 from scipy.integrate import quad, solve_ivp
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import Block, Record, Ricker, Scene, Sine, Wall, kinematics
 
 
@@ -241,8 +242,6 @@ def test_the_homogeneous_block_is_the_symmetric_instance():
 def test_what_is_decided_early_is_what_comes():
     """Outcomes and peaks of 60 loaded blocks by a batch that stops when all is certain, and by runs
     to the end."""
-    from rockcheck.ebm.batch import pack, run_batch
-
     rng, model = np.random.default_rng(13), EventBasedModel(tolerance=1e-10)
     scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
     early = run_batch(pack(scenes, model), model, jobs=1)

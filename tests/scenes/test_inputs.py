@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import InputError
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.files import Spread, split, uncertain_scene, with_numbers
 
 
@@ -62,8 +62,6 @@ TABLES = {
 
 
 def made():
-    from rockcheck.scenes import Scene
-
     plain, spreads, _ = split(TABLES)
     return Scene(name="made", floor={"friction": 0.3}, **plain), spreads
 

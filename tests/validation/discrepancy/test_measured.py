@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.discrepancy.measured import (
@@ -103,8 +104,6 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")
     scene = load_suite(path).scenes["tilt"]
-    from rockcheck.ebm import EventBasedModel
-
     truth = EventBasedModel().simulate(scene)
     rows = truth.channels["t"] <= 1.6
     write(
