@@ -26,7 +26,7 @@ from rockcheck.reports.figures import (
 )
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import FORMATS, looks, save
+from rockcheck.reports.style import kind_of, looks, save, save_as
 from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError
@@ -73,13 +73,7 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
     `against`: the model whose differences a scene's figure shows, by default its first reference.
     Raises `InputError` for what the run does not have.
     """
-    kind = path.suffix.lower().removeprefix(".")
-    if kind not in FORMATS:
-        allowed = ", ".join(f".{one}" for one in FORMATS)
-        raise InputError(
-            f"{printable(path)}: a figure is written as {allowed}, not as"
-            f" {printable(path.suffix)!r}"
-        )
+    kind_of(path)
     pages = _Pages(folder, (name,))
     view = pages.views[name]
     if isinstance(view, EnsembleView):
@@ -87,14 +81,14 @@ def write_figure(folder: Path, name: str, path: Path, against: str | None = None
             raise InputError(
                 "an ensemble's figure shows differences from its reference", "--against"
             )
-        return save(figure_of(view.distributions()), path.with_suffix(""), [kind], named=True)[0]
+        return save_as(figure_of(view.distributions()), path)
     if against is not None and against not in view.histories:
         raise unknown_name("model with a history of this scene", against, view.histories)
     if not view.histories:
         raise InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
-    return save(histories_figure(view, against), path.with_suffix(""), [kind], named=True)[0]
+    return save_as(histories_figure(view, against), path)
 
 
 def write_site(

@@ -18,6 +18,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rockcheck.scenes import InputError
+from rockcheck.scenes.errors import printable
 from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute.provenance import digest
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 #: Widths of a text column and of a page of text in common journals, inches.
 COLUMN, PAGE = 3.5, 7.1
 FORMATS = ("svg", "png", "pdf")
+ENDINGS = ", ".join(f".{kind}" for kind in FORMATS)
 
 
 @dataclass(frozen=True)
@@ -169,6 +172,22 @@ def power_of_ten(value: float) -> str:
         if -1 <= exponent <= 3
         else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
     )
+
+
+def kind_of(path: Path) -> str:
+    """The format of a figure's file, one of `FORMATS`; raises `InputError` for another ending."""
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in FORMATS:
+        raise InputError(
+            f"{printable(path)}: a figure is written as {ENDINGS}, not as"
+            f" {printable(path.suffix)!r}"
+        )
+    return kind
+
+
+def save_as(figure: Figure, path: Path) -> Path:
+    """Write a figure into the file that the user chose; returns it."""
+    return save(figure, path.with_suffix(""), [kind_of(path)], named=True)[0]
 
 
 def save(

@@ -312,13 +312,17 @@ class History(Shown):
         )
 
 
-def check_format(path: Path) -> None:
-    """Raise `InputError` if no history can be written into a file of that name."""
+def check_format(path: Path, more: str = "") -> None:
+    """Raise `InputError` if no history can be written into a file of that name.
+
+    The message ends with `more` that is allowed.
+    """
     kind = path.suffix.lower()
     if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
         allowed = ".csv, .csv.gz, .json, .mat or .parquet"
         raise InputError(
-            f"{printable(path)}: a history is written as {allowed}, not as {printable(path.suffix)}"
+            f"{printable(path)}: a history is written as {allowed}, not as"
+            f" {printable(path.suffix)}{more}"
         )
     if kind == ".parquet" and not find_spec("pyarrow"):
         raise InputError(

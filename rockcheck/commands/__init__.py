@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from rockcheck.reports.style import FORMATS
+from rockcheck.reports.style import ENDINGS, kind_of, save_as
 from rockcheck.scenes import History, InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
@@ -81,7 +81,9 @@ class Played:
     scheduler: SchedulerOption = None
 
 
-PlotOption = Annotated[Path | None, typer.Option("--plot", metavar="FILE.png", help="PNG to draw.")]
+PlotOption = Annotated[
+    Path | None, typer.Option("--plot", metavar="FILE", help=f"Figure to draw: {ENDINGS}.")
+]
 
 #: All models that are installed.
 ALL = "all"
@@ -218,13 +220,8 @@ def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
         wait = EVERY
 
 
-def studied(
-    study: Study, options: Played, formats: Sequence[str] = FORMATS, **how: Any
-) -> NoReturn:
-    """Run a study with progress, write its page, print its finding; ends with its exit code.
-
-    `formats` are those of the page's figures.
-    """
+def studied(study: Study, options: Played, **how: Any) -> NoReturn:
+    """Run a study with progress, write its page, print its finding; ends with its exit code."""
     from rockcheck.validation.study import run
 
     folder = usable_folder(options.out)
@@ -237,14 +234,14 @@ def studied(
             on_progress=on_progress,
             **how,
         )
-    told(found, folder, formats)
+    told(found, folder)
 
 
-def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FORMATS) -> NoReturn:
+def told(found: Finding, folder: Path | None = None) -> NoReturn:
     """Write a finding's page if it has a folder, print the finding, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = folder and publish(found, folder, formats=formats)
+    page = folder and publish(found, folder)
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)
@@ -310,22 +307,19 @@ def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:
         return key, value
 
 
-def check_picture(path: Path | None) -> None:
-    """Raise `InputError` if no picture can be written into a file of that name."""
-    if path is None:
-        return
-    if path.suffix.lower() != ".png":
-        raise InputError(f"{printable(path)}: give a name that ends in .png", "--plot")
+def check_file(path: Path, option: str, check: Callable[[Path], Any] = kind_of) -> None:
+    """Raise `InputError` that names the `option` where a file of that name cannot be written.
+
+    `check` raises it for an ending that is not allowed, by default of a figure.
+    """
     if not path.parent.is_dir():
-        raise InputError(f"{printable(path.parent)}: no such folder", "--plot")
+        raise InputError(f"{printable(path.parent)}: no such folder", option)
+    check(path)
 
 
-def save_picture(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, and say so."""
-    from rockcheck.reports.style import save
-
-    (written,) = save(figure, path.with_suffix(""), ("png",), named=True)
-    console().print(f"picture: {written}", soft_wrap=True)
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a figure, and say so."""
+    console().print(f"figure: {save_as(figure, path)}", soft_wrap=True)
 
 
 def report_file(text: str) -> str:

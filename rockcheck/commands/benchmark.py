@@ -8,6 +8,9 @@ import typer
 
 from rockcheck.commands import OUT, JobsOption, OutOption, Played, one_of, studied, tell_missing
 
+#: Nothing begins later than this; what was left out begins with the next run.
+MINUTES = 25.0
+
 WhatArgument = Annotated[
     str,
     typer.Argument(
@@ -22,9 +25,6 @@ def run(
     out: OutOption = OUT / "benchmark",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings.")] = False,
     jobs: JobsOption = None,
-    minutes: Annotated[
-        float, typer.Option("--minutes", min=0.1, help="Start nothing later than this.")
-    ] = 25.0,
 ) -> None:
     """Run time against error, for every model.
 
@@ -34,4 +34,4 @@ def run(
 
     part: What = one_of("benchmark", what, get_args(What))
     tell_missing()
-    studied(WorkPrecision(part, quick), Played(out, jobs), minutes=minutes)
+    studied(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)

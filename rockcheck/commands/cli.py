@@ -62,6 +62,11 @@ GONE = {
     "ida": "rockcheck assess SCENE RECORDS --levels pga:0.05:2:40",
     "compare --offset": "--align SECONDS",
     "conformance --settings": "--set settings=best, default or both",
+    "compare --all": "--json has all that moved",
+    "simulate --plot": "-o FILE.png, beside -o FILE.csv",
+    "spectrum --force": "give another --out",
+    "assess --paper": "PNG and PDF are always written",
+    "benchmark --minutes": "it ends after 25 minutes, and goes on when called again",
 }
 #: Commands that are not listed.
 HIDDEN = ("warm",)

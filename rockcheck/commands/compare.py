@@ -10,9 +10,9 @@ import typer
 from rockcheck.commands import (
     PlotOption,
     answer,
-    check_picture,
+    check_file,
     console,
-    save_picture,
+    save_figure,
     scene_names,
     told,
 )
@@ -27,8 +27,6 @@ from rockcheck.validation.finding import Block, Column, Finding, Table, Text, te
 from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run
 
-#: Most moved figures that are listed without --all.
-SHOWN = 20
 #: Value of --align without a time.
 BEST = "best"
 
@@ -63,9 +61,6 @@ def run(
         ),
     ] = None,
     plot: PlotOption = None,
-    everything: Annotated[
-        bool, typer.Option("--all", help=f"Of two runs: all figures that moved, not only {SHOWN}.")
-    ] = False,
 ) -> None:
     """Compare two histories, or two finished runs.
 
@@ -83,8 +78,9 @@ def run(
         if study.wrote(reference):
             told(study.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
-        told(difference(Run.load(reference), Run.load(candidate), None if everything else SHOWN))
-    check_picture(plot)
+        told(difference(Run.load(reference), Run.load(candidate)))
+    if plot is not None:
+        check_file(plot, "--plot")
     what = load_scene(scene) if scene else None
     try:
         offset = 0.0 if align in (None, BEST) else float(align or 0.0)
@@ -135,7 +131,7 @@ def run(
     finding = Finding("comparison", models, "", blocks, data)
     document.show(finding, console())
     if plot is not None:
-        save_picture(found.plot(), plot)
+        save_figure(found.plot(), plot)
     answer(finding.as_dict())
 
 

@@ -10,10 +10,11 @@ import numpy as np
 import typer
 
 from rockcheck.commands import (
+    PlotOption,
     answer,
-    check_picture,
+    check_file,
     console,
-    save_picture,
+    save_figure,
     setting_of,
     tell_left_out,
 )
@@ -54,16 +55,15 @@ def run(
         typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".'),
     ],
     read: ReadOption = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", help="PNG to draw: acceleration, velocity and Sa(T).")
-    ] = None,
+    plot: PlotOption = None,
 ) -> None:
     """Show what files of recorded ground motions hold.
 
     Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a
-    file does not say is given by --read.
+    file does not say is given by --read. --plot draws acceleration, velocity and Sa(T).
     """
-    check_picture(plot)
+    if plot is not None:
+        check_file(plot, "--plot")
     reading = reading_of(read)
     found: list[tuple[Path, Recording]] = []
     faults: list[Odd] = []
@@ -80,7 +80,7 @@ def run(
         from rockcheck.reports.show.drawing import recordings_figure
 
         drawn = [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-        save_picture(recordings_figure(drawn), plot)
+        save_figure(recordings_figure(drawn), plot)
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:

@@ -17,7 +17,7 @@ from typing import Annotated
 import typer
 from filelock import FileLock, Timeout
 
-from rockcheck.commands import answer, console, progress
+from rockcheck.commands import answer, check_file, console, progress
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, unheard
@@ -63,8 +63,7 @@ def run(
 
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
-        if not output.parent.is_dir():
-            raise InputError(f"{printable(output.parent)}: no such folder", "--output")
+        check_file(output, "--output")
         written = write_figure(folder, scene[0], output, against)
         console().print(f"figure: {written}", soft_wrap=True)
         answer({"figure": written})

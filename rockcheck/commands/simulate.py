@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import deque
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,18 +12,18 @@ import typer
 
 from rockcheck.commands import (
     AllowCodeOption,
-    PlotOption,
     answer,
-    check_picture,
+    check_file,
     console,
     model_names,
     progress,
     report_file,
-    save_picture,
+    save_figure,
     scene_names,
     setting_of,
     tell_notes,
 )
+from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import check_format
@@ -46,51 +47,54 @@ def run(
         typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names),
     ] = REFERENCE,
     output: Annotated[
-        Path | None,
+        list[Path] | None,
         typer.Option(
             "-o",
             "--output",
-            help="File to write: .csv, .csv.gz, .json or .mat (default: SCENE--MODEL.csv).",
+            help="File to write, repeatable: a history as .csv, .csv.gz, .json or .mat, its figure"
+            f" as {ENDINGS} (default: SCENE--MODEL.csv).",
         ),
     ] = None,
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", help="A setting of the model, such as time_step=1e-4; repeatable."),
     ] = None,
-    plot: PlotOption = None,
     allow_code: AllowCodeOption = None,
 ) -> None:
     """Simulate one scene with one model.
 
     Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
-    --plot draws rotation, slip and impacts.
+    A figure shows rotation, slip and impacts.
     """
     check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
     player = None if is_own(model) else build(model, given)
     what = load_scene(scene)
-    path = output or Path(f"{name_of(what.name, model)}.csv")
-    if not path.parent.is_dir():
-        raise InputError(f"{printable(path.parent)}: no such folder", "--output")
-    check_format(path)
-    check_picture(plot)
+    files = output or [Path(f"{name_of(what.name, model)}.csv")]
+    figures = [path for path in files if path.suffix.lower()[1:] in FORMATS]
+    histories = [path for path in files if path not in figures]
+    of_history = partial(check_format, more=f"; its figure as {ENDINGS}")
+    for path in files:
+        check_file(path, "--output", kind_of if path in figures else of_history)
     slow = ", may compile first" if compiles(model, given) else ""
     with progress(f"{what.name}, {model}{slow}") as on_progress, listening(on_progress):
         history = player.simulate(what) if player else _played_apart(what, model, given)
-    try:
-        history.save(path)
-    except OSError as error:
-        raise InputError(
-            f"{printable(path)}: cannot be written: {error.strerror}", "--output"
-        ) from None
+    for path in histories:
+        try:
+            history.save(path)
+        except OSError as error:
+            raise InputError(
+                f"{printable(path)}: cannot be written: {error.strerror}", "--output"
+            ) from None
     motion = motion_of(history, what)
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
     moved = ", ".join([history.fate, *motion.words(), took])
     console().print(f"{what.name}, {model}: {moved}")
     tell_notes(history)
-    console().print(f"history: {path}", soft_wrap=True)
-    if plot is not None:
-        save_picture(history.plot(), plot)
+    for path in histories:
+        console().print(f"history: {path}", soft_wrap=True)
+    for path in figures:
+        save_figure(history.plot(), path)
     answer(
         {
             "scene": what.name,
@@ -102,7 +106,8 @@ def run(
             "wall_seconds": history.cost.wall_seconds,
             "rules": dict(history.cost.rules),
             "notes": history.notes,
-            "history": path,
+            "history": next(iter(histories), None),
+            "files": files,
         }
     )
 

@@ -88,9 +88,6 @@ def run(
         ),
     ] = None,
     played: Played = Played(OUT / "spectrum"),
-    force: Annotated[
-        bool, typer.Option("--force", help="Run everything again, also what is up to date.")
-    ] = False,
 ) -> None:
     """Overturning spectra: the paper's, or your own.
 
@@ -125,4 +122,4 @@ def run(
             raise InputError(said, "--agreement")
         tell_missing()
     study = Spectra(panels, request, agreement or 0)
-    studied(study, played, force=force)
+    studied(study, played)

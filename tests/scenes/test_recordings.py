@@ -295,11 +295,11 @@ def test_the_command_shows_and_draws(tmp_path, monkeypatch, typed, refused):
         "Sa(T)",
         "1 s: ",
         "█",
-        "picture: a.png",
+        "figure: a.png",
     ):
         assert part in said, part
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
-    assert "ends in .png" in refused("record", "a.AT2", "--plot", "a.jpg")
+    assert ".svg, .png, .pdf" in refused("record", "a.AT2", "--plot", "a.jpg")
 
 
 def test_one_bad_file_does_not_hide_the_others(tmp_path, typed):

@@ -54,6 +54,8 @@ T = TypeVar("T")
 #: A figure has moved if it differs by more than this share, and by more than its measure's
 #: resolution.
 ROUNDING = 1e-9
+#: Most moved figures that the changes between two runs list.
+MOST_MOVED = 20
 #: Environment variables in which continuous integration gives its commit.
 COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
 
@@ -105,11 +107,12 @@ def changes(before: Run, after: Run) -> list[Change]:
     return sorted(found, key=lambda change: (order.index(change.what), -change.size))
 
 
-def difference(before: Run, after: Run, most: int | None = None) -> Finding:
+def difference(before: Run, after: Run) -> Finding:
     """The finding on the changes between two finished runs of a suite.
 
-    Its table has at most `most` of the figures that moved. Exit code 1 if a verdict changed or a
-    cell is in one of the runs only. Raises `InputError` for runs of two suites.
+    Its table has at most `MOST_MOVED` of the figures that moved, its data has all. Exit code 1 if a
+    verdict changed or a cell is in one of the runs only. Raises `InputError` for runs of two
+    suites.
     """
     found = changes(before, after)
     counts = Counter(change.what for change in found)
@@ -122,9 +125,8 @@ def difference(before: Run, after: Run, most: int | None = None) -> Finding:
     told = [
         f"{name} {was or 'absent'} -> {now or 'absent'}" for name, (was, now) in versions.items()
     ]
-    left = max(0, counts["figure"] - most) if most is not None else 0
-    if left:
-        told.append(f"{left} more figures moved: --all")
+    if left := max(0, counts["figure"] - MOST_MOVED):
+        told.append(f"{left} more figures moved: --json")
     rows = [
         [one.scene or "the run", one.model, f"{one.what} {one.name}".strip(), one.before, one.after]
         for one in found[: len(found) - left]
@@ -306,7 +308,7 @@ def trends(moments: Sequence[Moment]) -> list[Trend]:
 
 #: Most figures drawn (those that varied most), and most moved figures listed; the table has
 #: all that varied.
-DRAWN, MOST_MOVED = 12, 10
+DRAWN, LISTED = 12, 10
 
 
 def trend_of(moments: Sequence[Moment]) -> Finding:
@@ -321,7 +323,7 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     before = f" since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
     told = [
         f"{one.name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in one.values[-2:])}"
-        for one in moved[:MOST_MOVED]
+        for one in moved[:LISTED]
     ]
     numbers = list(range(1, len(moments) + 1))
     panels = []
