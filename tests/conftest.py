@@ -249,11 +249,15 @@ def made() -> Callable[..., History]:
 
 
 @pytest.fixture
-def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The working folder is an empty one, but for the models of `faulty.py`, imported afresh."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(
-        Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path / "faulty.py"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
+def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The models of `faulty.py` lie in `tmp_path`, and are imported afresh."""
+    shutil.copy(Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))  # a suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
+
+
+@pytest.fixture
+def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, faulty: None) -> None:
+    """The working folder is an empty one, but for the models of `faulty.py`."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)

@@ -3,7 +3,6 @@ allows it, and only by a worker."""
 
 import ast
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -49,13 +48,10 @@ class Told:
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, faulty):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "spy.py").write_text(SPY)
-    shutil.copy(
-        Path(__file__).parents[1] / "validation" / "models" / "faulty.py", tmp_path / "faulty.py"
-    )
     return tmp_path
 
 

@@ -42,20 +42,14 @@ def test_a_branch_is_known_again(law: str, restitution: float, side: str) -> Non
     assert found.errors[law] < 1e-6 < found.spread
 
 
-@pytest.mark.parametrize(("restitution", "branch"), [(0.5, "closed"), (1.0, "open")])
-def test_the_default_law_is_closed_below_one_and_open_at_one(
-    restitution: float, branch: str
+@pytest.mark.parametrize(
+    ("of", "played", "law"), [(0.5, 0.5, "closed"), (1.0, 1.0, "open"), (0.5, 0.9, "none")]
+)
+def test_the_default_law_is_closed_below_one_and_open_at_one_and_none_is_between(
+    of: float, played: float, law: str
 ) -> None:
-    scene = flush_landing(restitution)
-    found = law_followed(scene, EventBasedModel(pivot="unilateral").simulate(scene))
-    assert found.law == branch
-
-
-def test_a_history_between_the_branches_follows_none() -> None:
-    scene = flush_landing(0.5)
-    other = flush_landing(0.9)
-    found = law_followed(scene, EventBasedModel(pivot="unilateral").simulate(other))
-    assert found.law == "none"
+    history = EventBasedModel(pivot="unilateral").simulate(flush_landing(played))
+    assert law_followed(flush_landing(of), history).law == law
 
 
 def test_without_such_a_landing_there_is_nothing_to_tell() -> None:

@@ -3,9 +3,6 @@ them against tolerances."""
 
 import math
 import re
-import shutil
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -53,10 +50,7 @@ overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none f
 
 
 @pytest.fixture
-def suite_file(tmp_path, monkeypatch):
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
+def suite_file(tmp_path, faulty):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")
     return path

@@ -53,7 +53,6 @@ FINE = (
 def write_suite(
     folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0
 ) -> Path:
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", folder / "faulty.py")
     tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
     path.write_text(
@@ -63,10 +62,7 @@ def write_suite(
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-
+def run(tmp_path, faulty):
     def run(path: Path, jobs: int = 0, **options: object) -> Run:
         return run_suite(load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options)
 
@@ -247,7 +243,6 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path
     assert [(check.kind, check.verdict) for _, check in done.checks()] == [
         ("model form", "pass")
     ] * 2
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     falling = re.sub(r"walls = .*", "initial_rotation = -0.3", FORM)
     path.write_text(
         falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8"
@@ -331,7 +326,9 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
         ("box2d", "", ""),
     ],
 )
-def test_time_to_compile_does_not_count_for_a_cells_limit(tmp_path, model, settings, compiled):
+def test_time_to_compile_does_not_count_for_a_cells_limit(
+    tmp_path, faulty, model, settings, compiled
+):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
     study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
@@ -352,10 +349,7 @@ MODELS = "\n".join(
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("default")
-def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
+def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path, faulty):
     path = tmp_path / "mine.toml"
     path.write_text(
         f"""reference = "Still"
