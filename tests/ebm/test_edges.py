@@ -169,14 +169,6 @@ def test_balance_point(pivot):
     assert np.all(np.diff(over.channels["theta"]) > 0.0)
 
 
-@pivots
-def test_start_past_the_balance_point(pivot):
-    for side in (1.0, -1.0):
-        history = play(scene_of(initial_rotation=side * 1.3 * PAPER_BLOCK.alpha), pivot)
-        assert history.outcome == ("overturned left" if side > 0 else "overturned right")
-        assert np.all(np.diff(side * history.channels["theta"]) > 0.0)
-
-
 @pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
 @pivots
 def test_wall_that_is_touched_from_the_start(pivot, e):

@@ -144,11 +144,13 @@ def test_note_where_a_record_is_short():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
-def test_overturning_ends_the_history(pivot, side):
+@pytest.mark.parametrize(("tilt", "spin"), [(0.99, 0.3), (1.3, 0.0)])
+def test_overturning_ends_the_history(tilt, spin, pivot, side):
+    """Also from past the balance point, at rest."""
     sign = 1.0 if side == "left" else -1.0
     scene = scene_of(
-        initial_rotation=sign * 0.99 * PAPER_BLOCK.alpha,
-        initial_angular_velocity=sign * 0.3,
+        initial_rotation=sign * tilt * PAPER_BLOCK.alpha,
+        initial_angular_velocity=sign * spin,
         duration=30.0,
     )
     history = EventBasedModel(pivot=pivot).simulate(scene)
@@ -157,6 +159,7 @@ def test_overturning_ends_the_history(pivot, side):
     assert last.kind == f"overturned {side}"
     assert history.channels["t"][-1] < last.t < history.channels["t"][-1] + scene.output_step
     assert 1.4 < abs(history.channels["theta"][-1]) < math.pi / 2
+    assert np.all(np.diff(sign * history.channels["theta"]) > 0.0)
     assert {len(channel) for channel in history.channels.values()} == {len(history.channels["t"])}
 
 
