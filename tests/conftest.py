@@ -95,7 +95,6 @@ def pytest_runtest_call() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Iterator[None]:
-    """What became of a test."""
     report = yield
     _judged(report)
     return report
@@ -103,7 +102,6 @@ def pytest_runtest_makereport() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report() -> Iterator[None]:
-    """What became of a file that was read for tests."""
     report = yield
     _judged(report)
     return report

@@ -47,7 +47,6 @@ def put(motion: Any, values: Sequence[float]) -> None:
 
 
 def six(motion: Any) -> np.ndarray:
-    """x, y, theta and their rates."""
     return np.array(motion.tolist())
 
 

@@ -185,7 +185,6 @@ def test_wall_that_is_touched_from_the_start(pivot, e):
 
 @pivots
 def test_walls_on_both_sides_at_no_distance(pivot):
-    """It cannot move, however hard it is shaken."""
     walls = [Wall(side="left", gap=0.0), Wall(side="right", gap=0.0)]
     history = play(
         scene_of(walls=walls, excitation=Sine(amplitude=30.0, period=0.7, cycles=4)), pivot
@@ -197,7 +196,6 @@ def test_walls_on_both_sides_at_no_distance(pivot):
 
 @pivots
 def test_rattling_at_restitution_one(pivot):
-    """Pressed on an elastic wall, the block rattles, and that ends."""
     walls = [Wall(side="left", gap=0.001, restitution=1.0)]
     scene = scene_of(walls=walls, excitation=constant(1.5 * G * SLOPE), duration=5.0)
     history = play(scene, pivot)
@@ -263,7 +261,6 @@ def test_record_of_one_sample(pivot):
 
 @pivots
 def test_record_that_ends_with_a_jump(pivot):
-    """After its last sample the base is at rest at once."""
     scene = scene_of(excitation=constant(3.0 * G * SLOPE, 0.4))
     longer = scene.replace(
         excitation=Record.from_samples([3.0 * G * SLOPE, 3.0 * G * SLOPE, 0.0], time_step=0.4)

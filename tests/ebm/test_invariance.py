@@ -107,7 +107,6 @@ def assert_mirror_images(a: History, b: History) -> None:
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_mirror_image_to_the_bit(pivot, name):
-    """The mirrored scene gives the mirrored history, to the bit."""
     model, scene = EventBasedModel(pivot=pivot), SCENES[name]
     assert_mirror_images(model.simulate(scene), model.simulate(scene.mirrored()))
     assert scene.mirrored().mirrored() == scene
@@ -143,7 +142,6 @@ def test_dynamic_similarity(pivot, scale):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_constant_vertical_acceleration_is_gravity(pivot):
-    """A floor that accelerates up with a is a gravity of g + a."""
     duration, a = 4.0, 3.0
     vertical = Record.from_samples([a, a], time_step=duration + 1.0)
     scene = scene_of(walls=walls(left=0.053, e=0.5), duration=duration)

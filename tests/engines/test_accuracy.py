@@ -110,7 +110,6 @@ def test_walls_and_slip(varying_engine, every, least, bounds):
 
 
 def test_the_engines_agree(pulse):
-    """Two engines that share nothing but the steps: slip, both kinds of wall impact, hops."""
     scenes = [
         pulse(4.0, 4.5, friction=0.3),
         pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)]),

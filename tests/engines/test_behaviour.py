@@ -343,8 +343,6 @@ def test_blow_up_is_a_failure(varying_engine, step, block, tmp_path, monkeypatch
 
 
 class Scripted(Engine):
-    """An engine that answers what it is told to."""
-
     name = "scripted"
     answers: dict[str, object]
 

@@ -30,7 +30,6 @@ FOLDERS = {
 
 
 def names_of(requirements: list[str]) -> set[str]:
-    """Names of distributions, normalised."""
     return {re.split(r"[\[<>=!~; ]", text)[0].lower().replace("_", "-") for text in requirements}
 
 

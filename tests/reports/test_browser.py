@@ -51,7 +51,6 @@ def visits(visitor: Callable[..., playwright.Page], site: Path) -> Visits:
 
 @pytest.fixture
 def visit(visits: Visits) -> Visit:
-    """A visit on a desk."""
     return visits()
 
 

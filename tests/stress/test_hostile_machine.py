@@ -104,7 +104,6 @@ def test_disk_full_whatever_is_written(tmp_path, size):
 
 @pytest.mark.needs("POSIX")
 def test_what_is_no_file_is_written_as_it_is(tmp_path):
-    """A pipe, a device or a link is not replaced by a file."""
     (tmp_path / "link").symlink_to(tmp_path / "out.csv")
     assert (
         main(["simulate", "fig4a", "--model", "ebm", "-o", str(tmp_path / "link"), "--quiet"]) == 0

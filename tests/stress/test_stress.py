@@ -223,7 +223,6 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
 
 
 def test_the_command(tmp_path, told):
-    """All that a run has is in its files."""
     words = ["--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--seed", "4"]
     found = told("stress", "runs", "--model", "ebm", *words)
     assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
@@ -233,7 +232,6 @@ def test_the_command(tmp_path, told):
 
 @pytest.mark.slow
 def test_quick_run(tmp_path):
-    """All models: no event-based one breaks an invariant."""
     found = run(Stress("runs", quick=True, seed=11), tmp_path)
     assert found.complete
     assert found.exit_code == 0

@@ -53,7 +53,6 @@ def test_a_modelling_choice_is_counted_and_explained(rule):
 
 
 def test_the_theory_page_links_each_stage_to_its_function():
-    """In the order in which the loop calls them."""
     page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
     page = page[page.index("## How an event is handled") :]
     stages = re.findall(r"^\d\. \*\*(\w+)\.?\*\* \(`(\w+)\.(\w+)`\)", page, re.MULTILINE)

@@ -384,7 +384,6 @@ def test_it_runs_and_contacts_hold(settings, name):
 @pytest.mark.parametrize("impacts", ["moreau", "floor-first"])
 @pytest.mark.parametrize("tilt", np.linspace(0.05, 1.05, 21).round(3).tolist())
 def test_a_squat_block_on_a_floor_that_bounces(tilt, impacts):
-    """Both bottom corners, friction and restitution: every tilt has an impact that fits."""
     played(
         scene_of(SQUAT, 0.75, 1.0, 0.5, initial_rotation=tilt), pivot="unilateral", impacts=impacts
     )

@@ -43,7 +43,6 @@ class Made:
 
 
 def judged(model):
-    """What is said of each quantity of the made model, by name."""
     return {q.name: q for q in numerical_uncertainty(model, BOOKCASE).quantities}
 
 

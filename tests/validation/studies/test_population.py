@@ -134,7 +134,6 @@ def test_a_capacity_is_exceeded_not_met(lines):
 
 @pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
 def test_every_measure_takes_out_the_record_s_own_size(measure):
-    """The same motion twice as large has the same curve."""
     study = ida(SCENE, [("once", motion(1.0)), ("twice", motion(2.0))], LEVELS, measure=measure)
     (_, _, once), (_, _, twice) = study.motions
     assert twice == pytest.approx(2.0 * once, rel=1e-9)
