@@ -29,7 +29,7 @@ from rockcheck.reports.show.words import (
     unit,
     window,
 )
-from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, looks, save, stamp_of, undrawn
+from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, label_of, looks, save, stamp_of, undrawn
 from rockcheck.scenes.errors import inert
 from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
 from rockcheck.validation.execute.pool import Call
@@ -63,7 +63,7 @@ def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> st
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if column.kind == "model":
-        return LOOKS[value].label if value in LOOKS else str(value)
+        return label_of(str(value))
     if isinstance(value, bool):
         return "yes" if value else "no"
     if column.kind == "text" or not isinstance(value, int | float):

@@ -5,11 +5,11 @@ Lines over axes, and by `DRAWERS` what needs a drawer of its own.
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, figure_style, log_scales
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
-DRAWERS: dict[str, tuple[str, str]] = {
-    "spectra": ("rockcheck.reports.show.spectrum", "figure"),
-    "stable-steps": (__name__, "stable_steps"),
-    "strips": (__name__, "strips"),
+DRAWERS = {
+    "spectra": "rockcheck.reports.show.spectrum:figure",
+    "stable-steps": f"{__name__}:stable_steps",
+    "strips": f"{__name__}:strips",
 }
 #: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
 #: and the folder of figures and returns the scripts that the page reads, in order.
-SCRIPTS = {"spectra": ("rockcheck.reports.show.spectrum", "write_scripts")}
+SCRIPTS = {"spectra": "rockcheck.reports.show.spectrum:write_scripts"}
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
 COLOURS = (
     ("#0072b2", "#3d9fdc"),
@@ -56,24 +56,18 @@ STYLES: dict[str, dict[str, Any]] = {
 
 def figure_of(plot: Plot) -> Figure:
     """The figure of a plot."""
-    if plot.kind in DRAWERS:
-        drawn: Figure = _function(DRAWERS[plot.kind])(plot)
-        return drawn
-    return lines(plot)
+    drawn: Figure = resolve_name(DRAWERS.get(plot.kind, f"{__name__}:lines"))(plot)
+    return drawn
 
 
 def scripts_of(plots: Sequence[Plot], folder: Path) -> list[str]:
     """Writes the scripts of live plots with a drawer of their own; returns those of the page."""
     found = [
-        _function(SCRIPTS[plot.kind])(plot, folder)
+        resolve_name(SCRIPTS[plot.kind])(plot, folder)
         for plot in plots
         if plot.live and plot.kind in SCRIPTS
     ]
     return list(dict.fromkeys(script for some in found for script in some))
-
-
-def _function(name: tuple[str, str]) -> Any:
-    return getattr(importlib.import_module(name[0]), name[1])
 
 
 def lines(plot: Plot) -> Figure:
@@ -187,24 +181,22 @@ def _scale(ax: Axes, x: Axis, y: Axis) -> None:
             scale("log")
         if axis.limits is not None:
             limit(*axis.limits)
-    if x.log or y.log:
-        log_scales(ax)
+    log_scales(ax)
     for ticks, put in ((x.ticks, ax.set_xticks), (y.ticks, ax.set_yticks)):
         if ticks:
             put(list(ticks), list(ticks.values()))
 
 
 def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
+    import numpy as np
+
     for series, colour in zip(panel.series, colours(panel), strict=True):
         if series.style == "level":
-            drawn = ax.axhline(
-                _known(series.y[0]), color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3))
-            )
+            level = math.nan if series.y[0] is None else series.y[0]
+            drawn = ax.axhline(level, color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
         else:
+            low, y, high = (np.array(one, float) for one in (series.low, series.y, series.high))
             if series.high:
-                low, high = (
-                    [_known(value) for value in values] for values in (series.low, series.high)
-                )
                 ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
             look = STYLES[series.style] | (
                 {"marker": LOOKS[series.look].marker}
@@ -213,9 +205,7 @@ def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
                 if series.look in BY_KEY and series.style == "step"
                 else {}
             )
-            (drawn,) = ax.plot(
-                series.x, [_known(value) for value in series.y], color=colour[0], **look
-            )
+            (drawn,) = ax.plot(series.x, y, color=colour[0], **look)
         if series.label and series.style != "thin":
             handles.setdefault(series.label, drawn)
 
@@ -235,10 +225,6 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
         else:
             found.append(own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)]))
     return found
-
-
-def _known(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def live_data(plot: Plot) -> dict[str, Any]:

@@ -31,6 +31,13 @@ LEAST = 1e-3
 FINE = 1e-3
 LEGEND_COLUMNS = 6
 TOLERANCE = "#009168"
+#: The mark of a limit of the RMS.
+LIMIT: dict[str, Any] = {
+    "color": TOLERANCE,
+    "marker": "_",
+    "markersize": 7.0,
+    "markeredgewidth": 1.4,
+}
 
 
 def histories_figure(
@@ -55,7 +62,7 @@ def histories_figure(
             + [0.16 * len(view.histories) + 0.15]
         )
         beyond = view.horizon is not None and view.horizon < view.t[-1]
-        shades = _shades(view, against, channels)
+        shades = _shades(view, against, channels, beyond)
         legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
         # Margins in inches: a layout engine would need several times the drawing's own time.
         top, bottom, space = 0.25 + 0.16 * legend_rows, 0.42, 0.09
@@ -249,15 +256,7 @@ def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> N
         ax.fill_between([0.0, until], -limit, limit, color=TOLERANCE, alpha=0.13, linewidth=0)
     for limit, until in sorted({(band.limit, band.until) for band in bands if band.kind == "rms"}):
         ax.plot([until, until], [0.0, limit], color=TOLERANCE, linewidth=0.8, zorder=3.0)
-        ax.plot(
-            until,
-            limit,
-            marker="_",
-            color=TOLERANCE,
-            markersize=7.0,
-            markeredgewidth=1.4,
-            zorder=3.0,
-        )
+        ax.plot(until, limit, **LIMIT, zorder=3.0)
     for band in {
         band.model: band
         for band in sorted(bands, key=lambda band: band.until)
@@ -331,33 +330,19 @@ def _short(label: str, most: int = 17) -> str:
 
 
 def _shades(
-    view: SceneView, against: str | None, channels: Sequence[Channel]
+    view: SceneView, against: str | None, channels: Sequence[Channel], beyond: bool
 ) -> list[Patch | Line2D]:
     """Legend entries for what the figure has besides the models."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    names = [channel.name for channel in channels]
-    found: list[Patch | Line2D] = []
-    kinds = (
-        {band.kind for band in view.bands(against) if band.channel in names} if against else set()
-    )
-    if "peak" in kinds:
-        found.append(Patch(color=TOLERANCE, alpha=0.25, label="tolerance"))
-    if "rms" in kinds:
-        found.append(Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far"))
-        found.append(
-            Line2D(
-                [],
-                [],
-                color=TOLERANCE,
-                marker="_",
-                markersize=7.0,
-                markeredgewidth=1.4,
-                linestyle="",
-                label="its limit",
-            )
-        )
-    if view.horizon is not None and view.horizon < view.t[-1]:
-        found.append(Patch(color="#000000", alpha=0.08, label="beyond the horizon"))
-    return found
+    names, bands = [channel.name for channel in channels], view.bands(against) if against else ()
+    kinds = {band.kind for band in bands if band.channel in names}
+    look: dict[str, Any] = {**LIMIT, "linestyle": "", "label": "its limit"}
+    entries: list[tuple[bool, Patch | Line2D]] = [
+        ("peak" in kinds, Patch(color=TOLERANCE, alpha=0.25, label="tolerance")),
+        ("rms" in kinds, Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far")),
+        ("rms" in kinds, Line2D([], [], **look)),
+        (beyond, Patch(color="#000000", alpha=0.08, label="beyond the horizon")),
+    ]
+    return [handle for shown, handle in entries if shown]

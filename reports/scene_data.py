@@ -101,7 +101,7 @@ def payload(view: SceneView) -> dict[str, Any]:
                     [float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")]
                     for e in view.histories[model].event_list
                 ],
-                "modes": _spells(view, model),
+                "modes": [[float(f"{t:.4f}"), mode] for t, _, mode in view.spells(model)],
                 "agreement": view.agreement.get(model),
                 "fell": view.falls.get(model),
                 "samples": view.measured.get(model),
@@ -117,16 +117,6 @@ def script(view: SceneView) -> str:
     """The payload as a script that assigns it to `rockcheck`, written in ASCII."""
     text = json.dumps(payload(view), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return f"window.rockcheck = {text};\n"
-
-
-def _spells(view: SceneView, model: str) -> list[list[Any]]:
-    """The modes of motion as [start in s, mode], one entry for each change."""
-    channels = view.histories[model].channels
-    if "mode" not in channels:
-        return []
-    mode = np.asarray(channels["mode"]).astype(str)
-    starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
-    return [[float(f"{channels['t'][k]:.4f}"), str(mode[k])] for k in starts]
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

@@ -5,7 +5,6 @@ They are one folder that opens from the file system and needs no other place.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.reports import tables
-from rockcheck.reports.document import DATA, FIGURES, PAGES, Site, csv, row_cells
+from rockcheck.reports.document import FIGURES, PAGES, Site, csv, row_cells
 from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
@@ -26,17 +25,17 @@ from rockcheck.reports.figures import (
 )
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import kind_of, looks, save, save_as
+from rockcheck.reports.style import drawn_by, kind_of, looks, save, save_as
 from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
-from rockcheck.scenes import InputError
+from rockcheck.scenes import InputError, experience
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import MOST_BYTES, head_of
 from rockcheck.scenes.writing import made, write_whole
-from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call
+from rockcheck.validation.execute.provenance import digest
 from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
@@ -173,25 +172,25 @@ class _Pages:
         page = self.folder / _address(view)
         before = _belongings(page)
         if isinstance(view, EnsembleView):
-            self._write_ensemble(view, stamp)
+            template, shown = "finding.html", self._write_ensemble(view)
         else:
-            self._write_scene(view, stamp)
+            template, shown = "scene.html", self._write_scene(view)
+        shown |= {"view": view, "stamp": stamp} | _common(self.run)
+        self.site.page(_address(view), template, **shown)
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
-    def _write_scene(self, view: SceneView, stamp: str) -> None:
+    def _write_scene(self, view: SceneView) -> dict[str, Any]:
+        """Write a scene's figures and data; returns what its page shows beside the view."""
         write_figures(view, made(self.folder, PAGES, FIGURES))
         write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
-        names = [one.name for one in self.views.values() if isinstance(one, SceneView)]
-        place = names.index(view.name)
-        beside = {
-            "previous": self.views[names[place - 1]] if place else None,
-            "following": self.views[names[place + 1]] if place + 1 < len(names) else None,
-        }
-        self._page(view, stamp, "scene.html", files=files, **beside)
+        beside = [None, *(one for one in self.views.values() if isinstance(one, SceneView)), None]
+        place = beside.index(view)
+        return {"files": files, "previous": beside[place - 1], "following": beside[place + 1]}
 
-    def _write_ensemble(self, view: EnsembleView, stamp: str) -> None:
+    def _write_ensemble(self, view: EnsembleView) -> dict[str, Any]:
+        """Write an ensemble's figures and tables; returns what its page shows beside the view."""
         page, figures = view.page(), made(self.folder, PAGES, FIGURES)
         known = looks(self.run.models)
         curves = [(*view.curves[model], known[model]) for model in known if model in view.curves]
@@ -201,12 +200,7 @@ class _Pages:
         for table in page.tables():
             *parts, name = table.name.split("/")
             write_whole(made(self.folder, PAGES, *parts) / f"{name}.csv", csv(table))
-        self._page(view, stamp, "finding.html", found=page)
-
-    def _page(self, view: View, stamp: str, template: str, **context: Any) -> None:
-        self.site.page(
-            _address(view), template, view=view, stamp=stamp, **context, **_common(self.run)
-        )
+        return {"found": page}
 
     def _write_index(self) -> None:
         figures = made(self.folder, PAGES, FIGURES)
@@ -256,9 +250,9 @@ class _Pages:
                 },
             ),
             "links": self.site.links,
-            "drawn by": _appearance(),
+            "drawn by": drawn_by(),
         }
-        return provenance.digest(json.dumps(shown, sort_keys=True))
+        return digest(json.dumps(shown, sort_keys=True))
 
 
 def _address(view: View) -> str:
@@ -273,22 +267,6 @@ def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-@cache
-def _appearance() -> str:
-    """Hash of the code, templates, scripts and styles that make the pages."""
-    files = sorted(path for path in DATA.rglob("*") if path.is_file())
-    hashes = [f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for path in files]
-    return provenance.digest(
-        "\n".join(
-            [
-                provenance.code_digest("rockcheck.reports"),
-                provenance.version_of("matplotlib"),
-                *hashes,
-            ]
-        )
-    )
 
 
 def _stamp_of(page: Path) -> str:
@@ -314,6 +292,7 @@ def _common(run: Run) -> dict[str, Any]:
         tables.runs_table,
         tables.uncertainty_table,
         tables.use,
+        experience.outside,
         scene_facts,
         summary,
         figure_stem,

@@ -7,6 +7,7 @@ more for print without colour.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import math
@@ -101,6 +102,11 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
         spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
         found[model] = LOOKS[model] if model in LOOKS else replace(spare, label=model)
     return found
+
+
+def label_of(model: str) -> str:
+    """A model's label: its name where it has no look of its own."""
+    return LOOKS[model].label if model in LOOKS else model
 
 
 @contextmanager
@@ -235,13 +241,16 @@ def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
 
 def stamp_of(shown: object) -> str:
     """Two short hashes: of what a figure shows, and of what draws it."""
-    return f"{digest(json.dumps(shown, sort_keys=True))} {_drawn_by()}"
+    return f"{digest(json.dumps(shown, sort_keys=True))} {drawn_by()}"
 
 
 @cache
-def _drawn_by() -> str:
-    sources = sorted(Path(__file__).parent.rglob("*.py"))
-    return digest("\n".join([version("matplotlib"), *(one.read_text("utf-8") for one in sources)]))
+def drawn_by() -> str:
+    """Hash of all that draws figures and pages: code, templates, scripts, styles, matplotlib."""
+    places = sorted(Path(__file__).parent.rglob("*"))
+    files = (path for path in places if path.is_file() and path.suffix != ".pyc")
+    hashes = (hashlib.sha256(path.read_bytes()).hexdigest() for path in files)
+    return digest("\n".join([version("matplotlib"), *hashes]))
 
 
 def stamp_in(path: Path) -> str:

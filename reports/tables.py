@@ -14,8 +14,8 @@ from statistics import geometric_mean
 from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
-from rockcheck.reports.style import looks
-from rockcheck.reports.view import FALL, SceneView
+from rockcheck.reports.style import label_of, looks
+from rockcheck.reports.view import FALL, SceneView, all_figures
 from rockcheck.scenes.experience import Trust, known
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
@@ -83,14 +83,12 @@ def worst_table(run: Run, links: Mapping[str, str]) -> Table:
 
 def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
     """One check: expected and actual value, limit, share of it used, and why it is no pass."""
-    figure, waits = check.figure, check.words == "no tolerance yet"
-    against = f"against {_label(figure.against)}, " if figure.against else ""
+    figure, weighs = check.figure, "" if check.verdict == "not defined" else check.weighs
+    against = f"against {label_of(figure.against)}, " if figure.against else ""
     return [
         Mark(check.words, "changed")
-        if waits
-        else Mark(
-            VERDICTS[check.verdict][0], "" if check.verdict == "not defined" else check.weighs
-        ),
+        if check.words == "no tolerance yet"
+        else Mark(VERDICTS[check.verdict][0], weighs),
         Mark(cell.scene, link=(links or {}).get(cell.scene, "")),
         cell.model,
         Mark(figure.label, words=formula(figure.measure), more=against + window(figure)),
@@ -101,10 +99,6 @@ def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None)
         use(check),
         Mark(check.reason or figure.note, more=check.why),
     ]
-
-
-def _label(model: str) -> str:
-    return looks([model])[model].label
 
 
 def formula(measure: str) -> str:
@@ -192,7 +186,7 @@ def measures_table(view: SceneView, against: str) -> Table:
         ]
         for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
     ]
-    title = f"All measures against {_label(against)}"
+    title = f"All measures against {label_of(against)}"
     columns = [text("measure"), *map(Column, models)]
     return Table("measures", columns, rows, title, folded=True)
 
@@ -214,7 +208,7 @@ def uncertainty_table(view: SceneView) -> Table:
         [
             cell.model,
             one.quantity,
-            _label(one.against),
+            label_of(one.against),
             None if one.quantity == "outcome" else one.error,
             unit(one.unit),
             one.u_num,
@@ -372,9 +366,7 @@ def matrix(run: Run) -> list[Row]:
     """A row a scene, an entry a model of the run."""
     cells = run.by_scene()
     return [
-        Row(
-            scene, tuple(_entry(cells.get(scene, {}), model, run.reference) for model in run.models)
-        )
+        Row(scene, tuple(entry(run, cells.get(scene, {}), model) for model in run.models))
         for scene in run.scenes
     ]
 
@@ -418,28 +410,18 @@ def _moved(check: Check) -> bool:
     )
 
 
-def entry(run: Run, scene: str, model: str) -> Entry | None:
-    """How far a model lies from the run's reference in a scene; None where it does not play it."""
-    return _entry({cell.model: cell for cell in run.of_scene(scene)}, model, run.reference)
+def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
+    """How far a model lies from the run's reference in a scene; None where it does not play it.
 
-
-def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
-    """`entry`, of a scene's cells by model and the name of the reference."""
-    cell, reference = cells.get(model), cells.get(against)
+    `cells` are those of the scene, by model.
+    """
+    cell, against = cells.get(model), run.reference
     if cell is None:
         return None
-    figures = [check.figure for check in cell.checks] + list(cell.figures)
-    found = [
-        f
-        for f in figures
-        if f.measure == "theta_rms" and f.against == against and f.value is not None
-    ]
+    figures, of = all_figures(cell), ("theta_rms", against)
+    found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
-    falls = [
-        _side(outcome_of(one))
-        for one in (cell, reference)
-        if one is not None and one.status == "done"
-    ]
+    done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
     return Entry(
         cell=cell,
         rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
@@ -447,14 +429,13 @@ def _entry(cells: Mapping[str, Cell], model: str, against: str) -> Entry | None:
         ratio=value_of(figures, "peak_ratio", against),
         u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
         outcome=outcome_of(cell),
-        apart=len(set(falls)) > 1,
+        apart=len({_side(outcome_of(one)) for one in done}) > 1,
     )
 
 
 def outcome_of(cell: Cell) -> str:
     """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall."""
-    figures = (*(check.figure for check in cell.checks), *cell.figures)
-    last = value_of((f for f in figures if f.unit == "alpha"), "last_rotation")
+    last = value_of((f for f in all_figures(cell) if f.unit == "alpha"), "last_rotation")
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:
         return f"falling {'left' if last > 0.0 else 'right'}"
     return cell.fate

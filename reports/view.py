@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import History, InputError, Scene, experience, kinematics
-from rockcheck.scenes.history import events_path
+from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.scenes.history import COLUMNS, events_path
 from rockcheck.scenes.reading import within
+from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.motion import QUANTITIES, motion_of
-from rockcheck.validation.suite.results import Cell, Run
-from rockcheck.validation.uncertainty.population import Inputs
+from rockcheck.validation.suite.results import Cell, Run, value_of
 
 Array = NDArray[np.float64]
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
@@ -33,18 +33,16 @@ MEASURED = {"file", "offset"}
 
 @dataclass(frozen=True)
 class Channel:
-    """A quantity over time: name, label, symbol (for an axis), unit, and the stem of its measures.
+    """A quantity over time: name, label, symbol (for an axis) and unit.
 
-    These measures limit its difference.
-
-    `scale` turns the unit of its measures into `unit` (1000: from m to mm).
+    Measures `<name>_rms` and `<name>_peak` limit its difference; `scale` turns their unit into
+    `unit` (1000: from m to mm).
     """
 
     name: str
     label: str
     symbol: str
     unit: str
-    measured_by: str = ""
     scale: float = 1.0
 
     @property
@@ -55,12 +53,12 @@ class Channel:
 
 #: The quantities of the paper's Figs. 4 and 5, then energy and hop.
 CHANNELS = (
-    Channel("theta", "rotation θ/α", "θ/α", "1", "theta"),
-    Channel("theta_dot", "rotation rate", "dθ/dt\n(rad/s)", "rad/s", "theta_dot"),
-    Channel("slip", "pivot position", "pivot position\n(mm)", "mm", "slip", 1e3),
-    Channel("slip_rate", "pivot velocity", "pivot velocity\n(m/s)", "m/s", "slip_rate"),
-    Channel("energy", "energy per mass", "energy\n(J/kg)", "J/kg", "energy"),
-    Channel("hop", "height of the lowest corner", "lowest corner\n(mm)", "mm", "hop", 1e3),
+    Channel("theta", "rotation θ/α", "θ/α", "1"),
+    Channel("theta_dot", "rotation rate", "dθ/dt\n(rad/s)", "rad/s"),
+    Channel("slip", "pivot position", "pivot position\n(mm)", "mm", 1e3),
+    Channel("slip_rate", "pivot velocity", "pivot velocity\n(m/s)", "m/s"),
+    Channel("energy", "energy per mass", "energy\n(J/kg)", "J/kg"),
+    Channel("hop", "height of the lowest corner", "lowest corner\n(mm)", "mm", 1e3),
 )
 PAPER_CHANNELS = CHANNELS[:4]
 
@@ -81,18 +79,6 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Hop:
-    """How the block leaves the floor.
-
-    Its lowest corner's greatest height (m), by which model, and its longest flight (s).
-    """
-
-    height: float
-    model: str
-    longest: float
-
-
-@dataclass(frozen=True)
 class SceneView:
     """One scene of a finished run, ready to be drawn.
 
@@ -106,11 +92,6 @@ class SceneView:
     scene: Scene
     folder: Path
     stride: int
-
-    @property
-    def histories(self) -> dict[str, History]:
-        """By model, in the run's order: the histories that could be read."""
-        return self._read[0]
 
     @cached_property
     def moved(self) -> list[dict[str, Any]]:
@@ -131,32 +112,24 @@ class SceneView:
         """Whether the run asks for the scene's figures for a paper."""
         return self.name in self.run.printed
 
-    @property
-    def missing(self) -> dict[str, str]:
-        """By model: why there is no history."""
-        return self._read[1]
+    @cached_property
+    def histories(self) -> dict[str, History]:
+        """By model, in the run's order: the histories that could be read."""
+        return {model: one for model, one in self._read.items() if isinstance(one, History)}
 
     @cached_property
-    def _read(self) -> tuple[dict[str, History], dict[str, str]]:
-        return _read(self.cells, self.folder)
+    def missing(self) -> dict[str, str]:
+        """By model: why there is no history."""
+        return {model: one for model, one in self._read.items() if isinstance(one, str)}
+
+    @cached_property
+    def _read(self) -> dict[str, History | str]:
+        return {cell.model: _history_of(cell, self.folder) for cell in self.cells}
 
     @cached_property
     def cells(self) -> tuple[Cell, ...]:
         """The scene's cells, in the models' order."""
         return self.run.of_scene(self.name)
-
-    @property
-    def inputs(self) -> Inputs | None:
-        """What the spread of the scene's inputs makes of its figures."""
-        return self.run.inputs.get(self.name)
-
-    @cached_property
-    def outside(self) -> list[str]:
-        """The axes on which the scene lies outside of what the suites cover.
-
-        Empty where nothing is known of them.
-        """
-        return experience.outside(self.scene) if experience.known().domain else []
 
     @cached_property
     def t(self) -> Array:
@@ -175,21 +148,15 @@ class SceneView:
 
     def _channels(self, history: History) -> dict[str, Array]:
         block = self.scene.block
-        column = {
-            name: self._on_axis(history, name)
-            for name in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")
-        }
-        x, y, theta = column["x"], column["y"], column["theta"]
-        motion = (column[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
-        found = {
-            "theta": theta / block.alpha,
-            "theta_dot": column["theta_dot"],
-            "slip": column["slip"],
-            "slip_rate": column["slip_rate"],
+        found = {name: self._on_axis(history, name) for name in COLUMNS[1:-1]}
+        motion = (found[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+        found |= {
             "energy": np.asarray(kinematics.energy(block, self.scene.gravity, *motion)),
-            "hop": np.asarray(kinematics.pivot_height(block, y, theta)),
+            "hop": np.asarray(kinematics.pivot_height(block, found["y"], found["theta"])),
         }
-        return {c.name: c.scale * found[c.name] for c in CHANNELS} | {"x": x, "y": y}
+        found["theta"] = found["theta"] / block.alpha
+        shown = {c.name: c.scale * found[c.name] for c in CHANNELS}
+        return shown | {name: found[name] for name in ("x", "y")}
 
     def _on_axis(self, history: History, name: str) -> Array:
         """A column on `t`, linear between its rows.
@@ -256,46 +223,31 @@ class SceneView:
         return (first, last) if last - first < NEARLY_ALL * (whole[1] - whole[0]) else whole
 
     @property
-    def hop(self) -> Hop | None:
+    def hop(self) -> dict[str, Any] | None:
         """The highest hop, by the most trusted model that may hop.
 
-        None where no model may hop, or none does.
+        Its `height` (m), that `model`, and its `longest` flight (s); None where no model may hop,
+        or none does.
         """
-        order = (
-            *self.unilateral,
-            *(cell.model for cell in self.cells if cell.model not in self.bilateral),
-        )
-        for cell in sorted(
-            self.cells,
-            key=lambda cell: order.index(cell.model) if cell.model in order else len(order),
-        ):
-            height = next(
-                (f.value for f in cell.figures if f.measure == "highest_hop" and not f.window), None
-            )
-            if cell.model in order and height is not None:
-                return (
-                    Hop(height, cell.model, self._longest_flight(cell.model))
-                    if height > 0.0
-                    else None
-                )
-        return None
+        may = [cell for cell in self.cells if cell.model not in self.with_pivot("bilateral")]
+        may.sort(key=lambda cell: cell.settings.get("pivot") != "unilateral")
+        heights = {cell.model: value_of(cell.figures, "highest_hop") for cell in may}
+        model, height = next((one for one in heights.items() if one[1] is not None), ("", None))
+        if not height:
+            return None
+        flights = (end - start for start, end, mode in self.spells(model) if mode == "flight")
+        longest = max(flights, default=0.0)
+        return {"height": height, "model": model, "longest": longest}
 
-    def _longest_flight(self, model: str) -> float:
+    def spells(self, model: str) -> list[tuple[float, float, str]]:
+        """The modes of motion of a model as (start in s, end in s, mode), one for each change."""
         channels = self.histories[model].channels if model in self.histories else {}
         if "mode" not in channels:
-            return 0.0
-        t, flying = (
-            np.asarray(channels["t"], dtype=float),
-            np.asarray(channels["mode"]).astype(str) == "flight",
-        )
-        ends = np.flatnonzero(np.diff(np.r_[False, flying, False].astype(int)))
-        return max(
-            (
-                float(t[min(end, len(t) - 1)] - t[start])
-                for start, end in zip(ends[::2], ends[1::2], strict=True)
-            ),
-            default=0.0,
-        )
+            return []
+        mode, t = np.asarray(channels["mode"]).astype(str), np.asarray(channels["t"], dtype=float)
+        starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
+        ends = t[[*starts[1:], len(t) - 1]]
+        return list(zip(t[starts].tolist(), ends.tolist(), mode[starts].tolist(), strict=True))
 
     @property
     def references(self) -> tuple[str, ...]:
@@ -344,42 +296,30 @@ class SceneView:
 
     def bands(self, against: str | None = None) -> tuple[Band, ...]:
         """The tolerances that can be drawn over time; of one reference, or of all."""
-        found = []
-        for cell in self.cells:
-            for check in cell.checks:
-                figure = check.figure
-                stem, _, kind = figure.measure.rpartition("_")
-                channel = next((c for c in CHANNELS if c.measured_by == stem), None)
-                if (
-                    channel is None
-                    or kind not in ("rms", "peak")
-                    or check.limit is None
-                    or against not in (None, figure.against)
-                ):
-                    continue
-                until = min(figure.until or self.scene.duration, self.scene.duration)
-                found.append(
-                    Band(
-                        channel.name,
-                        cell.model,
-                        figure.against,
-                        kind,
-                        channel.scale * check.limit,
-                        until,
-                    )
-                )
-        return tuple(found)
+        whole = self.scene.duration
+        return tuple(
+            Band(
+                channel.name,
+                cell.model,
+                check.figure.against,
+                kind,
+                channel.scale * check.limit,
+                min(check.figure.until or whole, whole),
+            )
+            for cell in self.cells
+            for check in cell.checks
+            for channel in CHANNELS
+            for kind in ("rms", "peak")
+            if check.figure.measure == f"{channel.name}_{kind}"
+            and check.limit is not None
+            and against in (None, check.figure.against)
+        )
 
     @property
     def horizon(self) -> float | None:
         """Horizon of predictability, s: the end of the window of that name, where there is one."""
-        ends = [
-            f.until
-            for cell in self.cells
-            for f in _all_figures(cell)
-            if f.window == "horizon" and f.until is not None
-        ]
-        return min(ends, default=None)
+        figures = (f for cell in self.cells for f in all_figures(cell) if f.window == "horizon")
+        return min((f.until for f in figures if f.until is not None), default=None)
 
     @property
     def agreement(self) -> dict[str, tuple[float, str, str]]:
@@ -387,35 +327,27 @@ class SceneView:
 
         The time, what comes then, and that reference.
         """
-        found: dict[str, tuple[float, str, str]] = {}
-        for against in self.references:
-            for cell in self.cells:
-                for figure in cell.figures:
-                    wanted = (
-                        figure.measure == "events_agree_until"
-                        and figure.against == against
-                        and not figure.window
-                    )
-                    if wanted and figure.value is not None:
-                        found.setdefault(cell.model, (figure.value, figure.note, against))
-        return found
+        return {
+            cell.model: (figure.value, figure.note, against)
+            for against in reversed(self.references)
+            for cell in self.cells
+            for figure in reversed(cell.figures)
+            if (figure.measure, figure.against, figure.window)
+            == ("events_agree_until", against, "")
+            and figure.value is not None
+        }
 
-    @property
-    def bilateral(self) -> tuple[str, ...]:
-        """Models here whose pivot cannot leave the floor."""
-        return tuple(cell.model for cell in self.cells if cell.settings.get("pivot") == "bilateral")
+    def with_pivot(self, pivot: str) -> list[str]:
+        """Event-based models here with that pivot.
 
-    @property
-    def unilateral(self) -> tuple[str, ...]:
-        """Event-based models here whose floor can only push."""
-        return tuple(
-            cell.model for cell in self.cells if cell.settings.get("pivot") == "unilateral"
-        )
+        "bilateral" cannot leave the floor, "unilateral" can only push it.
+        """
+        return [cell.model for cell in self.cells if cell.settings.get("pivot") == pivot]
 
     @property
     def model_form_matters(self) -> bool:
         """Whether a wall can throw the block into free flight that one of the models forbids."""
-        return bool(self.scene.walls) and bool(self.bilateral)
+        return bool(self.scene.walls) and bool(self.with_pivot("bilateral"))
 
     @cached_property
     def extent(self) -> tuple[float, float, float, float]:
@@ -445,25 +377,18 @@ def scene_views(
     """
     slugs = slugs_of(run.scenes)
     names = [name for name in run.scenes if chosen is None or name in chosen]
-    share = most_values / max(1, len(names))
-    views = []
-    for name in names:
-        scene = run.load_scene(name)
-        columns = (len(CHANNELS) + 2) * max(
-            1, sum(cell.status == "done" for cell in run.of_scene(name))
-        )
-        values = (scene.duration / scene.output_step + 1.0) * columns
-        views.append(
-            SceneView(
-                run,
-                name,
-                slugs[name],
-                scene,
-                folder,
-                max(1, math.ceil(values / max(share, 20_000.0))),
-            )
-        )
-    return views
+    share = max(most_values / max(1, len(names)), 20_000.0)
+
+    def stride(name: str, scene: Scene) -> int:
+        models = max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
+        values = (scene.duration / scene.output_step + 1.0) * ((len(CHANNELS) + 2) * models)
+        return max(1, math.ceil(values / share))
+
+    scenes = {name: run.load_scene(name) for name in names}
+    return [
+        SceneView(run, name, slugs[name], scene, folder, stride(name, scene))
+        for name, scene in scenes.items()
+    ]
 
 
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
@@ -483,23 +408,20 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
     return slugs
 
 
-def _read(cells: Iterable[Cell], folder: Path) -> tuple[dict[str, History], dict[str, str]]:
-    histories, missing = {}, {}
-    for cell in cells:
-        if cell.status != "done" or cell.history is None:
-            missing[cell.model] = cell.reason or "no history"
-            continue
-        try:
-            path = within(folder, cell.history)
-            within(folder, str(events_path(Path(cell.history))))
-            histories[cell.model] = History.load(path)
-        except InputError as error:
-            missing[cell.model] = str(error)
-    return histories, missing
+def all_figures(cell: Cell) -> list[Figure]:
+    """The figures of a cell, those with a check first."""
+    return [*(check.figure for check in cell.checks), *cell.figures]
 
 
-def _all_figures(cell: Cell) -> list[Any]:
-    return [*cell.figures, *(check.figure for check in cell.checks)]
+def _history_of(cell: Cell, folder: Path) -> History | str:
+    """The cell's history, or why there is none."""
+    if cell.status != "done" or cell.history is None:
+        return cell.reason or "no history"
+    try:
+        within(folder, str(events_path(Path(cell.history))))
+        return History.load(within(folder, cell.history))
+    except InputError as error:
+        return str(error)
 
 
 def _least(values: Array) -> float:

@@ -92,16 +92,13 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
 def outside(scene: Scene, domain: Mapping[str, Range] | None = None) -> list[str]:
     """The axes on which a scene lies outside the domain of the suites, a line each.
 
-    Empty if it lies inside.
+    Empty if it lies inside, or where nothing is known of the suites.
     """
     domain = known().domain if domain is None else domain
-    lines = []
-    for axis, values in axes_of(scene).items():
-        covered = domain.get(axis)
-        for value in values:
-            if covered is None or not covered.low <= value <= covered.high:
-                bounds = (
-                    "nothing" if covered is None else f"{covered.low:.3g} to {covered.high:.3g}"
-                )
-                lines.append(f"{axis} is {value:.3g}; the suites cover {bounds}")
-    return lines
+    return [
+        f"{axis} is {value:.3g}; the suites cover "
+        + (f"{domain[axis].low:.3g} to {domain[axis].high:.3g}" if axis in domain else "nothing")
+        for axis, values in axes_of(scene).items()
+        for value in values
+        if domain and not (axis in domain and domain[axis].low <= value <= domain[axis].high)
+    ]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from rockcheck.ebm.spectrum import Spectrum
@@ -16,20 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def _later(module: str, name: str) -> Callable[[Any], Figure]:
+def _later(name: str) -> Callable[[Any], Figure]:
     """A drawing function, imported only when called: matplotlib takes a second."""
-
-    def draw(what: Any) -> Figure:
-        drawn: Figure = getattr(importlib.import_module(f"{__name__}.{module}"), name)(what)
-        return drawn
-
-    return draw
+    return lambda what: resolve_name(f"{__name__}.{name}")(what)
 
 
 #: The views of this package's classes (entry point of the group `rockcheck.views`).
 VIEWS = {
-    Scene: View(html=words.scene_html, figure=_later("drawing", "scene_figure")),
-    History: View(html=words.history_html, figure=_later("drawing", "history_figure")),
-    Discrepancy: View(html=words.discrepancy_html, figure=_later("drawing", "discrepancy_figure")),
-    Spectrum: View(html=words.spectrum_html, figure=_later("spectrum", "spectrum_figure")),
+    Scene: View(html=words.scene_html, figure=_later("drawing:scene_figure")),
+    History: View(html=words.history_html, figure=_later("drawing:history_figure")),
+    Discrepancy: View(html=words.discrepancy_html, figure=_later("drawing:discrepancy_figure")),
+    Spectrum: View(html=words.spectrum_html, figure=_later("spectrum:spectrum_figure")),
 }

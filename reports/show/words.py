@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from html import escape
@@ -75,11 +76,9 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     """(label, text) of a scene's block, floor, walls, excitation and duration."""
     block = scene.block
-    floor = f"μ {number(scene.floor.friction)}"
-    if scene.floor.mu_s != scene.floor.friction:
-        floor += f" (static {number(scene.floor.mu_s)})"
-    if scene.floor.restitution:
-        floor += f", restitution {number(scene.floor.restitution)}"
+    mu, mu_s, e = scene.floor.friction, scene.floor.mu_s, scene.floor.restitution
+    floor = f"μ {number(mu)}{f' (static {number(mu_s)})' if mu_s != mu else ''}"
+    floor += f", restitution {number(e)}" if e else ""
     walls = ", ".join(
         f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}"
         for wall in scene.walls
@@ -123,43 +122,31 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
     ]
 
 
-def history_facts(history: History) -> list[tuple[str, str]]:
-    """(label, text) of a history's outcome, peak, impacts, time, settings, cost and notes."""
-    time, alpha = history.channels["t"], history.alpha
-    peak = (
-        f"{number(history.peak_rotation)} rad"
-        if alpha is None
-        else f"{number(history.peak_rotation / alpha)} α"
-    )
-    impacts = {
-        kind: sum(event.kind == kind for event in history.event_list)
-        for kind in ("floor impact", "wall impact")
-    }
-    facts = [
-        ("outcome", history.fate),
-        *([("peak rotation", peak)] if history.overturned_at is None else []),
-        ("impacts", f"{impacts['floor impact']} on the floor, {impacts['wall impact']} on walls"),
-        ("time", f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows"),
-    ]
-    if history.settings:
-        facts.append(
-            ("settings", ", ".join(f"{key} {value}" for key, value in history.settings.items()))
-        )
-    if history.cost.steps:
-        facts.append(
-            ("cost", f"{number(1e3 * history.cost.wall_seconds)} ms, {history.cost.steps} steps")
-        )
-    return facts + [("note", note) for note in history.notes]
-
-
 def scene_html(scene: Scene) -> str:
     """The table of a scene in a notebook."""
     return html_table(scene.name, scene_facts(scene))
 
 
 def history_html(history: History) -> str:
-    """The table of a history in a notebook."""
-    return html_table(f"{history.name}, {history.model}", history_facts(history))
+    """The table of a history in a notebook.
+
+    Outcome, peak, impacts, time, settings, cost and notes.
+    """
+    time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
+    peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
+    kinds = Counter(event.kind for event in history.event_list)
+    settings = ", ".join(f"{key} {value}" for key, value in history.settings.items())
+    facts = {
+        "outcome": history.fate,
+        "peak rotation": peak if history.overturned_at is None else "",
+        "impacts": f"{kinds['floor impact']} on the floor, {kinds['wall impact']} on walls",
+        "time": f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows",
+        "settings": settings,
+        "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",
+    }
+    known = [(name, said) for name, said in facts.items() if said]
+    notes = [("note", note) for note in history.notes]
+    return html_table(f"{history.name}, {history.model}", known + notes)
 
 
 def discrepancy_html(found: Discrepancy) -> str:

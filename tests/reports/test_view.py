@@ -80,7 +80,8 @@ def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
             ending(cell, last) if (cell.scene, cell.model) == ("Free", "ebm") else cell
             for cell in finished.cells
         )
-        found = entry(finished.model_copy(update={"cells": cells}), "Free", "ebm")
+        run = finished.model_copy(update={"cells": cells})
+        found = entry(run, run.by_scene()["Free"], "ebm")
         assert (found.outcome, found.apart) == (outcome, apart)
 
 
@@ -186,7 +187,7 @@ def test_the_hop_is_the_trusted_model_s(site: Path) -> None:
     run = Run.load(site)
     views = {view.name: view for view in scene_views(run, site)}
     hop = views["beside a wall"].hop
-    assert (hop.height, hop.model) == (0.004, "ebm-unilateral")
+    assert (hop["height"], hop["model"]) == (0.004, "ebm-unilateral")
 
 
 def test_numbers_in_sentences_do_not_break() -> None:

@@ -17,15 +17,18 @@ from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.impact_laws import parting_landing
 from rockcheck.validation.discrepancy.motion import Motion, largest_reach, largest_slip, motion_of
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.models import build, compiles, family
 from rockcheck.validation.study import Task
 from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
-from rockcheck.validation.uncertainty.population import Inputs, propagate
+from rockcheck.validation.uncertainty.population import Inputs, Runs, play, propagate
 
 Side = Literal["left", "right"]
 Numbers = tuple[tuple[str, float], ...]
 #: Rows of a history that is kept, at the most.
 MOST_ROWS = 2000
+#: Usual time of a run, s, of compiled models and of others; total time up to which separate
+#: processes are not worth while.
+A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
 
 
 class Ran(Stored):
@@ -78,41 +81,69 @@ class Sure(Stored):
 
 
 @dataclass(frozen=True)
-class Run(Task):
-    """Runs of one scene: as it is, or with numbers changed.
-
-    A gap that is infinite takes the wall away. `shown` asks for the history and for hand methods.
-    """
+class OneScene(Task):
+    """Runs of one scene by one model; `of` names them."""
 
     of: tuple[str, ...]
     scene: Scene = field(repr=False)
     model: str
     settings: tuple[tuple[str, Any], ...] = ()
-    variants: tuple[Numbers, ...] = field(default=((),), repr=False)
-    shown: bool = False
 
     @property
     def label(self) -> str:
         """Which runs."""
-        return ", ".join(self.of)
+        return ", ".join(filter(None, self.of))
 
     def depends(self) -> Any:
-        """The scene with its motion, the model, the variants, and the code that plays them."""
+        """The scene with its motion, the model, what else is asked for, and the code."""
         cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
-        return cell, self.variants, self.shown, provenance.code_digest(__name__)
+        asked = [one for one in self.fields() if one not in OneScene.__dataclass_fields__]
+        return cell, [getattr(self, one) for one in asked], provenance.code_digest(__name__)
+
+
+def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
+    """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
+    a_run = A_RUN if family(model).compiled else A_SLOW_RUN
+    return {"expected": runs * a_run, "compiles": compiles(model, settings)}
+
+
+@dataclass(frozen=True)
+class Batch(OneScene):
+    """Runs of a population that are played together: a scene at factors of its base motion."""
+
+    factors: tuple[float, ...] = field(default=(), repr=False)
+
+    def play(self) -> Runs:
+        """The runs."""
+        motions = map(self.scene.excitation.scaled, self.factors)
+        scenes = [self.scene.replace(excitation=motion) for motion in motions]
+        return play(scenes, build(self.model, dict(self.settings)))
+
+
+@dataclass(frozen=True)
+class Run(OneScene):
+    """Runs of one scene: as it is, or with numbers changed.
+
+    A gap that is infinite takes the wall away. `shown` asks for the history and for hand methods.
+    """
+
+    variants: tuple[Numbers, ...] = field(default=((),), repr=False)
+    shown: bool = False
 
     def play(self) -> Played:
         """All variants, one after the other."""
         model = build(self.model, dict(self.settings))
         ran = [_ran(changed(self.scene, numbers), model) for numbers in self.variants]
+        runs, history = tuple(one for one, _ in ran), ran[0][1]
         if not self.shown:
-            return Played(runs=tuple(one for one, _ in ran))
-        base, first = base_of(self.scene), ran[0][1]
-        return Played(
-            runs=tuple(one for one, _ in ran),
-            history="" if first is None else _rows(first),
-            said=tuple(criterion.says(self.scene, base) for criterion in CRITERIA),
-        )
+            return Played(runs=runs)
+        base, rows = base_of(self.scene), ""
+        if history is not None:
+            every = -(-len(history.channels["t"]) // MOST_ROWS)
+            columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
+            rows = columns_text(columns)
+        said = tuple(criterion.says(self.scene, base) for criterion in CRITERIA)
+        return Played(runs=runs, history=rows, said=said)
 
 
 def changed(scene: Scene, numbers: Numbers) -> Scene:
@@ -127,47 +158,28 @@ def _ran(scene: Scene, model: Any) -> tuple[Ran, History | None]:
         history = model.simulate(scene)
     except ModelFailure as failure:
         return Ran(outcome="", reason=str(failure)), None
-    reach: dict[Side, float] = {
-        side: largest_reach(history, scene, side) for side in get_args(Side)
-    }
-    found = Ran(
+    ran = Ran(
         outcome=history.outcome,
         motion=motion_of(history, scene),
         slid=largest_slip(history),
-        reach=reach,
+        reach={side: largest_reach(history, scene, side) for side in get_args(Side)},
     )
-    return found, history
-
-
-def _rows(history: History) -> str:
-    """The history as CSV, of at most `MOST_ROWS` rows."""
-    every = -(-len(history.channels["t"]) // MOST_ROWS)
-    columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
-    return columns_text(columns)
+    return ran, history
 
 
 @dataclass(frozen=True)
-class Certainty(Task):
+class Certainty(OneScene):
     """How sure a run is; `samples` (0: none) draws of its uncertain numbers."""
 
-    of: tuple[str, ...]
-    given: UncertainScene = field(repr=False, compare=False)
-    scene: Scene = field(repr=False)
-    model: str
-    settings: tuple[tuple[str, Any], ...] = ()
     samples: int = 0
-
-    @property
-    def label(self) -> str:
-        """Which run."""
-        return ", ".join(self.of)
+    given: UncertainScene | None = field(default=None, repr=False, compare=False)
 
     def depends(self) -> Any:
-        """The scene, what is not known of it, the model, and the code."""
-        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
+        """Also what is not known of the scene."""
+        if self.given is None or not self.samples:
+            return super().depends()
         spreads = {name: spread.model_dump() for name, spread in self.given.spreads.items()}
-        drawn = [self.samples, spreads, self.given.correlation.tolist()] if self.samples else []
-        return cell, drawn, provenance.code_digest(__name__)
+        return super().depends(), spreads, self.given.correlation.tolist()
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
@@ -175,5 +187,7 @@ class Certainty(Task):
         return Sure(
             numerical=numerical_uncertainty(build(self.model, dict(self.settings)), self.scene),
             depends_on_law_from_s=None if landing is None else landing.t,
-            inputs=propagate(self.given, samples=self.samples).inputs if self.samples else None,
+            inputs=propagate(self.given, samples=self.samples).inputs
+            if self.given and self.samples
+            else None,
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,8 +19,7 @@ from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.recordings import Recording, intensity
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build, compiles
+from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
     Axis,
@@ -34,15 +33,9 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
-from rockcheck.validation.study import Study, Task
-from rockcheck.validation.uncertainty.population import (
-    Curve,
-    Floats,
-    Runs,
-    compiled,
-    curve_of,
-    play,
-)
+from rockcheck.validation.studies.population.runs import SOON, Batch, effort
+from rockcheck.validation.study import Study
+from rockcheck.validation.uncertainty.population import Curve, Floats, Runs, compiled, curve_of
 
 Motions = Sequence[tuple[str, Recording]]
 #: Records of a set, at the least; frequencies of a set of pulses.
@@ -57,39 +50,6 @@ BAND: dict[float, Style] = {0.16: "dotted", 0.5: "smooth", 0.84: "dashed"}
 FALLEN = 1.25
 #: Sets of motions drawn anew for the interval of a fitted median.
 DRAWS = 200
-#: Usual time of a run, s, of compiled models and of others; total time up to which separate
-#: processes are not worth while.
-A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
-
-
-@dataclass(frozen=True)
-class Batch(Task):
-    """Runs of a population that are played together: a scene at factors of its base motion.
-
-    `of` names their case and their motion.
-    """
-
-    of: tuple[str, ...]
-    scene: Scene = field(repr=False)
-    factors: tuple[float, ...] = field(repr=False)
-    model: str
-    settings: tuple[tuple[str, Any], ...] = ()
-
-    @property
-    def label(self) -> str:
-        """The case and the motion."""
-        return ", ".join(filter(None, self.of))
-
-    def depends(self) -> Any:
-        """The scene with its motion, the model, the factors, and the code that plays them."""
-        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
-        return cell, self.factors, provenance.code_digest(play.__module__)
-
-    def play(self) -> Runs:
-        """The runs."""
-        motions = map(self.scene.excitation.scaled, self.factors)
-        scenes = [self.scene.replace(excitation=motion) for motion in motions]
-        return play(scenes, build(self.model, dict(self.settings)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,19 +81,18 @@ class Population(Study):
         if compiled(player):
             for scene in self.cases.values():
                 player.check(scene)
-        expected = 2 * len(self.levels) * (A_RUN if compiled(player) else A_SLOW_RUN)
-        soon = expected * len(self.motions) * len(self.cases) < SOON
+        how = effort(self.model, self.settings, 2 * len(self.levels))
+        soon = how["expected"] * len(self.motions) * len(self.cases) < SOON
         return {
             case: [
                 Batch(
                     (case, name),
                     scene.replace(excitation=motion),
-                    (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
                     self.model,
                     tuple(self.settings.items()),
-                    expected=expected,
-                    compiles=compiles(self.model, self.settings),
+                    (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
                     where="here" if soon else "worker",
+                    **how,
                 )
                 for name, motion, own in self.motions
             ]
