@@ -1,31 +1,38 @@
 """Many runs of the event-based model at once, compiled and on all cores.
 
-They give outcomes and peaks, and the motion on request. Threads take chunks of rows; the result of
-a row depends neither on the other rows nor on the number of threads.
+A batch gives outcomes and peaks, and the motion on request; an ensemble, scenes of one duration,
+histories of the rotation on a common grid of times, peaks and last slips. Threads take chunks of
+rows; the result of a row depends neither on the other rows nor on the number of threads.
 """
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core.block import SETTING
-from rockcheck.ebm.core.ground import FORM
-from rockcheck.ebm.core.names import FAILURES, Ending, Shape
-from rockcheck.ebm.core.state import FOUND, MOTION, Records, Rows
+from rockcheck.ebm.core.names import FAILURES, Ending
+from rockcheck.ebm.core.state import FOUND, Records
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import Packed, pack, play, setting_for, sides_of, state_for
-from rockcheck.scenes.errors import InputError, ModelFailure
+from rockcheck.ebm.packed import Packed, pack, pack_pulses, play, sides_of, state_for
+from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import OnProgress, threads, unheard
-from rockcheck.scenes.scene import Scene
 
-__all__ = ["Outcomes", "Packed", "pack", "pack_pulses", "refuse_bouc_wen", "run_batch"]
+__all__ = [
+    "Ensemble",
+    "Outcomes",
+    "Packed",
+    "pack",
+    "pack_pulses",
+    "play_ensemble",
+    "run_batch",
+]
 Floats = NDArray[np.float64]
-_CHUNK = 256
+#: Runs of a batch, and scenes of an ensemble, that a thread takes at once.
+_CHUNK, _SCENES = 256, 32
 #: The fields of a FOUND, by their names in `Outcomes`.
 _KEPT = {
     "peak": "peak",
@@ -65,42 +72,6 @@ class Outcomes:
         return (self.ending != Ending.DONE) & (self.ending != Ending.OVERTURNED)
 
 
-def pack_pulses(
-    scene: Scene, model: EventBasedModel, amplitudes: Floats, periods: Floats
-) -> Packed:
-    """Packs one scene under many pulses of its own kind.
-
-    `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
-    """
-    model.check(scene)
-    unit, count = natural.time_unit(scene), len(amplitudes)
-    template = type(scene.excitation)
-    pulse = scene.excitation.model_copy(update={"amplitude": 1.0, "period": 1.0})
-    one = natural.base_of(scene.replace(excitation=template(**pulse.model_dump()))).horizontal
-    # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
-    ratio = 1.0 / periods
-    horizontal = np.full(count, one.form, dtype=FORM)
-    for power in range(4):
-        horizontal[f"c{power}"] *= amplitudes * (
-            ratio**power if one.form.kind == Shape.GAUSSIAN else 1.0
-        )
-    horizontal["rate"] *= ratio**2 if one.form.kind == Shape.GAUSSIAN else ratio
-    horizontal["centre"] *= periods
-    horizontal["quiet"] *= periods
-    still = natural.base_of(scene).vertical
-    return Packed(
-        rows=Rows(
-            settings=np.full(count, setting_for(scene, model), dtype=SETTING),
-            horizontal=horizontal,
-            vertical=np.full(count, still.form, dtype=FORM),
-            starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
-            durations=np.full(count, scene.duration / unit),
-            output_steps=np.full(count, scene.output_step / unit),
-            samples=still.samples,
-        )
-    )
-
-
 def run_batch(
     packed: Packed,
     model: EventBasedModel,
@@ -134,7 +105,7 @@ def run_batch(
         play(model, packed.part(part), state, records, found[part])
         return part.stop - part.start
 
-    with threads(jobs or os.cpu_count() or 1) as pool:
+    with threads(jobs) as pool:
         done = 0
         for rows in pool.map(chunk, range(0, count, _CHUNK)):
             done += rows
@@ -149,6 +120,73 @@ def run_batch(
         why = FAILURES[int(outcomes.ending[first])]
         raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
     return outcomes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ensemble:
+    """What a model makes of some scenes, one row a scene.
+
+    `theta` (rad, n x rows) at times `t` (s), after a fall pi/2 to its side; empty where no rows
+    were asked for. `side` is -1 overturned left, +1 right, 0 not; `peak` the largest |theta| (rad,
+    pi/2 of a fall); `last_slip` in m; `alpha` the blocks' own (rad).
+    """
+
+    t: Floats
+    theta: Floats
+    side: NDArray[np.int8]
+    peak: Floats
+    last_slip: Floats
+    alpha: Floats
+
+
+def play_ensemble(
+    scenes: Sequence[Scene], model: EventBasedModel, *, rows: int = 0, jobs: int | None = None
+) -> Ensemble:
+    """Play scenes of one duration to their end, on `jobs` threads (default: all cores).
+
+    Raises `InputError` where the model cannot play one of them, or has Bouc-Wen friction, and
+    `ModelFailure`.
+    """
+    refuse_bouc_wen(model)
+    first, count = scenes[0], len(scenes)
+    step = max(first.output_step, first.duration / rows) if rows else first.duration
+    t = first.replace(output_step=step).output_times if rows else np.empty(0)
+    steps = np.array([step / natural.time_unit(scene) for scene in scenes])
+    packed = pack(scenes, model).changed(output_steps=steps)
+    found = np.empty(count, FOUND)
+
+    def chunk(begin: int) -> Floats:
+        part = slice(begin, begin + _SCENES)
+        some = found[part]
+        shape = len(some), len(t)
+        records = Records(
+            np.empty((*shape, 6)), np.empty(shape, dtype=np.int8), np.empty((len(some), 0, 5))
+        )
+        play(model, packed.part(part), state_for(model, model.most_steps), records, some)
+        lasts = np.arange(len(t)) >= some["rows"][:, None]
+        return np.where(lasts, some["motion"]["theta"][:, None], records.out[:, :, 2])
+
+    with threads(jobs) as pool:
+        theta = np.concatenate(list(pool.map(chunk, range(0, count, _SCENES))))
+    motion, ending = np.array(found["motion"].tolist()), found["ending"]
+    failed = np.isin(ending, tuple(FAILURES))
+    if failed.any():
+        i = int(np.argmax(failed))
+        raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
+    placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, motion, strict=True)]
+    slip = [
+        float(kinematics.slip(scene.block, z[0], z[2]))
+        for scene, z in zip(scenes, placed, strict=True)
+    ]
+    alpha = np.array([scene.block.alpha for scene in scenes])
+    return Ensemble(
+        t=t,
+        theta=theta,
+        side=sides_of(found),
+        peak=found["peak"].copy(),
+        last_slip=np.array(slip),
+        alpha=alpha,
+    )
 
 
 def refuse_bouc_wen(model: EventBasedModel) -> None:

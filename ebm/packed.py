@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core import march
-from rockcheck.ebm.core.block import SETTING
+from rockcheck.ebm.core import block, march, names
 from rockcheck.ebm.core.ground import FORM
-from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
 from rockcheck.scenes.compiled import for_types_of
 from rockcheck.scenes.scene import Scene
@@ -64,7 +62,7 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
     forms["first"] = np.cumsum(forms["count"]) - forms["count"]
     units = np.array([natural.time_unit(scene) for scene in scenes])
     rows = Rows(
-        settings=np.array([setting_for(scene, model) for scene in scenes], dtype=SETTING),
+        settings=np.array([setting_for(scene, model) for scene in scenes], dtype=block.SETTING),
         horizontal=forms[::2].copy(),
         vertical=forms[1::2].copy(),
         starts=np.array([tuple(natural.state_of(scene).tolist()) for scene in scenes], MOTION),
@@ -73,6 +71,40 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
         samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
     )
     return Packed(rows=rows)
+
+
+def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Packed:
+    """Packs one scene under many pulses of its own kind.
+
+    `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
+    """
+    model.check(scene)
+    unit, count = natural.time_unit(scene), len(amplitudes)
+    template = type(scene.excitation)
+    pulse = scene.excitation.model_copy(update={"amplitude": 1.0, "period": 1.0})
+    one = natural.base_of(scene.replace(excitation=template(**pulse.model_dump()))).horizontal
+    # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
+    ratio = 1.0 / periods
+    horizontal = np.full(count, one.form, dtype=FORM)
+    for power in range(4):
+        horizontal[f"c{power}"] *= amplitudes * (
+            ratio**power if one.form.kind == names.Shape.GAUSSIAN else 1.0
+        )
+    horizontal["rate"] *= ratio**2 if one.form.kind == names.Shape.GAUSSIAN else ratio
+    horizontal["centre"] *= periods
+    horizontal["quiet"] *= periods
+    still = natural.base_of(scene).vertical
+    return Packed(
+        rows=Rows(
+            settings=np.full(count, setting_for(scene, model), dtype=block.SETTING),
+            horizontal=horizontal,
+            vertical=np.full(count, still.form, dtype=FORM),
+            starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
+            durations=np.full(count, scene.duration / unit),
+            output_steps=np.full(count, scene.output_step / unit),
+            samples=still.samples,
+        )
+    )
 
 
 def setting_for(scene: Scene, model: Any) -> np.record:
@@ -104,8 +136,8 @@ def play(
 
 def sides_of(found: NDArray[np.void]) -> NDArray[np.int8]:
     """The side to which each run overturned, -1 left or +1 right, 0 if it did not."""
-    theta = found["motion"]["theta"]
-    return np.where(found["ending"] == Ending.OVERTURNED, -np.sign(theta), 0.0).astype(np.int8)
+    overturned = found["ending"] == names.Ending.OVERTURNED
+    return np.where(overturned, -np.sign(found["motion"]["theta"]), 0.0).astype(np.int8)
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:

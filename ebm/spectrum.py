@@ -5,18 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
+from rockcheck.scenes import Block, InputError, Record, Scene
 from rockcheck.scenes.base import Shown
-from rockcheck.scenes.errors import InputError, check_kind
-from rockcheck.scenes.excitations import Record
+from rockcheck.scenes.errors import check_kind
 from rockcheck.scenes.progress import Count, OnProgress, unheard
-from rockcheck.scenes.scene import Block, Scene
 
 if TYPE_CHECKING:
     from rockcheck.ebm.batch import Packed
@@ -119,7 +117,13 @@ def overturning_spectrum(
         model = model or EventBasedModel(tolerance=TOLERANCE)
         model.check(scene)
         count = Count(on_progress, len(frequencies) * len(amplitudes))
-        play = partial(_play_part, model=model, jobs=jobs, count=count)
+
+        def play(scene: Scene, amplitudes: Floats, frequencies: Floats) -> Nodes:
+            part = count.part()
+            return play_nodes(
+                scene, amplitudes, frequencies, model=model, jobs=jobs, on_progress=part
+            )
+
     outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
     undecided = np.zeros(outcomes.shape, dtype=bool)
     evaluations = 0
@@ -167,12 +171,6 @@ def play_nodes(
             scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, unheard
         )
     return sides, failed
-
-
-def _play_part(
-    scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, *, count: Count, **how: Any
-) -> Nodes:
-    return play_nodes(scene, amplitude_ratios, frequency_ratios, on_progress=count.part(), **how)
 
 
 def _batch_of(

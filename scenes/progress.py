@@ -166,12 +166,12 @@ def interruptible(call: Callable[[], Result]) -> Result:
 
 
 @contextmanager
-def threads(count: int) -> Iterator[ThreadPoolExecutor]:
-    """Threads for kernels.
+def threads(count: int | None) -> Iterator[ThreadPoolExecutor]:
+    """Threads for kernels (None: as many as the machine has cores).
 
     When an exception (Ctrl-C is one) leaves the block, kernels that still run are not waited for.
     """
-    pool = ThreadPoolExecutor(count)
+    pool = ThreadPoolExecutor(count or os.cpu_count())
     try:
         yield pool
     except BaseException:

@@ -119,6 +119,12 @@ def shown(node: ast.AST) -> str:
     )[:90]
 
 
+def is_told(one: dict[str, str], fault: tuple[int, str, str], lines: list[str]) -> bool:
+    """Whether an entry of `equivalent` is of this fault of a file of these lines."""
+    line, text, around = fault
+    return one["fault"] == text and one["part"] in (around or lines[line - 1])
+
+
 class PlainCore:
     """For pytest: what is compiled is that of the plain sources here, which no fault changes."""
 
@@ -196,6 +202,10 @@ def main() -> None:
             lines = source.splitlines()
             listed = Plant()
             listed.visit(ast.parse(source))
+            equivalent = [one for one in DATA["equivalent"] if one["file"] == name]
+            for one in equivalent:
+                if not any(is_told(one, fault, lines) for fault in listed.found):
+                    sys.exit(f"{name}: mutation.toml tells of a fault that is none: {one['fault']}")
             if not survives(tree, name, source, [*tests, *asked.pytest]):
                 sys.exit(f"{name}: its tests fail without a fault")
             chosen = sorted(
@@ -206,11 +216,7 @@ def main() -> None:
             noticed = judged = 0
             for index in chosen:
                 line, text, around = listed.found[index]
-                if any(
-                    (one["file"], one["fault"]) == (name, text)
-                    and one["part"] in (around or lines[line - 1])
-                    for one in DATA["equivalent"]
-                ):
+                if any(is_told(one, listed.found[index], lines) for one in equivalent):
                     continue
                 fault = ast.unparse(
                     ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))

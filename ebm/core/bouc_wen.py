@@ -23,12 +23,8 @@ from __future__ import annotations
 
 import math
 
+from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
-from rockcheck.ebm.core.contacts import SLOW, closed_wall, slip_velocity, stop, upright
-from rockcheck.ebm.core.coulomb import tell
-from rockcheck.ebm.core.ground import acceleration, acceleration_after, fill_series, weightless_at
-from rockcheck.ebm.core.guards import drop, fill_guards, first_event, guard
-from rockcheck.ebm.core.modes import hangs_flat, slacken, tips_first, touched_walls
 from rockcheck.ebm.core.motion import flat_series, tilt_series, turned
 from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
@@ -75,11 +71,11 @@ def _fill_z(block, a, k, loads, yielded):
 
 
 @inner_kernel
-def _less_later(value, a, x, y, k):
+def _less_later(known, a, x, y, k):
     """A value minus the sum of x_j y_(k-j) over j = 1..k: y_k is this, divided by x_0."""
     for j in range(1, k + 1):
-        value -= a[x, j] * a[y, k - j]
-    return value
+        known -= a[x, j] * a[y, k - j]
+    return known
 
 
 @inner_kernel
@@ -114,8 +110,8 @@ def friction_series(block, base, run, zeta, yielded, order):
     x'' = Q - u.
     """
     state, a = run.state, run.a
-    fill_series(base.horizontal, state.t, float(state.mode.sense), order, a, Row.U)
-    fill_series(base.vertical, state.t, 1.0, order, a, Row.G)
+    ground.fill_series(base.horizontal, state.t, float(state.mode.sense), order, a, Row.U)
+    ground.fill_series(base.vertical, state.t, 1.0, order, a, Row.G)
     a[Row.G, 0] += 1.0
     _fill_friction_series(block, state, a, zeta, yielded, order)
 
@@ -184,14 +180,16 @@ def _held(block, base, state):
     but for rounding, is at rest; its guards say when it leaves.
     """
     motion, t = state.motion, state.t
-    g, u = 1.0 + acceleration(base.vertical, t), acceleration(base.horizontal, t)
+    g, u = 1.0 + ground.acceleration(base.vertical, t), ground.acceleration(base.horizontal, t)
     to_left, to_right = block.left.arm / block.height, block.right.arm / block.height
     slope = to_left if (u > 0.0) == (g >= 0.0) else to_right
     # At its limit where it goes decides.
     limit = (min(slope, block.mu_s) if g >= 0.0 else slope) * abs(g)
     if abs(abs(u) - limit) < NOISE[Kind.FORCE]:
-        g, u = 1.0 + acceleration_after(base.vertical, t), acceleration_after(base.horizontal, t)
-    left, right = closed_wall(block, motion, 1, False), closed_wall(block, motion, -1, False)
+        g = 1.0 + ground.acceleration_after(base.vertical, t)
+        u = ground.acceleration_after(base.horizontal, t)
+    left = contacts.closed_wall(block, motion, 1, False)
+    right = contacts.closed_wall(block, motion, -1, False)
     # Hanging: by both corners, as long as nothing at all tells to which side it tips.
     if g < 0.0 and not left and not right:
         return u == 0.0
@@ -216,9 +214,10 @@ def _hangs_on(base, state):
     mode, t = state.mode, state.t
     stands = mode.pivot == Pivot.STICK and mode.pull > 0 and not on_wall(mode)
     still = (
-        acceleration(base.horizontal, t) == 0.0 and acceleration_after(base.horizontal, t) == 0.0
+        ground.acceleration(base.horizontal, t) == 0.0
+        and ground.acceleration_after(base.horizontal, t) == 0.0
     )
-    return stands and still and acceleration_after(base.vertical, t) < -1.0
+    return stands and still and ground.acceleration_after(base.vertical, t) < -1.0
 
 
 @called_kernel
@@ -226,9 +225,9 @@ def _rest(block, base, state):
     """The mode of a block at rest on its base."""
     mode, motion = state.mode, state.motion
     place(mode, Family.FLAT, 1, Pivot.STICK, 0)
-    mode.pull = 1 if acceleration(base.vertical, state.t) > -1.0 else -1
-    mode.tip = closed_wall(block, motion, 1, False)
-    mode.far = closed_wall(block, motion, -1, False)
+    mode.pull = 1 if ground.acceleration(base.vertical, state.t) > -1.0 else -1
+    mode.tip = contacts.closed_wall(block, motion, 1, False)
+    mode.far = contacts.closed_wall(block, motion, -1, False)
 
 
 @inner_kernel
@@ -239,7 +238,7 @@ def _waits(base, state):
     """
     motion = state.motion
     if motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0:
-        state.t = weightless_at(base.vertical, state.t)
+        state.t = ground.weightless_at(base.vertical, state.t)
 
 
 @called_kernel
@@ -249,16 +248,16 @@ def _leave_rest(block, base, run):
     Returns z = -u/(mu_k G0), +-1 if it slides.
     """
     state, t = run.state, run.state.t
-    sense = tips_first(block, base, state)
-    u, g = acceleration(base.horizontal, t), 1.0 + acceleration(base.vertical, t)
+    sense = modes.tips_first(block, base, state)
+    u, g = ground.acceleration(base.horizontal, t), 1.0 + ground.acceleration(base.vertical, t)
     # Friction falls with P: nothing tips until the floor pulls.
-    soon = 1.0 + acceleration_after(base.vertical, t) <= 0.0
+    soon = 1.0 + ground.acceleration_after(base.vertical, t) <= 0.0
     hangs = g <= 0.0 if abs(g) > NOISE[Kind.FORCE] else soon
     arm = side_of(block, sense).arm
-    held = hangs or soon or closed_wall(block, state.motion, sense, False)
+    held = hangs or soon or contacts.closed_wall(block, state.motion, sense, False)
     tips = block.mu_k * block.height > (1.0 + _YIELDS) * arm
     if hangs or tips:
-        zeta = min(max(-u / max(block.mu_k * abs(g), SLOW), -1.0), 1.0)
+        zeta = min(max(-u / max(block.mu_k * abs(g), contacts.SLOW), -1.0), 1.0)
         uplift = g * min(arm / block.height, block.mu_k)
         if u != 0.0 and abs(abs(u) - uplift) < NOISE[Kind.FORCE]:
             # Just where it tips or slips. Near g = 0 the quotient is no better known, and its
@@ -284,7 +283,7 @@ def _tip(block, base, run, first, zeta, free):
     has ended at this instant does not begin again.
     """
     state = run.state
-    v = slip_velocity(block, state.motion)
+    v = contacts.slip_velocity(block, state.motion)
     for sense in (first, -first):
         _tilts(block, base, run, sense, v, zeta)
         grows = leading(run.a, Row.PHI, _LOOK, NOISE[Kind.POSITION], AHEAD)
@@ -308,7 +307,7 @@ def _starts(block, base, run, zeta):
     Returns z, changed only where the block was at rest.
     """
     state, motion = run.state, run.state.motion
-    v = slip_velocity(block, motion)
+    v = contacts.slip_velocity(block, motion)
     if motion.theta == 0.0 and motion.w == 0.0:
         if v == 0.0:
             if not _held(block, base, state):
@@ -357,7 +356,7 @@ def _close_walls(block, base, run, zeta, which):
     state, mode, motion = run.state, run.state.mode, run.state.motion
     ended = mode.pull if which == Guard.FLOOR_PUSH else 0
     lets_go = 1 if which == Guard.TIP_PUSH else (2 if which == Guard.FAR_PUSH else 0)
-    touched, fits = touched_walls(block, motion, mode.sense, False), False
+    touched, fits = modes.touched_walls(block, motion, mode.sense, False), False
     for walls in range(3, -1, -1):
         if walls & touched == walls and not walls & lets_go:
             fits = _fits_walls(block, base, run, zeta, (walls, touched), ended)
@@ -369,7 +368,7 @@ def _close_walls(block, base, run, zeta, which):
         if ended != 0:
             mode.pull = -ended  # in turn, until the slack allows one
     if mode.tip != 0 and mode.far != 0:
-        stop(motion)
+        contacts.stop(motion)
 
 
 @inner_kernel
@@ -407,8 +406,8 @@ def _wall_holds(block, run, tip, touched):
         return leading(a, push, _LOOK - 2, slack * NOISE[Kind.FORCE], AHEAD) >= 0
     if touched & (1 if tip else 2) == 0:
         return True
-    fill_guards(block, run.state, run.a)
-    guard(Guard.TIP_GAP if tip else Guard.FAR_GAP, _LOOK, a)
+    guards.fill_guards(block, run.state, run.a)
+    guards.guard(Guard.TIP_GAP if tip else Guard.FAR_GAP, _LOOK, a)
     a[Row.GUARD, 0] = a[Row.GUARD, 1] = 0.0  # it is closed: its acceleration decides
     return leading(a, Row.GUARD, _LOOK, slack * NOISE[Kind.POSITION], AHEAD) >= 0
 
@@ -450,14 +449,14 @@ def _has_sign(a, sign, ended):
 def _initial_friction(block, base, run):
     """Z at the start: sgn V for a pivot that slips, else the value that holds it (|z| <= 1)."""
     mode, motion, a = run.state.mode, run.state.motion, run.a
-    v = slip_velocity(block, motion)
-    if abs(v) > SLOW:
+    v = contacts.slip_velocity(block, motion)
+    if abs(v) > contacts.SLOW:
         return 1.0 if v > 0.0 else -1.0
     if motion.theta == 0.0 and motion.w == 0.0:
         return 0.0
     sense = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
     place(mode, Family.TILT, sense, Pivot.STICK, 0)
-    mode.tip = closed_wall(block, motion, sense, False)
+    mode.tip = contacts.closed_wall(block, motion, sense, False)
     tilt_series(block, base, run, _LOOK, 0.0, 0.0)
     if mode.tip != 0 and a[Row.NA, 0] < 0.0:
         mode.tip = 0
@@ -499,13 +498,13 @@ def locate(block, run):
     Where the pivot unloads, z comes to the sign of V there: from then on the pivot loads.
     """
     state, mode, a = run.state, run.state.mode, run.a
-    fill_guards(block, run.state, run.a)
+    guards.fill_guards(block, run.state, run.a)
     # The friction of a wedged block, which does not slip, is what z makes it: it has no cone to
     # leave.
     if mode.family == Family.TILT:
-        drop(a, Guard.CONE_PLUS)
-        drop(a, Guard.CONE_MINUS)
-    first_event(run)
+        guards.drop(a, Guard.CONE_PLUS)
+        guards.drop(a, Guard.CONE_MINUS)
+    guards.first_event(run)
     if mode.pivot == Pivot.SLIPPING and mode.slip * a[Row.Z, 0] <= -NOISE[Kind.POSITION]:
         tau, degree = state.tau, state.order - 1
         for k in range(degree + 1):
@@ -543,16 +542,16 @@ def after_event(block, base, run):
             note(run, event, state.before)
         return
     if state.guard != Guard.NONE and state.floor_impulse + state.wall_impulse == 0.0:
-        slacken(state)
-    upright(block, state.motion)
+        modes.slacken(state)
+    contacts.upright(block, state.motion)
     _waits(base, state)
     starts = math.isnan(state.zeta)
     zeta = _initial_friction(block, base, run) if starts else state.zeta
     zeta = state.zeta = _starts(block, base, run, zeta)
     # It has yielded where the pivot slips with z = +-1.
     slips = state.mode.pivot == Pivot.SLIPPING and abs(zeta) == 1.0
-    state.holds = not (slips and zeta * slip_velocity(block, state.motion) > SLOW)
-    tell(run, state.event)
+    state.holds = not (slips and zeta * contacts.slip_velocity(block, state.motion) > contacts.SLOW)
+    coulomb.tell(run, state.event)
 
 
 @called_kernel
@@ -561,7 +560,7 @@ def _follow(block, base, run):
     state, mode, which = run.state, run.state.mode, run.state.guard
     _waits(base, state)
     # At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
-    slacken(state)
+    modes.slacken(state)
     if which == Guard.LOADS:
         state.zeta = 0.0
         return Event.UNTOLD
@@ -569,7 +568,7 @@ def _follow(block, base, run):
         return _turn(block, base, state)
     if mode.family == Family.FLAT and (which == Guard.FLOOR_PUSH or _hangs_on(base, state)):
         mode.pull = -mode.pull
-        state.rules[Rule.HANGS] += hangs_flat(mode)
+        state.rules[Rule.HANGS] += modes.hangs_flat(mode)
         return Event.UNTOLD
     if mode.family == Family.TILT:  # the push of the floor or of a wall ends
         _close_walls(block, base, run, state.zeta, which)
@@ -615,7 +614,7 @@ def _tip_sliding(block, base, run):
     """
     state, slip = run.state, run.state.mode.slip
     # It slid by rounding, whose sign would choose the side.
-    if abs(state.motion.vx) < SLOW and _comes_to_rest(block, base, state):
+    if abs(state.motion.vx) < contacts.SLOW and _comes_to_rest(block, base, state):
         return Event.STICKS
     if state.holds and 1.0 - slip * state.zeta < _YIELDS:
         state.zeta = float(slip)

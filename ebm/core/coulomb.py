@@ -4,21 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from rockcheck.ebm.core.contacts import CLOSED, stand, stop
-from rockcheck.ebm.core.guards import fill_guards, first_event, rock_guards_hold
-from rockcheck.ebm.core.modes import select
+from rockcheck.ebm.core import contacts, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Shape
-from rockcheck.ebm.core.series import (
-    AHEAD,
-    NO_ROOT,
-    NOISE,
-    ORDER,
-    first_root,
-    longest_step,
-    size_of,
-    step_size,
-)
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rests, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -35,41 +23,41 @@ def expand(block, base, run, reach):
     reach = min(reach, _FARTHER * state.stride)
     state.place = 0.0
     if mode.family == Family.FLAT:
-        order = state.order = flat_series(block, base, run, ORDER)
-        state.length = step_size(a, Row.U, Row.G, order, state.last_term_rad, reach)
+        order = state.order = flat_series(block, base, run, series.ORDER)
+        state.length = series.step_size(a, Row.U, Row.G, order, state.last_term_rad, reach)
         return
     # The tolerance is relative to a motion that is still tiny, since it may grow.
     enough = 0.01 * state.tolerance_rad * min(1.0, 1e2 * (abs(motion.theta) + abs(motion.w)))
-    order = state.order = tilt_series(block, base, run, ORDER, enough, reach)
+    order = state.order = tilt_series(block, base, run, series.ORDER, enough, reach)
     state.place = mode.sense * motion.x - a[Row.SIN, 0]
     state.length = reach
-    if order == ORDER:
-        last = size_of(a, Row.PHI, Row.COS, order)
-        before = size_of(a, Row.PHI, Row.COS, order - 1)
+    if order == series.ORDER:
+        last = series.size_of(a, Row.PHI, Row.COS, order)
+        before = series.size_of(a, Row.PHI, Row.COS, order - 1)
         free = rocks(mode)
         if not free:
-            last = max(last, size_of(a, Row.XI, Row.Y, order))
-            before = max(before, size_of(a, Row.XI, Row.Y, order - 1))
+            last = max(last, series.size_of(a, Row.XI, Row.Y, order))
+            before = max(before, series.size_of(a, Row.XI, Row.Y, order - 1))
         if (
             not free or base.vertical.form.kind != Shape.STILL
         ):  # forces follow the base acceleration
-            last = max(last, size_of(a, Row.U, Row.G, order))
-            before = max(before, size_of(a, Row.U, Row.G, order - 1))
-        state.length = longest_step(last, before, order, state.last_term_rad, reach)
+            last = max(last, series.size_of(a, Row.U, Row.G, order))
+            before = max(before, series.size_of(a, Row.U, Row.G, order - 1))
+        state.length = series.longest_step(last, before, order, state.last_term_rad, reach)
 
 
 @inner_kernel
 def locate(block, run):
     """The first time within the step at which a guard ends the mode, and which."""
     state, mode, h = run.state, run.state.mode, run.state.length
-    if rocks(mode) and mode.pull > 0 and rock_guards_hold(block, run):
-        noise = min(state.slack * NOISE[Kind.POSITION], CLOSED)
-        tau = first_root(run.a, Row.PHI, state.order, h, h, noise, AHEAD, run.stack)
-        none = tau == NO_ROOT
+    if rocks(mode) and mode.pull > 0 and guards.rock_guards_hold(block, run):
+        noise = min(state.slack * series.NOISE[Kind.POSITION], contacts.CLOSED)
+        tau = series.first_root(run.a, Row.PHI, state.order, h, h, noise, series.AHEAD, run.stack)
+        none = tau == series.NO_ROOT
         state.tau, state.guard = h if none else tau, (Guard.NONE if none else Guard.PHI)
         return
-    fill_guards(block, run.state, run.a)
-    first_event(run)
+    guards.fill_guards(block, run.state, run.a)
+    guards.first_event(run)
 
 
 @inner_kernel
@@ -88,7 +76,7 @@ def after_event(block, base, run):
     if state.guard > Guard.FAR_GAP:
         state.event = _release(block, state)
     event, ended = state.event, code_of(mode)
-    if not select(block, base, run):
+    if not modes.select(block, base, run):
         state.ending = Ending.NOT_FINITE
         return
     # Events that are changes of mode and nothing else.
@@ -123,8 +111,8 @@ def _release(block, state):
     mode, which = state.mode, state.guard
     if which == Guard.SLIP:
         if on_wall(mode):
-            stop(state.motion)
-        stand(block, state.motion)
+            contacts.stop(state.motion)
+        contacts.stand(block, state.motion)
         return Event.STICKS
     if not block.unilateral and rests(mode) and not on_wall(mode):
         # Or hangs on, or lands again: the next mode says which.

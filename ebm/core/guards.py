@@ -13,21 +13,8 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core import contacts, lanes, motion
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
-from rockcheck.ebm.core.contacts import CLOSED, SLOW, closed_gap
-from rockcheck.ebm.core.lanes import (
-    LANES,
-    above,
-    falls,
-    load,
-    powers,
-    ramp,
-    store,
-    total,
-    upto,
-    zeros,
-)
-from rockcheck.ebm.core.motion import delta
 from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.series import (
     AHEAD,
@@ -73,7 +60,7 @@ _ANY = 2.0**400
 
 
 @inner_kernel
-def _enter(a, which, shorter, series, weight):
+def _enter(a, which, shorter, source, weight):
     """Enters a guard into the table, `shorter` terms shorter than the series.
 
     It gets the weight of one series; its other weights and its constant are zero.
@@ -81,7 +68,7 @@ def _enter(a, which, shorter, series, weight):
     row = Row.TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = 0.0
-    a[row, series], a[row, _CONSTANT], a[row, _SHORTER] = weight, 0.0, shorter
+    a[row, source], a[row, _CONSTANT], a[row, _SHORTER] = weight, 0.0, shorter
 
 
 @inner_kernel
@@ -141,12 +128,16 @@ def _fill_gap(block, state, a, tip):
     """The clear gap of the corner that faces the tip wall, +-xi + delta - s', or the far wall."""
     mode, pivot = state.mode, state.place
     which = Guard.TIP_GAP if tip else Guard.FAR_GAP
-    distance = delta(block, mode, tip)
+    distance = motion.delta(block, mode, tip)
     if (mode.tip if tip else mode.far) != 0 or distance == np.inf:
         return
     sense = 1.0 if tip else -1.0
     rock = rocks(mode)
-    if rock and not tip and distance - pivot - (block.left.arm + block.right.arm) > -CLOSED:
+    if (
+        rock
+        and not tip
+        and distance - pivot - (block.left.arm + block.right.arm) > -contacts.CLOSED
+    ):
         # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands:
         # it cannot close before.
         return
@@ -225,12 +216,12 @@ def _coefficients(which, half, a):
 
     A series without weight need not be there.
     """
-    row, sum, rate = Row.TABLE + which, zeros(), KIND[which] == Kind.RATE
+    row, sum, rate = Row.TABLE + which, lanes.zeros(), KIND[which] == Kind.RATE
     for part in range(_MOST):
-        series = _COMBINES[which, part]
-        if a[row, series] != 0.0:
-            sum = sum + a[row, series] * load(a, series, half + rate)
-    return sum * (ramp() + (half + 1.0)) if rate else sum
+        source = _COMBINES[which, part]
+        if a[row, source] != 0.0:
+            sum = sum + a[row, source] * lanes.load(a, source, half + rate)
+    return sum * (lanes.ramp() + (half + 1.0)) if rate else sum
 
 
 @inner_kernel
@@ -239,11 +230,11 @@ def guard(which, order, a):
     row = Row.TABLE + which
     if a[row, _SHORTER] < 0.0:
         return -1
-    for half in (0, LANES):
-        store(a, Row.GUARD, half, _coefficients(which, half, a))
+    for half in (0, lanes.LANES):
+        lanes.store(a, Row.GUARD, half, _coefficients(which, half, a))
     a[Row.GUARD, 0] += a[row, _CONSTANT]
     if Guard.LANDING <= which <= Guard.FAR_GAP:
-        a[Row.GUARD, 0], a[Row.GUARD, 1] = closed_gap(a[Row.GUARD, 0], a[Row.GUARD, 1])
+        a[Row.GUARD, 0], a[Row.GUARD, 1] = contacts.closed_gap(a[Row.GUARD, 0], a[Row.GUARD, 1])
     return order - int(a[row, _SHORTER])
 
 
@@ -261,11 +252,11 @@ def _with_slack(which, slack, a):
     if (
         slack == 1.0
         or which == Guard.PHI
-        or abs(a[Row.GUARD, 0]) > CLOSED
-        or a[Row.GUARD, 1] < -SLOW
+        or abs(a[Row.GUARD, 0]) > contacts.CLOSED
+        or a[Row.GUARD, 1] < -contacts.SLOW
     ):
-        return min(slack * NOISE[Kind.POSITION], CLOSED)
-    a[Row.GUARD, 0] += CLOSED
+        return min(slack * NOISE[Kind.POSITION], contacts.CLOSED)
+    a[Row.GUARD, 0] += contacts.CLOSED
     return NOISE[Kind.POSITION]
 
 
@@ -304,7 +295,7 @@ def starts_positive(which, ahead, a):
         return False
     begin = _coefficient(which, 0, a) + a[row, _CONSTANT]
     floor = (
-        max(NOISE[KIND[which]], CLOSED)
+        max(NOISE[KIND[which]], contacts.CLOSED)
         if Guard.LANDING <= which <= Guard.FAR_GAP
         else NOISE[KIND[which]]
     )
@@ -324,11 +315,13 @@ def _stays_positive(which, order, until, slack, a):
         return False
     begin, degree = a[row, _CONSTANT] + _coefficient(which, 0, a), order - int(a[row, _SHORTER])
     low, high = (
-        upto(_coefficients(which, 0, a), degree),
-        upto(_coefficients(which, LANES, a), degree - LANES),
+        lanes.upto(_coefficients(which, 0, a), degree),
+        lanes.upto(_coefficients(which, lanes.LANES, a), degree - lanes.LANES),
     )
-    fallen = total((above(falls(low), 0) + falls(high) * eighth(until)) * powers(until))
-    return begin > max(slack * NOISE[KIND[which]], CLOSED) and -fallen < 0.999999 * begin
+    fallen = lanes.total(
+        (lanes.above(lanes.falls(low), 0) + lanes.falls(high) * eighth(until)) * lanes.powers(until)
+    )
+    return begin > max(slack * NOISE[KIND[which]], contacts.CLOSED) and -fallen < 0.999999 * begin
 
 
 @inner_kernel
@@ -430,4 +423,6 @@ def _rock_gap_holds(row, order, h, a):
     cos_low, cos_high = halves(a, Row.COS, order)
     sin_low, sin_high = halves(a, Row.SIN, order)
     low = least_change(along * cos_low + across * sin_low, along * cos_high + across * sin_high, h)
-    return along * a[Row.COS, 0] + across * a[Row.SIN, 0] + a[row, _CONSTANT] + low > CLOSED
+    return (
+        along * a[Row.COS, 0] + across * a[Row.SIN, 0] + a[row, _CONSTANT] + low > contacts.CLOSED
+    )

@@ -12,18 +12,21 @@ from types import ModuleType
 
 import numpy as np
 
-from rockcheck.ebm.core import bouc_wen, coulomb
-from rockcheck.ebm.core.contacts import closed_floor
-from rockcheck.ebm.core.decide import quiet_from
-from rockcheck.ebm.core.ground import Ground, next_kink
-from rockcheck.ebm.core.guards import KIND
+from rockcheck.ebm.core import (
+    bouc_wen,
+    contacts,
+    coulomb,
+    decide,
+    ground,
+    guards,
+    modes,
+    moving,
+    rest,
+    series,
+    settle,
+)
 from rockcheck.ebm.core.laws.strike import strike
-from rockcheck.ebm.core.modes import forget, leave
-from rockcheck.ebm.core.moving import advance, may_go_on, passes_on, sample
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
-from rockcheck.ebm.core.rest import rest, sample_rest, waits
-from rockcheck.ebm.core.series import ORDER
-from rockcheck.ebm.core.settle import no_impacts, settling_speed
 from rockcheck.ebm.core.state import Base, Records, Run, mode_code, rests
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -42,9 +45,9 @@ def loop_with(friction: ModuleType) -> object:
             if state.changing:
                 state.changing = False
                 after_event(block, base, run)
-            elif looks_ahead and waits(base, state):
-                rest(block, base, run)
-            elif may_go_on(block, base, run):
+            elif looks_ahead and rest.waits(base, state):
+                rest.rest(block, base, run)
+            elif moving.may_go_on(block, base, run):
                 step(block, base, run)
         end(run)
 
@@ -58,10 +61,10 @@ def loop_with(friction: ModuleType) -> object:
         locate(block, run)
         if not finite(state, math.isfinite(state.tau)):
             return
-        sample(block, run)
-        advance(block, base, run)
+        moving.sample(block, run)
+        moving.advance(block, base, run)
         advance_friction(run)
-        if state.guard != Guard.NONE and not passes_on(block, base, run):
+        if state.guard != Guard.NONE and not moving.passes_on(block, base, run):
             resolve(block, base, run)
 
     @inner_kernel
@@ -73,8 +76,8 @@ def loop_with(friction: ModuleType) -> object:
         state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
         sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
         base = Base(
-            Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
-            Ground(upward, samples[upward.first : upward.first + upward.count]),
+            ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
+            ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
         )
         written = Records(records.out[i], records.out_mode[i], records.log[i])
         march(rows.settings[i], base, Run(state, work[0], work[1], written))
@@ -93,22 +96,22 @@ def begin(block, base, run):
     # All that a block does before it topples happens within alpha. Terms fall like the powers of a
     # ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what
     # is left out is a geometric series. It may be half of the tolerance.
-    ratio = control.tolerance ** (1.0 / ORDER)
+    ratio = control.tolerance ** (1.0 / series.ORDER)
     state.tolerance_rad = control.tolerance * min(block.left.alpha, block.right.alpha)
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
-    state.quiet_from = quiet_from(base, state.tolerance_rad)
+    state.quiet_from = decide.quiet_from(base, state.tolerance_rad)
     state.steps = state.events = state.wall_impacts = state.rows = state.gains = 0
     state.largest_gain = state.floor_impulse = state.wall_impulse = 0.0
     state.rules[:] = 0
     state.holds = state.known = False
     state.began = state.place = 0.0
-    no_impacts(state)
-    forget(state)
+    settle.no_impacts(state)
+    modes.forget(state)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
     stands = motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     state.guard, state.before, state.changing = Guard.NONE, 0, True
-    leaves = stands and closed_floor(block, motion)
+    leaves = stands and contacts.closed_floor(block, motion)
     state.event = Event.LEAVES_REST if leaves else Event.UNTOLD
     mode = state.mode
     mode.family = mode.sense = mode.pivot = mode.slip = mode.pull = mode.tip = mode.far = 0
@@ -117,7 +120,7 @@ def begin(block, base, run):
 @inner_kernel
 def smooth_until(base, state):
     """The time up to which the base motion is smooth, or at which the run ends."""
-    kink = min(next_kink(base.horizontal, state.t), next_kink(base.vertical, state.t))
+    kink = min(ground.next_kink(base.horizontal, state.t), ground.next_kink(base.vertical, state.t))
     state.smooth_until = min(kink, state.t_end)
     return state.smooth_until
 
@@ -139,13 +142,13 @@ def resolve(block, base, run):
     state = run.state
     state.before, state.known, state.changing = mode_code(state), False, True
     state.event = Event.UNTOLD
-    leave(state, KIND[state.guard])
+    modes.leave(state, guards.KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
         state.floor_impulse = state.wall_impulse = 0.0
-        resting = settling_speed(state)
+        resting = settle.settling_speed(state)
         state.event, state.known = strike(block, base, run, resting)
         if state.floor_impulse + state.wall_impulse > 0.0:
-            forget(state)  # a new motion: all modes may be tried again
+            modes.forget(state)  # a new motion: all modes may be tried again
         elif block.unilateral:
             state.event = Event.UNTOLD  # a block in flight passes theta = 0
         state.wall_impacts += state.event == Event.WALL_IMPACT
@@ -158,7 +161,7 @@ def end(run):
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE
     if state.ending == Ending.DONE and not run.state.control.until_decided:
-        sample_rest(run, np.inf)
+        rest.sample_rest(run, np.inf)
 
 
 @inner_kernel

@@ -20,22 +20,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rockcheck.ebm.core.contacts import (
-    CLOSED,
-    SLOW,
-    closed_floor,
-    closed_wall,
-    slip_velocity,
-    stand,
-    stop,
-    upright,
-)
-from rockcheck.ebm.core.ground import acceleration, acceleration_after, next_kink
-from rockcheck.ebm.core.guards import KIND, fill_guards, guard, seen, starts_positive
+from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.ebm.core.series import INSTANT, NOISE, WIDTH, contradiction, leading
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -113,10 +101,10 @@ def leave(state, kind):
 
     If it was a force's, and by rounding only, the mode may go on once.
     """
-    if state.t - state.since > INSTANT:
+    if state.t - state.since > series.INSTANT:
         forget(state)
     code = code_of(state.mode)
-    state.tried[code] = kind != Kind.FORCE or state.t - state.began <= INSTANT
+    state.tried[code] = kind != Kind.FORCE or state.t - state.began <= series.INSTANT
     state.ended = code if kind == Kind.FORCE else -1
 
 
@@ -135,7 +123,7 @@ def wrong_by(block, base, run, measured):
     does not begin, or if that slack is not `measured`: only where no mode fits is it asked for.
     """
     # The plain constant would make numba compile all series once more, for it alone.
-    look = min(_LOOK, WIDTH)
+    look = min(_LOOK, series.WIDTH)
     state, mode, t, a = run.state, run.state.mode, run.state.t, run.a
     state.place = 0.0
     if mode.family == Family.FLAT:
@@ -143,12 +131,12 @@ def wrong_by(block, base, run, measured):
     else:
         order = tilt_series(block, base, run, look, 0.0, 0.0)
         state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
-    fill_guards(block, run.state, run.a)
-    smooth = min(next_kink(base.horizontal, t), next_kink(base.vertical, t)) - t
+    guards.fill_guards(block, run.state, run.a)
+    smooth = min(ground.next_kink(base.horizontal, t), ground.next_kink(base.vertical, t)) - t
     worst = 0.0
     for which in range(GUARDS):
-        ahead = seen(KIND[which], smooth)
-        if not starts_positive(which, ahead, a):
+        ahead = guards.seen(guards.KIND[which], smooth)
+        if not guards.starts_positive(which, ahead, a):
             worst = max(worst, _guard_wrong_by(mode, which, order, ahead, a, measured))
             if worst == np.inf:
                 break
@@ -158,10 +146,10 @@ def wrong_by(block, base, run, measured):
 @inner_kernel
 def _guard_wrong_by(mode, which, order, ahead, a, measured):
     """What one guard adds to `wrong_by`."""
-    noise, degree = NOISE[KIND[which]], guard(which, order, a)
-    if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -SLOW:
+    noise, degree = series.NOISE[guards.KIND[which]], guards.guard(which, order, a)
+    if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -contacts.SLOW:
         return 0.0  # a closing contact is the impact handler's
-    sign = leading(a, Row.GUARD, degree, noise, ahead)
+    sign = series.leading(a, Row.GUARD, degree, noise, ahead)
     never = sign <= 0 and which == Guard.PHI and (mode.pivot != Pivot.OFF or sign < 0)
     if never or not math.isfinite(a[Row.GUARD, 0]):
         return np.inf
@@ -169,7 +157,7 @@ def _guard_wrong_by(mode, which, order, ahead, a, measured):
         return 0.0
     if not measured:
         return np.inf
-    return contradiction(a, Row.GUARD, degree, noise, ahead) / noise if sign < 0 else 1.0
+    return series.contradiction(a, Row.GUARD, degree, noise, ahead) / noise if sign < 0 else 1.0
 
 
 @inner_kernel
@@ -182,12 +170,12 @@ def _favoured(block, base, state):
     order of calculation, so that a mirror image gives the mirrored result.
     """
     motion, t = state.motion, state.t
-    toward = acceleration(base.horizontal, t)
-    if abs(toward) <= NOISE[Kind.FORCE]:
-        toward = acceleration_after(base.horizontal, t)
+    toward = ground.acceleration(base.horizontal, t)
+    if abs(toward) <= series.NOISE[Kind.FORCE]:
+        toward = ground.acceleration_after(base.horizontal, t)
     if toward == 0.0:
         toward = -motion.vx
-    if toward == 0.0 and abs(motion.x) > NOISE[Kind.POSITION]:
+    if toward == 0.0 and abs(motion.x) > series.NOISE[Kind.POSITION]:
         toward = motion.x
     if toward == 0.0 and block.gap_left != block.gap_right:
         toward = block.gap_left - block.gap_right
@@ -243,7 +231,7 @@ def _possible(block, mode, motion, at):
     if flat and not _flat_on(mode, mine, at.upright_walls):
         return False
     # Near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on it.
-    lies = mine == 2 and motion.theta * motion.theta < CLOSED
+    lies = mine == 2 and motion.theta * motion.theta < contacts.CLOSED
     if not flat and mode.pivot == Pivot.STICK and lies:
         return False
     # Along a wall the pivot slips as the block turns.
@@ -280,8 +268,8 @@ def touched_walls(block, motion, sense, flat):
     """
     if not block.walls:
         return 0
-    return (1 if closed_wall(block, motion, 1 if flat else sense, False) else 0) + (
-        2 if closed_wall(block, motion, -1 if flat else -sense, not flat) else 0
+    return (1 if contacts.closed_wall(block, motion, 1 if flat else sense, False) else 0) + (
+        2 if contacts.closed_wall(block, motion, -1 if flat else -sense, not flat) else 0
     )
 
 
@@ -291,16 +279,21 @@ def _clean(block, motion, floor):
 
     That is a tilt, a slip, or the motion of a block that stands on floor and wall.
     """
-    upright(block, motion)
-    if floor and abs(slip_velocity(block, motion)) < SLOW:
-        stand(block, motion)
+    contacts.upright(block, motion)
+    if floor and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW:
+        contacts.stand(block, motion)
     if not floor or not block.walls or (motion.theta == 0.0 and motion.w == 0.0):
         return
     side = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
-    near, away = closed_wall(block, motion, side, False), closed_wall(block, motion, -side, True)
-    if (near and away) or (motion.theta != 0.0 and abs(motion.w) < SLOW and (near or away)):
-        stop(motion)
-        upright(block, motion)
+    near, away = (
+        contacts.closed_wall(block, motion, side, False),
+        contacts.closed_wall(block, motion, -side, True),
+    )
+    if (near and away) or (
+        motion.theta != 0.0 and abs(motion.w) < contacts.SLOW and (near or away)
+    ):
+        contacts.stop(motion)
+        contacts.upright(block, motion)
 
 
 class _Touching(NamedTuple):
@@ -324,9 +317,9 @@ class _Touching(NamedTuple):
 @inner_kernel
 def _touching(block, base, state):
     motion = state.motion
-    floor = not block.unilateral or closed_floor(block, motion)
+    floor = not block.unilateral or contacts.closed_floor(block, motion)
     _clean(block, motion, floor)
-    v = slip_velocity(block, motion)
+    v = contacts.slip_velocity(block, motion)
     if motion.theta != 0.0 or motion.w != 0.0:
         first = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
         near = touched_walls(block, motion, first, False)

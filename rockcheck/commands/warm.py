@@ -28,8 +28,7 @@ def _played(name: str) -> tuple[Any, Scene]:
 
 
 def _batches(name: str) -> None:
-    from rockcheck.ebm.batch import pack, run_batch
-    from rockcheck.ebm.ensemble import play_ensemble
+    from rockcheck.ebm.batch import pack, play_ensemble, run_batch
 
     model, scene = _played(name)
     run_batch(pack([scene], model), model, jobs=1)

@@ -71,7 +71,7 @@ class Core:
         coefficients, h: float, noise: float = series.NOISE[Kind.POSITION]
     ) -> float | None:
         """First time in [0, h] at which the polynomial (constant first) turns negative."""
-        row, stack = _row(coefficients), np.zeros((48, series.WIDTH))
+        row, stack = _row(coefficients), np.full((48, series.WIDTH), np.nan)
         found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
         return None if found == series.NO_ROOT else found
 

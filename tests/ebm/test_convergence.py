@@ -7,8 +7,8 @@ import pytest
 from stepping import play, six
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.batch import play_ensemble
 from rockcheck.ebm.core.state import workspace
-from rockcheck.ebm.ensemble import play_ensemble
 from rockcheck.scenes import (
     Block,
     Floor,

@@ -315,7 +315,7 @@ def propagate(
     """
     from scipy.stats import binomtest, qmc
 
-    from rockcheck.ebm.ensemble import play_ensemble
+    from rockcheck.ebm.batch import play_ensemble
 
     if not given.spreads:
         said = "no number of this scene is uncertain: write one as { value = 0.3, sd = 0.03 }"

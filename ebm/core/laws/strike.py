@@ -11,23 +11,10 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core import contacts, modes, series
 from rockcheck.ebm.core.block import side_of
-from rockcheck.ebm.core.contacts import (
-    CLOSED,
-    SLOW,
-    between_walls,
-    closed_floor,
-    floor_gap,
-    land_upright,
-    lower,
-    slip_velocity,
-    stand,
-    stop,
-    wall_gap,
-)
 from rockcheck.ebm.core.laws import impacts
 from rockcheck.ebm.core.laws.contact_impacts import WORK, Impact, contact_impact
-from rockcheck.ebm.core.modes import tips_first
 from rockcheck.ebm.core.names import (
     Branch,
     Contact,
@@ -40,7 +27,6 @@ from rockcheck.ebm.core.names import (
     Pivot,
 )
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.ebm.core.series import NOISE
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -59,8 +45,8 @@ def strike(block, base, run, resting):
         state.rules[Rule.LANDS_ALONG] += 1
         which = Guard.PHI
     if which == Guard.PHI:
-        floor = mode.pivot != Pivot.OFF or closed_floor(block, motion)
-        land_upright(block, motion, float(mode.sense), floor)
+        floor = mode.pivot != Pivot.OFF or contacts.closed_floor(block, motion)
+        contacts.land_upright(block, motion, float(mode.sense), floor)
     wall = which == Guard.TIP_GAP or which == Guard.FAR_GAP
     known = False
     if block.unilateral:
@@ -69,8 +55,12 @@ def strike(block, base, run, resting):
         known = _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
         known = _floor_impact(block, state, resting)
-    if not known and not block.unilateral and abs(slip_velocity(block, motion)) < SLOW:
-        stand(block, motion)
+    if (
+        not known
+        and not block.unilateral
+        and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW
+    ):
+        contacts.stand(block, motion)
     if motion.theta == 0.0 and abs(motion.w) < SETTLE:
         _settle_flat(block, state, resting)
         known = False
@@ -87,8 +77,8 @@ def _lands_along(block, state):
     rounding only.
     """
     mode, motion = state.mode, state.motion
-    upright = mode.family == Family.TILT and motion.theta * motion.theta < CLOSED
-    return upright and mode.sense * motion.w < 0.0 and closed_floor(block, motion)
+    upright = mode.family == Family.TILT and motion.theta * motion.theta < contacts.CLOSED
+    return upright and mode.sense * motion.w < 0.0 and contacts.closed_floor(block, motion)
 
 
 @inner_kernel
@@ -101,7 +91,7 @@ def touch(block, mode, motion, which):
     """
     phi = abs(motion.theta)
     if which == Guard.LANDING:
-        side = lower(block, motion)
+        side = contacts.lower(block, motion)
         motion.y = side.radius * math.cos(side.alpha - phi)
     elif which == Guard.TIP_GAP and mode.family == Family.TILT and mode.pivot == Pivot.STICK:
         sign, side = float(mode.sense), side_of(block, mode.sense)
@@ -109,7 +99,7 @@ def touch(block, mode, motion, which):
         arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(
             side.top_alpha + phi
         )
-        turned = phi + wall_gap(block, motion, mode.sense) / arms
+        turned = phi + contacts.wall_gap(block, motion, mode.sense) / arms
         if turned > 0.0:
             s, c = (
                 side.radius * math.sin(side.alpha - turned),
@@ -118,12 +108,12 @@ def touch(block, mode, motion, which):
             motion.x, motion.y, motion.theta = sign * (pivot + s), c, sign * turned
             motion.vx, motion.vy = -c * motion.w, s * sign * motion.w
         else:  # past upright it would stand on its other corner, without an impact
-            motion.x -= sign * wall_gap(block, motion, mode.sense)
+            motion.x -= sign * contacts.wall_gap(block, motion, mode.sense)
     elif which == Guard.TIP_GAP or which == Guard.FAR_GAP:
         side = (
             1 if (which == Guard.TIP_GAP) == (mode.family == Family.FLAT or mode.sense > 0) else -1
         )
-        motion.x -= side * wall_gap(block, motion, side)
+        motion.x -= side * contacts.wall_gap(block, motion, side)
 
 
 @inner_kernel
@@ -134,10 +124,10 @@ def _settle_flat(block, state, resting):
     """
     motion = state.motion
     state.rules[Rule.SETTLES] += 1
-    v = slip_velocity(block, motion)
+    v = contacts.slip_velocity(block, motion)
     motion.vx = v if abs(v) > max(resting, 4.0 * SETTLE) else 0.0
     motion.w = 0.0
-    if abs(floor_gap(block, motion)) < CLOSED and motion.vy < resting:
+    if abs(contacts.floor_gap(block, motion)) < contacts.CLOSED and motion.vy < resting:
         motion.vy = 0.0
 
 
@@ -148,14 +138,14 @@ def _floor_impact(block, state, resting):
     Returns whether it is already known to rock on in the state's mode.
     """
     mode, motion = state.mode, state.motion
-    w1, v1 = motion.w, slip_velocity(block, motion)
+    w1, v1 = motion.w, contacts.slip_velocity(block, motion)
     S1, c = mode.sense, block.height
     s1, s2 = side_of(block, S1).arm, side_of(block, -S1).arm
     if on_wall(mode):  # from LADDER: every contact plastic, flush rest
         state.floor_impulse = abs(motion.vy)
-        stop(motion)
+        contacts.stop(motion)
         return False
-    if wall_gap(block, motion, -S1) < CLOSED:
+    if contacts.wall_gap(block, motion, -S1) < contacts.CLOSED:
         # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper
         # is silent).
         state.rules[Rule.FLUSH_LANDING] += 1
@@ -183,10 +173,10 @@ def _wall_impact(block, state, tip, resting):
     """
     mode, motion = state.mode, state.motion
     # Wedged: between both walls at once nothing rebounds.
-    if between_walls(block, motion) or on_wall(mode):
+    if contacts.between_walls(block, motion) or on_wall(mode):
         state.rules[Rule.WEDGED] += 1
         state.wall_impulse = abs(motion.vx)
-        stop(motion)
+        contacts.stop(motion)
         return False
     left = tip if mode.family == Family.FLAT else (mode.sense > 0) == tip
     e = block.e_left if left else block.e_right
@@ -223,13 +213,13 @@ def _corner_impact(block, state, sw, e, resting):
     stays = stays or sw * (xdot2 - C * w2) < resting
     if stays:
         xdot2 = C * w2
-    if abs(xdot2 + c * w2) < SLOW:
+    if abs(xdot2 + c * w2) < contacts.SLOW:
         xdot2 = -c * w2
     motion.w, motion.vx, motion.vy = sign * w2, sign * xdot2, s * w2
     # Its side: the other corner follows.
     flush = phi == 0.0 and stays and -resting < sw * xdot2 + c * w2 < 0.0
     if (block.no_slip and stays) or flush:
-        stop(motion)
+        contacts.stop(motion)
     if not stays and v2 == 0.0:
         place(mode, Family.TILT, mode.sense, Pivot.STICK, 0)
         return True
@@ -239,7 +229,7 @@ def _corner_impact(block, state, sw, e, resting):
 @inner_kernel
 def count_gain(before, after, state):
     """Counts an impact that added energy, and keeps the largest relative gain."""
-    if after > before * (1.0 + 10.0 * NOISE[Kind.POSITION]):
+    if after > before * (1.0 + 10.0 * series.NOISE[Kind.POSITION]):
         state.gains += 1
         state.largest_gain = max(state.largest_gain, after / before - 1.0)
 
@@ -248,14 +238,14 @@ def count_gain(before, after, state):
 def _strike_all(block, base, run, resting):
     """Unilateral pivot: resolves all contacts touched at this instant."""
     state, mode, motion, work = run.state, run.state.mode, run.state.motion, run.stack
-    sense = tips_first(block, base, state) if mode.family == Family.FLAT else mode.sense
+    sense = modes.tips_first(block, base, state) if mode.family == Family.FLAT else mode.sense
     sign = float(sense)
     phi = abs(motion.theta)
     flat = motion.theta == 0.0
-    floor = abs(floor_gap(block, motion)) < CLOSED
+    floor = abs(contacts.floor_gap(block, motion)) < contacts.CLOSED
     tip, far = (
-        abs(wall_gap(block, motion, sign)) < CLOSED,
-        abs(wall_gap(block, motion, -sign)) < CLOSED,
+        abs(contacts.wall_gap(block, motion, sign)) < contacts.CLOSED,
+        abs(contacts.wall_gap(block, motion, -sign)) < contacts.CLOSED,
     )
     touching, v = work[WORK], work[WORK + 1]
     touching[Contact.FOOT], touching[Contact.OTHER] = floor, flat and floor
@@ -263,7 +253,7 @@ def _strike_all(block, base, run, resting):
     touching[Contact.FAR_BOTTOM], touching[Contact.FAR_TOP] = far, flat and far
     v[0], v[1], v[2] = sign * motion.vx, motion.vy, sign * motion.w
     slower = v[1] + max(side_of(block, -sign).arm * v[2], -side_of(block, sign).arm * v[2])
-    state.rules[Rule.FLAT_LANDING] += flat and floor and slower < -SLOW
+    state.rules[Rule.FLAT_LANDING] += flat and floor and slower < -contacts.SLOW
     e_tip = block.e_left if sign > 0 else block.e_right
     e_far = block.e_right if sign > 0 else block.e_left
     if tip and far:
@@ -275,5 +265,5 @@ def _strike_all(block, base, run, resting):
         least = found == Found.LEAST_WRONG
         state.rules[Rule.LEAST_CONTRADICTION if least else Rule.ENDLESS_STAGES] += 1
     motion.vx, motion.vy, motion.w = sign * v[0], v[1], sign * v[2]
-    if floor and abs(slip_velocity(block, motion)) < SLOW:
-        stand(block, motion)
+    if floor and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW:
+        contacts.stand(block, motion)

@@ -128,6 +128,15 @@ def landing(
     return after, float(state.largest_gain)
 
 
+def test_no_speed_obeys_friction_that_has_the_levers_of_the_wall():
+    """(32) divides by the difference of the two levers."""
+    for side in (1.0, -1.0):
+        corner = impacts.Corner(side, 1.0, 0.3, 0.8, 0.6, 0.75, 3.0)
+        same = side * 0.6 / 0.3
+        assert impacts._slips_without_wall(corner, 0.4, 0.2, same)[0] == Branch.NO_BRANCH
+        assert impacts._slips_without_wall(corner, 0.4, 0.2, 1.001 * same)[0] == Branch.E_SLIP
+
+
 def test_an_impact_reads_no_scratch_that_it_has_not_written():
     """Whatever the root search has left there: also impacts whose approach is hardly more than
     rounding."""

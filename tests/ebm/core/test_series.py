@@ -234,6 +234,15 @@ def test_terms_beyond_the_third_drown_no_earlier_one():
     assert Core.leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
 
 
+@pytest.mark.parametrize("ahead", [0.1, 10.0])
+def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead):
+    for share, leads in ((0.99, True), (1.01, False)):
+        noisy = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
+        assert series.leads_up(1.0, noisy[0], 0.0, 0.0, ahead) == leads
+        assert series.leads_up(1.0, 0.0, -noisy[1], 0.0, ahead) == leads
+        assert series.leads_up(1.0, 0.0, 0.0, share, ahead) == leads
+
+
 @pytest.mark.parametrize("seed", range(40))
 def test_what_stays_below_a_level_is_below_it(seed):
     r = np.random.default_rng(seed)
