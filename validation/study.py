@@ -213,14 +213,26 @@ class _Run:
         workers: Pool | None = None
         while waiting := self._next():
             self._estimate(waiting)
-            elsewhere = [task for task in waiting if self._elsewhere(task)]
+            elsewhere = [
+                task
+                for task in waiting
+                if (
+                    task.where == "worker" and self.jobs > 0
+                    if self.scheduler is None
+                    else task.where != "timed"
+                )
+            ]
             for task in waiting:
                 if task not in elsewhere and time.monotonic() < until:
                     self._end(task, guarded(self.study.play, task))
             if not elsewhere:
                 continue
             if workers is None:
-                workers = stack.enter_context(self._workers())
+                workers = stack.enter_context(
+                    Pool(self.jobs, self.study.memory_mb)
+                    if self.scheduler is None
+                    else Cluster(self.scheduler, self.study.memory_mb)
+                )
             calls = (
                 Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
                 for task in elsewhere
@@ -252,18 +264,6 @@ class _Run:
         else:
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)
-
-    def _elsewhere(self, task: Task) -> bool:
-        if self.scheduler is not None:
-            return task.where != "timed"
-        return task.where == "worker" and self.jobs > 0
-
-    def _workers(self) -> Pool:
-        return (
-            Cluster(self.scheduler, self.study.memory_mb)
-            if self.scheduler is not None
-            else Pool(self.jobs, self.study.memory_mb)
-        )
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
         seconds = sum(

@@ -122,7 +122,8 @@ def failed(history: History, reason: str) -> Numerical:
 
 
 def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
-    finest, units = runs[0], _units(scene)
+    alpha, finest = scene.block.alpha, runs[0]
+    units = {"alpha": 1.0, "m": alpha * scene.block.radius, "s": 1.0 / scene.frequency_parameter}
     changes = [_changes(scene, finest, coarser) for coarser in runs[1:]]
     shown = [("theta_rms", "alpha", changes[0]["theta_rms"]), *_scalars(scene, finest)]
     apart = [max(one[name] / units[unit] for name, unit, _ in shown) for one in changes]
@@ -135,8 +136,10 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
         unsure = reason = f"the outcome changes with the step: {', '.join(sides)} at h, 2h, 3h, 4h"
     elif parted > LARGE:
         reason = f"the histories part by {parted:.2g} with the step, more than {LARGE:g}"
-    between = {"peak_rotation": _between_rows(finest) / scene.block.alpha}
-    between["end_time"] = scene.output_step
+    between = {
+        "peak_rotation": _between_rows(finest) / alpha,
+        "end_time": scene.output_step,
+    }
     found = []
     for name, unit, value in shown:
         own = [one[name] for one in changes]
@@ -220,14 +223,6 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     return found
 
 
-def _units(scene: Scene) -> dict[str, float]:
-    return {
-        "alpha": 1.0,
-        "m": scene.block.alpha * scene.block.radius,
-        "s": 1.0 / scene.frequency_parameter,
-    }
-
-
 def _side(history: History) -> str:
     return (
         history.outcome.removeprefix("overturned ")
@@ -281,7 +276,16 @@ def explain(
     `u_num` holds both runs' numerical uncertainties, `reason` says why it is None, `against` names
     the reference.
     """
-    verdict = _verdict(unit, error, u_num, u_input, u_data)
+    u_val = math.hypot(u_num or 0.0, u_input, u_data)
+    if u_num is None or error is None:
+        verdict = NOT_CONVERGED
+    elif error <= u_num:
+        verdict = NUMERICAL
+    elif error <= u_val:
+        verdict = INPUTS if u_input >= u_data else DATA
+    else:
+        least = f"{error - u_val:.2g} {unit}"
+        verdict = f"not explained: model form or set-up, at least {least}".rstrip()
     return Explanation(
         quantity=quantity,
         unit=unit,
@@ -293,16 +297,3 @@ def explain(
         verdict=verdict,
         reason=reason,
     )
-
-
-def _verdict(
-    unit: str, error: float | None, u_num: float | None, u_input: float, u_data: float
-) -> str:
-    if u_num is None or error is None:
-        return NOT_CONVERGED
-    if error <= u_num:
-        return NUMERICAL
-    u_val = math.hypot(u_num, u_input, u_data)
-    if error <= u_val:
-        return INPUTS if u_input >= u_data else DATA
-    return f"not explained: model form or set-up, at least {error - u_val:.2g} {unit}".rstrip()

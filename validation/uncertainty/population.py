@@ -146,7 +146,8 @@ def curve_of(
 ) -> Curve:
     """The curve of runs (motion, direction, intensity): in which it happened, which failed.
 
-    With `draws` of the motions the fitted median has an interval.
+    With `draws` of the motions the fitted median has an interval, `NO_FIT` if under 90 % of the
+    draws fit.
     """
     from scipy.special import ndtr
 
@@ -154,7 +155,13 @@ def curve_of(
     median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
     fitted = ndtr(np.log(intensities / median) / dispersion)
     points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
-    low, high = _median_between(intensities, hits, decided, draws)
+    sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
+    medians = [
+        fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
+        for rows in sets
+    ]
+    known = [one for one in medians if not math.isnan(one)]
+    low, high = _ends(known) if known and len(known) >= 0.9 * draws else NO_FIT
     motions, undecided = len(hit), int(failed.sum())
     return Curve(label, motions, undecided, median, dispersion, low, high, points)
 
@@ -178,19 +185,6 @@ def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Float
         middle = (share + 0.5 * z2) / (1.0 + z2)
         half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
     return share, middle - half, middle + half
-
-
-def _median_between(
-    intensities: Floats, hits: NDArray[np.int64], decided: NDArray[np.int64], draws: int
-) -> tuple[float, float]:
-    """Interval of the fitted median by redrawing motions; `NO_FIT` if under 90 % of draws fit."""
-    sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
-    medians = [
-        fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
-        for rows in sets
-    ]
-    known = [median for median in medians if not math.isnan(median)]
-    return _ends(known) if known and len(known) >= 0.9 * draws else NO_FIT
 
 
 def fit_lognormal(

@@ -253,11 +253,19 @@ def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
         id: Seen(None, "error", one.reason, "") if isinstance(one, Failure) else one
         for id, one in found.items()
     }
-    rows = []
-    for id, one in seen.items():
-        what = PHENOMENA[id]
-        row = (id, what.name, what.target, one.value, what.limit, what.unit, one.verdict)
-        rows.append(dict(zip(ROW, (*row, one.reason), strict=True)))
+    rows = [
+        {
+            "id": id,
+            "name": (what := PHENOMENA[id]).name,
+            "target": what.target,
+            "value": one.value,
+            "limit": what.limit,
+            "unit": what.unit,
+            "verdict": one.verdict,
+            "reason": one.reason,
+        }
+        for id, one in seen.items()
+    ]
     counts = Counter(row["verdict"] for row in rows)
     version = next(filter(None, (one.version for one in seen.values())), player.version)
     return {

@@ -183,17 +183,16 @@ def calibrate(
             f" {min(ends):.3g} to {max(ends):.3g} can",
             "--tune",
         )
+    near = [
+        one for one, end in zip(knob.bounds, ends, strict=True) if abs(end - restitution) <= NEAR
+    ]
     found = (
-        low
-        if abs(ends[0] - restitution) <= NEAR
-        else high
-        if abs(ends[1] - restitution) <= NEAR
-        else math.nan
-    )
-    if math.isnan(found):
-        found = brentq(
+        near[0]
+        if near
+        else brentq(
             lambda setting: dropped(setting)[0] - restitution, low, high, xtol=1e-5, rtol=1e-5
         )
+    )
     asked = friction
     for _ in range(12):
         way = _played(model, slide, {"restitution": found, "friction": asked}, step)[-1, 0]
@@ -205,12 +204,12 @@ def calibrate(
     used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
     used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
     words = {where: what.format_map(used) for where, what in knob.words.items()}
-    near = (
+    reached = (
         abs(rebound - restitution) <= 5.0 * NEAR
         and abs(slid - friction) <= 5.0 * NEAR * friction
         and deep <= penetration
     )
-    return Calibration(engine, step, words, rebound, slid, max(deep, 0.0), near)
+    return Calibration(engine, step, words, rebound, slid, max(deep, 0.0), reached)
 
 
 def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:

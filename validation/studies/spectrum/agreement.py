@@ -49,7 +49,11 @@ def choose_nodes(
     Half of them are near it, where there are enough. The choice is random but depends only on
     `name`. Nodes that the reference could not decide are left out.
     """
-    near = near_boundary(spectrum.outcomes)
+    from scipy import ndimage
+
+    filters = ndimage.maximum_filter, ndimage.minimum_filter
+    most, least = (one(spectrum.outcomes, 2 * NEAR + 1, mode="nearest") for one in filters)
+    near: NDArray[np.bool_] = most != least
     random = np.random.default_rng(zlib.crc32(name.encode()))
     decided = np.ones(near.shape, dtype=bool)
     decided[tuple(spectrum.undecided.T)] = False
@@ -73,24 +77,9 @@ def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
     return np.concatenate([side[:number] for side, number in zip(sides, wanted, strict=True)])
 
 
-def near_boundary(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Which nodes have another outcome within `NEAR` nodes."""
-    from scipy import ndimage
-
-    filters = ndimage.maximum_filter, ndimage.minimum_filter
-    most, least = (one(outcomes, 2 * NEAR + 1, mode="nearest") for one in filters)
-    near: NDArray[np.bool_] = most != least
-    return near
-
-
 def candidates() -> tuple[str, ...]:
     """The installed models that are compared with the event-based ones."""
     return tuple(model for model in CANDIDATES if not not_installed(model))
-
-
-def nodes_played(model: str, count: int) -> int:
-    """How many of `count` nodes of a spectrum a model plays: at least two, one on each side."""
-    return max(2, round(PLAYED_SHARE.get(model, 1.0) * count))
 
 
 def plays(request: Request, panel: Panel) -> bool:
@@ -150,7 +139,8 @@ def _shares(
     i, j = nodes.T
     sides = {"ebm": spectrum.outcomes[i, j]}
     for one in others:
-        chosen = first_of(near, nodes_played(one.model, count))
+        # at least two, one on each side
+        chosen = first_of(near, max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count)))
         where = one.amplitudes[i[chosen]], one.frequencies[j[chosen]]
         if not plays(one, panel):
             continue

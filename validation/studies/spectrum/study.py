@@ -182,35 +182,45 @@ class Spectra(Study):
 
     def _shares(self, spectra: Mapping[Panel, Spectrum]) -> Table:
         laws = any(one.depends_on_law is not None for one in spectra.values())
-        rows = []
-        for panel, one in spectra.items():
-            law = one.depends_on_law
-            row: list[Any] = [panel.name, panel.title, panel.figure, one.safe_area]
-            row += [float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)]
-            row += [len(one.undecided), *([None if law is None else len(law)] if laws else [])]
-            files = {kind: f"{self._stem(panel)}.{kind}" for kind in ("csv", "npz")}
-            row += [one.evaluations, *(Mark(k.upper(), link=link) for k, link in files.items())]
-            rows.append(row)
-        columns = [text("spectrum"), text("title", brief=False), Column("figure", brief=False)]
-        columns += [
-            Column(name, kind="percent", digits=4, help=words)
-            for name, words in (
-                ("safe", ""),
-                ("left", "overturned counterclockwise"),
-                ("right", "overturned clockwise"),
-            )
+        columns = [
+            text("spectrum"),
+            text("title", brief=False),
+            Column("figure", brief=False),
+            Column("safe", kind="percent", digits=4),
+            Column("left", kind="percent", digits=4, help="overturned counterclockwise"),
+            Column("right", kind="percent", digits=4, help="overturned clockwise"),
+            Column("undecided"),
+            *([Column("depends_on_law")] if laws else []),
+            Column("runs"),
+            text("csv", brief=False),
+            text("npz", brief=False),
         ]
-        columns += [Column("undecided"), *([Column("depends_on_law")] if laws else [])]
-        columns += [Column("runs"), text("csv", brief=False), text("npz", brief=False)]
+        rows = [
+            [
+                panel.name,
+                panel.title,
+                panel.figure,
+                one.safe_area,
+                *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
+                len(one.undecided),
+                *(
+                    [None if one.depends_on_law is None else len(one.depends_on_law)]
+                    if laws
+                    else []
+                ),
+                one.evaluations,
+                *(Mark(k.upper(), link=f"{self._stem(panel)}.{k}") for k in ("csv", "npz")),
+            ]
+            for panel, one in spectra.items()
+        ]
         return Table("spectra", columns, rows, "Shares of outcomes")
 
     def _figures(self, found: _Found) -> Iterator[Plot]:
         request = self.request
         by = "" if request.model == "ebm" else f", by {request.model}"
         for number in dict.fromkeys(panel.figure for panel in found.spectra):
-            mine = {p: one for p, one in found.spectra.items() if p.figure == number}
-            panels = [self._panel(panel, one, found) for panel, one in mine.items()]
-            first = next(iter(mine))
+            mine = [panel for panel in found.spectra if panel.figure == number]
+            first = mine[0]
             name = f"figure-{number}" if number else first.name
             yield Plot(
                 self._stem(first).replace(first.name, name),
@@ -224,28 +234,22 @@ class Spectra(Study):
                     "amplitudes": request.amplitudes.tolist(),
                     "record": first.scene.excitation.kind == "record",
                     "pulse": _pulse(first, request),
-                    "panels": panels,
+                    "panels": [self._panel(panel, found.spectra[panel], found) for panel in mine],
                     "height": 4.0,
                 },
             )
 
     def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
-        wall, spread = panel.wall, _spread(self.request.size)
-        motions = found.motions.get(panel, tiles.Played())
-        block = panel.scene.block
-        place = [0, 4, 0]
-        if panel.figure is not None:
-            place = (
-                [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
-                if wall
-                else [1, 2, 0]
-            )
-        law = one.depends_on_law
+        wall, block = panel.wall, panel.scene.block
+        motions, spread = found.motions.get(panel, tiles.Played()), _spread(self.request.size)
+        place = [0, 4, 0] if panel.figure is None else [1, 2, 0]
+        if panel.figure is not None and wall:
+            place = [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
         return {
             "title": panel.title,
             "free": wall is None,
             "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
-            "law": [] if law is None else law.tolist(),
+            "law": [] if one.depends_on_law is None else one.depends_on_law.tolist(),
             "place": place,
             "nodes": [
                 [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
@@ -268,18 +272,19 @@ class Spectra(Study):
         scene = panel.scene.model_dump(mode="json")
         for part in ("excitation", "vertical"):
             scene[part].pop("unscaled", None)
-        about = {
-            "name": self._stem(panel),
-            "title": panel.title,
-            "figure": panel.figure,
-            "scene": scene,
-            "model": self.request.model,
-            "settings": dict(self.request.settings),
-            "refined": self.request.refine,
-            "evaluations": one.evaluations,
-            "versions": provenance.versions(),
-        }
-        return json.dumps(about)
+        return json.dumps(
+            {
+                "name": self._stem(panel),
+                "title": panel.title,
+                "figure": panel.figure,
+                "scene": scene,
+                "model": self.request.model,
+                "settings": dict(self.request.settings),
+                "refined": self.request.refine,
+                "evaluations": one.evaluations,
+                "versions": provenance.versions(),
+            }
+        )
 
 
 @dataclass
@@ -306,14 +311,11 @@ def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
     f, a = request.frequencies, request.amplitudes
     amplitudes = [node_pulse(panel.scene, one, f[0])[0] for one in a]
     periods = [node_pulse(panel.scene, a[0], one)[1] for one in f]
-    own = [
-        float(f[0]) * periods[0] / pulse.period,
-        float(a[0]) * pulse.amplitude / amplitudes[0],
-    ]
+    own = float(f[0]) * periods[0] / pulse.period, float(a[0]) * pulse.amplitude / amplitudes[0]
     return {
         "amplitude": amplitudes,
         "period": periods,
-        "own": own if panel.figure is None else None,
+        "own": [*own] if panel.figure is None else None,
     }
 
 

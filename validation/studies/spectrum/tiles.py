@@ -26,7 +26,7 @@ from rockcheck.ebm.spectrum import (
 )
 from rockcheck.scenes import InputError, Scene
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import Model, build
+from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Failure, cores
 from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
 from rockcheck.validation.study import Task
@@ -95,6 +95,7 @@ def nodes_of(
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
     how = provenance.code_digest(__name__) if fast else f"{population.SETTLE} {population.ENOUGH}"
     base = provenance.cell_key(neutral, model, settings) + what + how
+    where: Literal["here", "worker"] = "here" if fast else "worker"
     size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
     one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
     found = []
@@ -103,11 +104,8 @@ def nodes_of(
             np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)
         )
         key = provenance.digest(base + a.tobytes().hex() + f.tobytes().hex())
-        how_played: dict[str, Any] = {
-            "where": "here" if fast else "worker",
-            "expected": one * len(a),
-        }
-        found.append(Nodes(key, what, scene, a, f, model, settings, **how_played))
+        nodes = Nodes(key, what, scene, a, f, model, settings, expected=one * len(a), where=where)
+        found.append(nodes)
     return found
 
 
@@ -118,7 +116,10 @@ def play(task: Nodes) -> Played:
         return _motions(task, player)
     nodes = list(zip(task.amplitudes.tolist(), task.frequencies.tolist(), strict=True))
     if task.what == "one impact":
-        return Played("".join("NY"[_impacts(player, task.scene, *node) == 1] for node in nodes))
+        scenes = [node_scene(task.scene, *node) for node in nodes]
+        histories = [player.simulate(one.replace(output_step=one.duration)) for one in scenes]
+        kinds = [[event.kind for event in one.event_list] for one in histories]
+        return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
     if compiled(player):
         where = task.scene, task.amplitudes, task.frequencies
         sides, failed = play_nodes(*where, model=player, jobs=cores())
@@ -132,10 +133,8 @@ def play(task: Nodes) -> Played:
 def outcomes_of(letters: str) -> Outcomes:
     """Sides (-1, 0, +1) and which runs failed, of letters."""
     codes = np.frombuffer(letters.encode(), dtype=np.uint8)
-    sides = np.full(len(codes), SAFE, dtype=np.int8)
-    sides[codes == ord(LETTERS[0])], sides[codes == ord(LETTERS[2])] = LEFT, RIGHT
-    failed: NDArray[np.bool_] = codes == ord(UNDECIDED)
-    return sides, failed
+    left, right, failed = (codes == ord(one) for one in (LETTERS[0], LETTERS[2], UNDECIDED))
+    return np.select([left, right], [LEFT, RIGHT], SAFE).astype(np.int8), failed
 
 
 def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray[np.str_]:
@@ -143,12 +142,6 @@ def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray
     letters = np.array(list(LETTERS))[sides - LEFT]
     letters[tuple(undecided.T)] = UNDECIDED
     return letters
-
-
-def _impacts(player: Model, scene: Scene, amplitude: float, frequency: float) -> int:
-    node = node_scene(scene, amplitude, frequency)
-    history = player.simulate(node.replace(output_step=node.duration))
-    return sum(event.kind == "floor impact" for event in history.event_list)
 
 
 def _motions(task: Nodes, player: Any) -> Played:

@@ -198,22 +198,33 @@ def _samples(r: np.random.Generator, amplitude: float) -> NDArray[np.float64]:
     return np.where(r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0)
 
 
+#: Part of a scene's start: its key, the share of the draws that have it, and what draws it.
+Part = tuple[str, float, Callable[[], float]]
+
+
+def _drawn(r: np.random.Generator, parts: Sequence[Part]) -> dict[str, Any]:
+    """A start of some of the parts; no number decides about a part that every start has."""
+    return {key: draw() for key, share, draw in parts if share > 1.0 or r.random() < share}
+
+
 def _start(r: np.random.Generator, block: Block, unit: float, must_move: bool) -> dict[str, Any]:
     alpha, radius = block.alpha, block.radius
-    speed = radius / unit
-    start: dict[str, Any] = {}
-    if must_move or r.random() < 0.3:
-        balance = block.pivot("left").alpha, -block.pivot("right").alpha
-        start["initial_rotation"] = _edge(r, 0.05, balance) or alpha * float(r.uniform(-1.0, 1.0))
-    if r.random() < 0.3:
-        start["initial_angular_velocity"] = (
-            float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit
-        )
-    if r.random() < 0.2:
-        start["initial_velocity"] = float(r.uniform(-1.0, 1.0)) * speed
-    if r.random() < 0.1:
-        start["initial_height"] = radius * _log(r, 1e-6, 1.0)
-    return start
+    balance = block.pivot("left").alpha, -block.pivot("right").alpha
+    parts: list[Part] = [
+        (
+            "initial_rotation",
+            math.inf if must_move else 0.3,
+            lambda: _edge(r, 0.05, balance) or alpha * float(r.uniform(-1.0, 1.0)),
+        ),
+        (
+            "initial_angular_velocity",
+            0.3,
+            lambda: float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit,
+        ),
+        ("initial_velocity", 0.2, lambda: float(r.uniform(-1.0, 1.0)) * (radius / unit)),
+        ("initial_height", 0.1, lambda: radius * _log(r, 1e-6, 1.0)),
+    ]
+    return _drawn(r, parts)
 
 
 # Scenes at which rounding decides: round numbers, equal lengths, accelerations exactly at a limit,
@@ -350,18 +361,21 @@ def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Exci
 def _exact_start(
     r: np.random.Generator, block: Block, kind: Kind, must_move: bool
 ) -> dict[str, Any]:
-    start: dict[str, Any] = {}
-    if r.random() < 0.4 or must_move:
+    def tilt() -> float:
         sign = _sign(r)
         alpha = block.pivot("left" if sign > 0.0 else "right").alpha
-        tilt = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
-        start["initial_rotation"] = sign * (tilt if tilt < 1.5 else 0.1)
-    if r.random() < 0.4:
-        start["initial_angular_velocity"] = _sign(r) * 10.0 ** int(_pick(r, SIZES))
-    if r.random() < 0.3 and kind != "no-slip":
-        start["initial_velocity"] = _sign(r) * 10.0 ** int(_pick(r, SIZES))
-    if r.random() < 0.2 and kind == "unilateral":
-        start["initial_height"] = 10.0 ** int(
-            _pick(r, tuple(float(size) for size in SIZES if size < 1))
-        )
-    return start
+        size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
+        return sign * (size if size < 1.5 else 0.1)
+
+    low = tuple(size for size in SIZES if size < 1)
+    parts: list[Part] = [
+        ("initial_rotation", 1.0 if must_move else 0.4, tilt),
+        ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
+        (
+            "initial_velocity",
+            0.3 * (kind != "no-slip"),
+            lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES)),
+        ),
+        ("initial_height", 0.2 * (kind == "unilateral"), lambda: 10.0 ** int(_pick(r, low))),
+    ]
+    return _drawn(r, parts)

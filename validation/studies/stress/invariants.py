@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,6 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
-from rockcheck.validation.discrepancy.motion import largest_reach
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
@@ -46,17 +45,15 @@ from rockcheck.validation.studies.stress.mechanics import (
 )
 
 
-@dataclass(frozen=True)
-class Invariant:
-    """A condition: its name, what its figure means, and the largest value that is allowed."""
+class Invariant(NamedTuple):
+    """A condition: what its figure means, and the largest value that is allowed."""
 
-    name: str
     words: str
     bound: float
 
 
 INVARIANTS = {
-    name: Invariant(name, words, bound)
+    name: Invariant(words, bound)
     for name, words, bound in (
         ("ends", "the run ends within its caps, in a mode of motion (1: it does not)", 0.0),
         ("finite", "values that are not finite", 0.0),
@@ -222,19 +219,22 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     history = model.simulate(free)
     if history.overturned_at is not None:
         return False
-    reach = largest_reach(history, free, side)
-    x, theta = history.channels["x"], history.channels["theta"]
-    gaps = kinematics.clearance(scene.block, side, 0.0, x, theta)
+    gaps = kinematics.clearance(
+        scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
+    )
+    reach = float(np.max(-gaps))
     room = float(np.max(np.abs(np.diff(gaps)))) + SETTLED * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
         return False
-    struck = []
-    for gap in (reach + room, reach - room):
-        walled = model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
-        struck.append(
-            "lands along a wall" in walled.cost.rules
-            or any(event.kind == "wall impact" for event in walled.event_list)
-        )
+    walled = [
+        model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
+        for gap in (reach + room, reach - room)
+    ]
+    struck = [
+        "lands along a wall" in one.cost.rules
+        or any(event.kind == "wall impact" for event in one.event_list)
+        for one in walled
+    ]
     return struck != [False, True]
 
 
@@ -263,16 +263,12 @@ def audited(scene: Scene) -> Scene:
     It is cut after `MOST_ROWS` rows.
     """
     unit = math.sqrt(scene.block.radius / scene.gravity)
-    step = 0.03 * unit
-    for excitation in (scene.excitation, scene.vertical):
-        if isinstance(excitation, Ricker | Sine):
-            step = min(step, excitation.period / FINE)
-    for excitation in (scene.excitation, scene.vertical):
-        if isinstance(excitation, Record):
-            step = excitation.time_step / (
-                GROUP * max(1, math.ceil(excitation.time_step / (GROUP * step)))
-            )
-            break
+    bases = scene.excitation, scene.vertical
+    step = min(
+        [0.03 * unit, *(one.period / FINE for one in bases if isinstance(one, Ricker | Sine))]
+    )
+    if records := [one.time_step for one in bases if isinstance(one, Record)]:
+        step = records[0] / (GROUP * max(1, math.ceil(records[0] / (GROUP * step))))
     return scene.replace(output_step=step, duration=min(scene.duration, MOST_ROWS * step))
 
 
@@ -317,9 +313,9 @@ def _largest(values: Floats, rows: Mask) -> float:
 
 
 def _clear(motion: Motion) -> Mask:
-    t, events = motion.channels["t"], [event.t for event in motion.history.event_list]
-    bases = motion.scene.excitation, motion.scene.vertical
+    t, bases = motion.channels["t"], (motion.scene.excitation, motion.scene.vertical)
     jumps = [time for one in bases if one.kind != "rest" for time in (0.0, one.quiet_after)]
+    events = [event.t for event in motion.history.event_list]
     places = np.sort(np.array([*events, *jumps, -math.inf, math.inf]))
     after = np.searchsorted(places, t)
     near = NEAR * motion.unit + 1e-12 * np.abs(t)
@@ -400,18 +396,17 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
         held = scene.floor.friction * model.yield_displacement / radius * force
         return _largest(off - held / size, whole) if whole.any() else None
-    judged = whole & quiet
-    return _largest(np.abs(off), judged) if judged.any() else None
+    whole &= quiet
+    return _largest(np.abs(off), whole) if whole.any() else None
 
 
 def _friction_power(motion: Motion) -> Floats:
     """Power of the floor's friction, natural units."""
-    slip, mu = motion.slip, motion.scene.floor.friction
-    flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(slip)
+    along, mu = motion.sign * motion.slip, motion.scene.floor.friction
+    flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(along)
     power = np.where(motion.within("slide"), flat, 0.0)
     tilted = motion.within("slide-rock", "ladder")
     if tilted.any():
-        along = motion.sign * slip
         _, forces = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
         power[tilted] = forces.friction * along[tilted]
     return power
@@ -423,12 +418,10 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     groups = (len(t) - 1) // GROUP
     edges = t[: groups * GROUP + 1 : GROUP]
     events = [event.t for event in history.event_list]
-    breaks = [*events]
-    for excitation in (scene.excitation, scene.vertical):
-        if isinstance(excitation, Record):
-            breaks += list(excitation.time_step * np.arange(len(excitation.unscaled)))
-        elif not isinstance(excitation, Rest):
-            breaks.append(excitation.quiet_after)
+    bases = scene.excitation, scene.vertical
+    records = [one for one in bases if isinstance(one, Record)]
+    kinks = [time for one in records for time in one.time_step * np.arange(len(one.unscaled))]
+    ends = [one.quiet_after for one in bases if isinstance(one, Ricker | Sine)]
     near = 1e-9 * scene.output_step
 
     def without(times: list[float], margin: float) -> Mask:
@@ -439,11 +432,8 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
 
     # An event at an edge itself: the row there is from before or after it. The base acceleration
     # jumps where a record ends.
-    whole = without(breaks, -near) & without(events, 1e3 * near)
-    for excitation in (scene.excitation, scene.vertical):
-        if isinstance(excitation, Record):
-            end = excitation.quiet_after
-            whole &= ~((edges[:-1] - 1e3 * near <= end) & (end <= edges[1:] + 1e3 * near))
+    whole = without([*events, *kinks, *ends], -near)
+    whole &= without([*events, *(one.quiet_after for one in records)], 1e3 * near)
     nodes = mode[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
@@ -461,13 +451,14 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
     ours, theirs = ((len(one.channels["t"]), len(one.event_list)) for one in (history, image))
     if ours != theirs:
         return math.inf
-    differ = sum(int(np.sum(motion.channels[name] != image.channels[name])) for name in EVEN)
-    differ += sum(int(np.sum(motion.channels[name] != -image.channels[name])) for name in ODD)
-    differ += sum(
+    mirrored = {name: image.channels[name] for name in EVEN}
+    mirrored |= {name: -image.channels[name] for name in ODD}
+    differ = [np.sum(motion.channels[name] != values) for name, values in mirrored.items()]
+    differ += [
         replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
         for a, b in zip(history.event_list, image.event_list, strict=True)
-    )
-    return float(differ + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
+    ]
+    return float(sum(differ) + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
 
 
 def similar(scene: Scene, seed: int) -> Scene:
@@ -570,9 +561,8 @@ def _differences(a: History, b: History) -> Floats:
 
 def _agree(a: History, b: History, seen: float) -> int:
     """Number of rows, from the first on, in which theta differs by no more than `seen`, rad."""
-    difference = _differences(a, b)
-    apart = np.flatnonzero(difference > seen)
-    return int(apart[0]) if apart.size else len(difference)
+    apart = _differences(a, b) > seen
+    return int(np.argmax(apart)) if apart.any() else len(apart)
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:

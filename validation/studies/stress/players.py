@@ -37,6 +37,7 @@ class Player(ABC):
     runs: int
     quick: int
     words: str
+    friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
 
     @property
     def event_based(self) -> bool:
@@ -47,22 +48,18 @@ class Player(ABC):
     def settings(self, scene: Scene, number: int) -> dict[str, Any]:
         """The settings that the model is built with for this scene, besides those in its name."""
 
-    @property
-    def model_name(self) -> str:
-        """The model's name for `rockcheck simulate`."""
-        return self.label
-
     def command(self, scene: Scene, number: int) -> str:
         """The options of `rockcheck simulate` with which this run can be made again."""
+        name = "ebm:EventBasedModel" if self.friction == "no-slip" else self.label.split()[0]
         settings = [
             f"--set {key}={value if isinstance(value, str) else repr(value).lower()}"
             for key, value in self.settings(scene, number).items()
         ]
-        return " ".join([f"--model {self.model_name}", *settings])
+        return " ".join([f"--model {name}", *settings])
 
+    @abstractmethod
     def scene(self, seed: int, number: int) -> Scene:
         """Its scene of that number."""
-        return random_scene(seed, number, self.kind)
 
     @abstractmethod
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
@@ -73,7 +70,6 @@ class Player(ABC):
 class EventBased(Player):
     """A variant of the event-based model."""
 
-    friction: Literal["coulomb", "bouc-wen", "no-slip"] = "coulomb"
     impacts: ImpactLaw = "moreau"
     #: Whether its scenes are those at which rounding decides.
     exact: bool = False
@@ -81,12 +77,6 @@ class EventBased(Player):
     def scene(self, seed: int, number: int) -> Scene:
         """Its scene of that number."""
         return (exact_scene if self.exact else random_scene)(seed, number, self.kind)
-
-    @property
-    def model_name(self) -> str:
-        """The model's name for `rockcheck simulate`."""
-        names = {"unilateral": "ebm-unilateral", "bouc-wen": "ebm-bouc-wen"}
-        return names.get(self.kind, "ebm:EventBasedModel" if self.friction == "no-slip" else "ebm")
 
     def settings(self, scene: Scene, number: int) -> dict[str, Any]:
         """Every other unilateral run has the energy cap, Bouc-Wen yields within R/1000."""
@@ -98,20 +88,17 @@ class EventBased(Player):
         }
         return {key: value for key, (given, value) in every.items() if given}
 
-    def model(self, scene: Scene, number: int) -> EventBasedModel:
-        """The model as it plays this scene."""
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        """Every invariant; energy and clearance in each tenth run."""
         fixed: dict[str, Any] = {
             "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
             "friction": self.friction,
             "most_steps": MOST_STEPS,
             "most_events": MOST_EVENTS,
         }
-        return EventBasedModel(**fixed | self.settings(scene, number))
-
-    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Every invariant; energy and clearance in each tenth run."""
+        model = EventBasedModel(**fixed | self.settings(scene, number))
         audit = only in ("energy", "clearance") or (not only and number % AUDIT == 0)
-        return check_run(self.model(scene, number), scene, seed=seed, audit=audit, only=only)
+        return check_run(model, scene, seed=seed, audit=audit, only=only)
 
 
 @dataclass(frozen=True)
@@ -123,7 +110,6 @@ class Approximate(Player):
     most `longest`.
     """
 
-    family: str = ""
     longest: float = 5.0
     step: float = 2e-3
 
@@ -140,7 +126,7 @@ class Approximate(Player):
 
     def settings(self, scene: Scene, number: int = 0) -> dict[str, Any]:
         """The settings that the model is built with for this scene."""
-        if self.family == "cm":
+        if self.label == "cm":
             return {"penetration": DEPTH * scene.block.radius}
         return {"time_step": self.step * math.sqrt(scene.block.radius / scene.gravity)}
 
@@ -151,21 +137,21 @@ class Approximate(Player):
         """
         played = self._check(scene)
         broken = [name for name in played.broken if name in ("depth", "source")]
-        if broken and self.family != "cm":
+        if broken and self.label != "cm":
             finer = replace(self, step=0.5 * self.step)._check(
                 scene.replace(output_step=0.5 * scene.output_step)
             )
-            words = [
+            words = (
                 f"{name} {played.figures[name]:.2g}, with half the step"
                 f" {finer.figures.get(name, math.nan):.2g}"
                 for name in broken
-            ]
-            played = replace(played, failure="; ".join(words))
+            )
+            return replace(played, failure="; ".join(words))
         return played
 
     def _check(self, scene: Scene) -> CheckedRun:
         try:
-            history = build(self.family, self.settings(scene)).simulate(scene)
+            history = build(self.label, self.settings(scene)).simulate(scene)
         except (ModelFailure, InputError) as error:
             return CheckedRun(figures={"ends": 1.0}, failure=str(error))
         figures = {"ends": 0.0, "finite": not_finite(history)}
@@ -185,7 +171,7 @@ class Approximate(Player):
         bases = motion.scene.excitation, motion.scene.vertical
         shaken = sum(np.max(np.abs(base.acceleration(motion.channels["t"]))) for base in bases)
         level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
-        if self.family == "cm":
+        if self.label == "cm":
             stated = speed * math.sqrt(DEPTH) + level * DEPTH
         else:
             stated = speed * self.step + level * self.step**2
@@ -272,7 +258,7 @@ PLAYERS: dict[str, Player] = {
         EventBased("ebm no-slip exact", "no-slip", 20_000, 200, ROUNDING, "no-slip", exact=True),
         EventBased("ebm-unilateral exact", "unilateral", 20_000, 200, ROUNDING, exact=True),
         EventBased("ebm-bouc-wen exact", "bouc-wen", 5000, 50, ROUNDING, "bouc-wen", exact=True),
-        Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep", "cm"),
+        Approximate("cm", "unilateral", 2000, 40, "continuous model, standing 1e-8 R deep"),
         *(
             Approximate(
                 engine.lower(),
@@ -280,7 +266,6 @@ PLAYERS: dict[str, Player] = {
                 2000,
                 40,
                 f"{engine}, best settings, steps of 0.002 sqrt(R/g)",
-                engine.lower(),
             )
             for engine in ("MuJoCo", "PyBullet")
         ),

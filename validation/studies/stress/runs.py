@@ -49,7 +49,13 @@ def shrink(
     again = True
     while again:
         again = False
-        for simpler in simplifications(scene):
+        for tables in _changes(scene):
+            try:
+                simpler = Scene(**tables)
+            except InputError:
+                continue
+            if simpler == scene:
+                continue
             if trials == 0 or time.monotonic() > until:
                 return scene, False
             trials -= 1
@@ -59,19 +65,8 @@ def shrink(
     return scene, True
 
 
-def simplifications(scene: Scene) -> Iterator[Scene]:
-    """Valid scenes that are simpler in one respect, the greatest simplification first."""
-    for tables in _changes(scene):
-        try:
-            simpler = Scene(**tables)
-        except InputError:
-            continue
-        if simpler != scene:
-            yield simpler
-
-
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The scene's tables with one simplification each.
+    """The scene's tables with one simplification each, the greatest first; not all are valid.
 
     A part is left out, a run or list is shorter, the scale is another; at last one number is zero
     or has fewer digits.
@@ -261,17 +256,10 @@ class Chunk(Task):
 
     def play(self) -> RunTotals:
         """The totals of the runs."""
-        began, player, totals = (
-            time.process_time(),
-            PLAYERS[self.model],
-            RunTotals(model=self.model),
-        )
+        began, totals = time.process_time(), RunTotals(model=self.model)
         for number in range(self.first, self.first + self.count):
-            totals.see(
-                checked(self.model, player.scene(self.seed, number), self.seed, number),
-                self.seed,
-                number,
-            )
+            scene = PLAYERS[self.model].scene(self.seed, number)
+            totals.see(checked(self.model, scene, self.seed, number), self.seed, number)
         totals.cpu_seconds = time.process_time() - began
         return totals
 

@@ -201,9 +201,9 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
 CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 
-def stand_still(label: str, case: str, duration: float, step: float = REST_STEP) -> Still:
+def stand_still(label: str, case: str, duration: float) -> Still:
     """Plays the paper's block in a case in which it should not move."""
-    block, mu = PAPER_BLOCK, 0.3
+    block, mu, step = PAPER_BLOCK, 0.3, REST_STEP
     push = CASES[case] * 9.81 * min(SLOPE, mu)
     excitation: Rest | Record | Sine = (
         Record.from_samples([push, push], time_step=duration + 1.0)
@@ -221,11 +221,10 @@ def stand_still(label: str, case: str, duration: float, step: float = REST_STEP)
         output_step=max(step, duration / 4000),
     )
     line = SETUPS[label]
-    settings = dict(line.settings)
-    if line.family != "cm":  # the CM's own step makes an hour cheap
-        settings |= {line.knob: step}
+    # the CM's own step makes an hour cheap
+    steps = {} if line.family == "cm" else {line.knob: step}
     try:
-        history = build(line.family, settings).simulate(scene)
+        history = build(line.family, dict(line.settings) | steps).simulate(scene)
     except (ModelFailure, InputError) as error:
         return Still(label, case, duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius

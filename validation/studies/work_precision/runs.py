@@ -42,23 +42,6 @@ class SceneFamily:
     member: Callable[[int], Scene]
 
 
-def _spread(k: int) -> float:
-    """From 0.955 to 1.045."""
-    return 1.0 + 0.01 * (k - 4.5)
-
-
-def _free(k: int) -> Scene:
-    tilt = (0.30 + 0.05 * k) * PAPER_BLOCK.alpha
-    return Scene(
-        name=f"free {k}",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=1.0),
-        excitation=Rest(),
-        duration=3.0,
-        initial_rotation=tilt,
-    )
-
-
 def pulse(
     frequency_ratio: float,
     amplitude_ratio: float,
@@ -93,7 +76,11 @@ def _pulses(
         name,
         words,
         lambda k: pulse(
-            frequency_ratio, amplitude_ratio * _spread(k), friction, walls=walls, name=f"{name} {k}"
+            frequency_ratio,
+            amplitude_ratio * (1.0 + 0.01 * (k - 4.5)),
+            friction,
+            walls=walls,
+            name=f"{name} {k}",
         ),
     )
 
@@ -110,7 +97,18 @@ def _record(name: str, words: str) -> SceneFamily:
 FAMILIES = {
     family.name: family
     for family in (
-        SceneFamily("free", "free rocking from 0.3 to 0.75 α, μ 1", _free),
+        SceneFamily(
+            "free",
+            "free rocking from 0.3 to 0.75 α, μ 1",
+            lambda k: Scene(
+                name=f"free {k}",
+                block=PAPER_BLOCK,
+                floor=Floor(friction=1.0),
+                excitation=Rest(),
+                duration=3.0,
+                initial_rotation=(0.30 + 0.05 * k) * PAPER_BLOCK.alpha,
+            ),
+        ),
         _pulses("pulse a", 4.5, 4.0, 1.0),
         _pulses("pulse b", 6.0, 6.0, 1.0),
         _pulses("pulse c", 6.0, 8.0, 1.0),
@@ -372,14 +370,23 @@ def play(task: Play) -> BenchmarkRun:
     costs = [history.cost]
     while len(costs) < task.repeats and costs[0].wall_seconds < LONG_ENOUGH:
         costs.append(model.simulate(ready.scene).cost)
+    reference = ready.references[line.reference]
+    errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
     paper = compare(ready.references["ebm"], history, measures=["theta_rms"])["theta_rms"]
+    first = [
+        min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
+        for h in (reference, history)
+    ]
     return BenchmarkRun(
         task.family,
         task.member,
         task.line,
         task.value,
         ready.horizon,
-        **errors_of(ready.references[line.reference], history),
+        rms=errors["theta_rms"],
+        largest=errors["theta_peak"],
+        peak=abs(history.peak_rotation - reference.peak_rotation) / (reference.alpha or 1.0),
+        first_impact=abs(first[1] - first[0]),
         against_ebm=paper,
         step=float(history.settings.get("time_step", math.nan))
         if line.knob != "largest_step"
@@ -395,22 +402,6 @@ def lost(task: Play, reason: str) -> BenchmarkRun:
     """The record of a run that failed."""
     horizon = prepared(task.family, task.member).horizon
     return BenchmarkRun(task.family, task.member, task.line, task.value, horizon, failure=reason)
-
-
-def errors_of(reference: History, history: History) -> dict[str, Any]:
-    """The errors of a `BenchmarkRun`."""
-    found = compare(reference, history, measures=["theta_rms", "theta_peak"])
-    alpha = reference.alpha or 1.0
-    first = [
-        min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
-        for h in (reference, history)
-    ]
-    return {
-        "rms": found["theta_rms"],
-        "largest": found["theta_peak"],
-        "peak": abs(history.peak_rotation - reference.peak_rotation) / alpha,
-        "first_impact": abs(first[1] - first[0]),
-    }
 
 
 def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:

@@ -27,7 +27,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.ebm.spectrum import Floats
-from rockcheck.scenes import Floor, ModelFailure, Record, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import Floor, ModelFailure, Record, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Model, build, not_installed
@@ -107,16 +107,8 @@ def at_level(rows: Sequence[BatchTime], case: str) -> BatchTime | None:
     return min(good, key=lambda row: row.cpu, default=None)
 
 
-def _scene(*walls: Wall, friction: float = 0.3) -> Scene:
-    pulse = Ricker(amplitude=1.0, period=1.0)
-    return Scene(
-        name="grid",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=friction),
-        walls=walls,
-        excitation=pulse,
-        duration=10.0,
-    )
+#: The scene of the batches, whose pulse is another in each run.
+PLAIN = pulse(4.5, 4.0, 0.3).replace(duration=10.0)
 
 
 def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
@@ -154,14 +146,12 @@ def _records(model: EventBasedModel, nodes: int) -> Packed:
     )
 
 
-_WALL = Wall(side="left", gap=0.053)
+BESIDE = PLAIN.replace(walls=(Wall(side="left", gap=0.053),))
 CASES = (
-    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(_scene())),
-    BatchCase("friction", "μ 0.3, no wall", {}, _pulses(_scene())),
-    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(_scene(_WALL))),
-    BatchCase(
-        "unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(_scene(_WALL))
-    ),
+    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(PLAIN)),
+    BatchCase("friction", "μ 0.3, no wall", {}, _pulses(PLAIN)),
+    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(BESIDE)),
+    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(BESIDE)),
     BatchCase(
         "El Centro",
         "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end",
@@ -174,17 +164,17 @@ CASES = (
 
 def batch_size(runs: int, threads: int) -> BatchSize:
     """Times a batch of `runs` random pulses on `threads` threads."""
-    scene, model = _scene(), EventBasedModel(tolerance=LEVEL)
+    scene, model = PLAIN, EventBasedModel(tolerance=LEVEL)
     random = np.random.default_rng(1)
     pulses = _pulse(
         scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs)
     )
-    taken = []
-    for _ in range(ROUNDS):
-        began = time.perf_counter()
-        run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=threads)
-        taken.append((time.perf_counter() - began) / runs)
-    return BatchSize(runs, threads, median(taken))
+    cost = _timed(
+        lambda _: run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=threads),
+        runs,
+        clock=time.perf_counter,
+    )
+    return BatchSize(runs, threads, 1e-6 * median(cost() for _ in range(ROUNDS)))
 
 
 def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
@@ -197,28 +187,26 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     packed = case.packed(reference_model, nodes)
     play = partial(run_batch, packed, until_decided=case.until_decided, strict=False, jobs=1)
     reference = play(reference_model)
-    cpu: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
-    wall: dict[float, list[float]] = {tolerance: [] for tolerance in TOLERANCES}
-    found, ones = {}, []
+    costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
+    found, ones, rows = {}, [], []
     for _ in range(ROUNDS):
         ones.append(right_hand_side_seconds())
         for tolerance in TOLERANCES:
             model = EventBasedModel(tolerance=tolerance, **case.settings)
             began, began_cpu = time.perf_counter(), time.process_time()
             found[tolerance] = play(model)
-            cpu[tolerance].append((time.process_time() - began_cpu) / len(packed))
-            wall[tolerance].append((time.perf_counter() - began) / len(packed))
-    one, rows = median(ones), []
+            costs[tolerance].append((time.process_time() - began_cpu, time.perf_counter() - began))
     for tolerance, outcomes in found.items():
-        error = np.abs(outcomes.peak - reference.peak)
+        error, one = np.abs(outcomes.peak - reference.peak), median(ones)
+        cpu, wall = (median(some) / len(packed) for some in zip(*costs[tolerance], strict=True))
         rows.append(
             BatchTime(
                 case=case.name,
                 tolerance=tolerance,
                 runs=len(packed),
-                cpu=median(cpu[tolerance]),
-                wall=median(wall[tolerance]),
-                evaluations=median(cpu[tolerance]) / one,
+                cpu=cpu,
+                wall=wall,
+                evaluations=cpu / one,
                 error_50=float(np.quantile(error, 0.5)),
                 error_95=float(np.quantile(error, 0.95)),
                 wrong=int(np.count_nonzero(outcomes.side != reference.side)),
@@ -248,14 +236,10 @@ def right_hand_side_seconds(count: int = 400_000) -> float:
     """
     from rockcheck.ebm import natural
 
-    ground = natural.base_of(_scene()).horizontal
+    ground = natural.base_of(PLAIN).horizontal
     _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
-    taken = []
-    for _ in range(5):
-        began = time.process_time()
-        _right_hand_sides(ground, PAPER_BLOCK.alpha, count)
-        taken.append((time.process_time() - began) / count)
-    return median(taken)
+    cost = _timed(lambda _: _right_hand_sides(ground, PAPER_BLOCK.alpha, count), count)
+    return 1e-6 * median(cost() for _ in range(5))
 
 
 _FRESH = """
@@ -274,32 +258,27 @@ print(imported - began, time.perf_counter() - loaded)
 def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
     """Import and first simulation in a fresh process, with compile cache or without.
 
-    With a cache, the medians of `times` processes.
+    With a cache, the medians of `times` processes; one before them fills it. Raises `ModelFailure`.
     """
+    starts = []
     with tempfile.TemporaryDirectory() as folder:
         fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
-        if not cached:
-            return ColdStart("none", *_cold_start(fresh))
-        _cold_start(fresh)
-        return ColdStart(
-            "filled",
-            *(
-                median(column)
-                for column in zip(*(_cold_start(fresh) for _ in range(times)), strict=True)
-            ),
-        )
-
-
-def _cold_start(environment: dict[str, str]) -> tuple[float, float]:
-    played = subprocess.run(
-        [sys.executable, "-c", _FRESH], env=environment, capture_output=True, text=True, check=False
-    )
-    if played.returncode:
-        raise ModelFailure(
-            f"ebm: no fresh process could be started: {played.stderr.strip().splitlines()[-1:]}"
-        )
-    importing, first = map(float, played.stdout.split()[-2:])
-    return importing, first
+        for _ in range(1 + times if cached else 1):
+            played = subprocess.run(
+                [sys.executable, "-c", _FRESH],
+                env=fresh,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            if played.returncode:
+                raise ModelFailure(
+                    "ebm: no fresh process could be started:"
+                    f" {played.stderr.strip().splitlines()[-1:]}"
+                )
+            starts.append([*map(float, played.stdout.split()[-2:])])
+    name, first = ("filled", 1) if cached else ("none", 0)
+    return ColdStart(name, *map(median, zip(*starts[first:], strict=True)))
 
 
 #: A wall that the block cannot reach, m.
@@ -358,24 +337,22 @@ def measured(name: str, rounds: int = SAVING_ROUNDS) -> list[Saving]:
 
 
 def _batches(nodes: int) -> Iterator[Pair]:
-
-    plain = pulse(4.5, 4.0, 0.3).replace(duration=10.0)
-    strengths, periods = grid(plain, nodes)
+    strengths, periods = grid(PLAIN, nodes)
 
     def batch(scene: Scene, *, until_decided: bool = True, **settings: Any) -> tuple[Play, Any]:
         """Cost of a trajectory, us, and a run of the batch."""
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
         run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
-        return _timed(lambda: None, lambda _: run(), len(packed)), run
+        return _timed(lambda _: run(), len(packed)), run
 
-    sticky = plain.replace(floor=Floor(friction=1.3))
+    sticky = PLAIN.replace(floor=Floor(friction=1.3))
     still = Record.from_samples(np.zeros(1001), 0.01)
-    basis = batch(plain)
+    basis = batch(PLAIN)
     for thing, dear, cheap, remark in (
         (
             "wall",
-            batch(plain.replace(walls=(FAR,))),
+            batch(PLAIN.replace(walls=(FAR,))),
             basis,
             "a wall out of reach against none: no guard, earlier decision",
         ),
@@ -387,19 +364,19 @@ def _batches(nodes: int) -> Iterator[Pair]:
         ),
         (
             "free flight",
-            batch(plain, pivot="unilateral"),
+            batch(PLAIN, pivot="unilateral"),
             basis,
             "unilateral against bilateral, no wall",
         ),
         (
             "the tail",
-            batch(plain, until_decided=False),
+            batch(PLAIN, until_decided=False),
             basis,
             "10 s against: until outcome and peak are certain",
         ),
         (
             "vertical motion",
-            batch(plain.replace(vertical=still)),
+            batch(PLAIN.replace(vertical=still)),
             basis,
             "a record of zeros against none",
         ),
@@ -410,14 +387,18 @@ def _batches(nodes: int) -> Iterator[Pair]:
         yield "ebm", thing, "μs a trajectory", dear[0], cheap[0], change, remark
 
 
-def _timed(start: Callable[[], Any], play: Callable[[Any], object], count: int) -> Play:
-    """CPU time (us) of one of `count` parts of a play; `start` is not counted."""
+def _timed(
+    play: Callable[[Any], object],
+    count: int,
+    start: Callable[[], Any] = lambda: None,
+    clock: Callable[[], float] = time.process_time,
+) -> Play:
+    """Time (us) of one of `count` parts of a play; its argument, from `start`, does not count."""
 
     def cost() -> float:
-        started = start()
-        began = time.process_time()
+        started, began = start(), clock()
         play(started)
-        return 1e6 * (time.process_time() - began) / count
+        return 1e6 * (clock() - began) / count
 
     return cost
 
@@ -513,7 +494,11 @@ def _mujoco_steps() -> Iterator[Pair]:
 
     from rockcheck.engines import MuJoCo
 
-    text = _as_xml(MuJoCo().rigid_world(_TILTED.replace(walls=(FAR,), initial_rotation=0.0)))
+    world: Any = MuJoCo().rigid_world(_TILTED.replace(walls=(FAR,), initial_rotation=0.0))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "world.xml"
+        mujoco.mj_saveLastXML(str(path), world.model)
+        text = path.read_text(encoding="utf-8")
     whole, lean = _loaded(text), _loaded(text, _unpaired)
 
     def one_by_one(model: Any) -> Play:
@@ -521,7 +506,7 @@ def _mujoco_steps() -> Iterator[Pair]:
             for _ in range(_STEPS):
                 mujoco.mj_step(model, data)
 
-        return _timed(lambda: _started(model), steps, _STEPS)
+        return _timed(steps, _STEPS, lambda: _started(model))
 
     def native(data: Any) -> None:
         start = np.empty(mujoco.mj_stateSize(lean, mujoco.mjtState.mjSTATE_FULLPHYSICS))
@@ -556,7 +541,7 @@ def _mujoco_steps() -> Iterator[Pair]:
         (
             "Python between steps",
             one_by_one(lean),
-            _timed(lambda: _started(lean), native, _STEPS),
+            _timed(native, _STEPS, lambda: _started(lean)),
             "against mujoco.rollout",
         ),
     ):
@@ -573,15 +558,9 @@ def _loaded(text: str, change: Callable[[ET.Element], None] = lambda root: None)
     model.opt.gravity[:] = 0.0, 0.0, -9.81
     model.opt.timestep = 1e-3
     # The one-step contact that the engine's march sets, for pairs and for geoms alike.
-    one_step, impedance = (
-        (-0.01 / model.opt.timestep**2, -1.0 / model.opt.timestep),
-        (0.9999, 0.9999, 0.001, 0.5, 1.0),
-    )
-    for solref, solimp in (
-        (model.pair_solref, model.pair_solimp),
-        (model.geom_solref, model.geom_solimp),
-    ):
-        solref[:], solimp[:] = one_step, impedance
+    one_step = -0.01 / model.opt.timestep**2, -1.0 / model.opt.timestep
+    model.pair_solref[:], model.geom_solref[:] = one_step, one_step
+    model.pair_solimp[:] = model.geom_solimp[:] = 0.9999, 0.9999, 0.001, 0.5, 1.0
     return model
 
 
@@ -637,13 +616,6 @@ def _all_collide(root: ET.Element) -> None:
         geom.attrib.update(collides)
 
 
-def _as_xml(world: Any) -> str:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "world.xml"
-        world.mujoco.mj_saveLastXML(str(path), world.model)
-        return path.read_text(encoding="utf-8")
-
-
 def _pybullet_steps() -> Iterator[Pair]:
     if not_installed("pybullet"):
         return
@@ -673,7 +645,7 @@ def _pybullet_steps() -> Iterator[Pair]:
                 world.place(*_TILTED.initial_state)
                 bullet.setTimeStep(1e-3, **options)
                 bullet.setGravity(0.0, 0.0, -9.81, **options)
-                return _timed(lambda: None, stepped, count)()
+                return _timed(stepped, count)()
             finally:
                 world.close()
 
