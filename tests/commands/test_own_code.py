@@ -239,8 +239,6 @@ UNPICKLE = {
 }
 IMPORT = {
     "rockcheck/commands/cli.py": "rockcheck's own commands",
-    "reports/drawers.py": "rockcheck's own drawers, by the kind of a plot",
-    "reports/show/__init__.py": "rockcheck's own drawings",
     "validation/execute/models.py": (
         "models by rockcheck's own names; one's own only as the command line allows, in a worker"
     ),
