@@ -77,7 +77,6 @@ def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> st
 
 
 def _typed(value: float, digits: int) -> str:
-    """A number as a terminal shows it."""
     return f"{value:.{digits}g}"
 
 
@@ -142,18 +141,15 @@ def _grid(table: Table) -> Grid:
 
 def csv(table: Table) -> str:
     """A table as CSV with all digits."""
-    rows = ([plain(cell) for cell in row] for row in table.rows)
-    return table_text([column.name for column in table.columns], rows)
+    heads = [column.name for column in table.columns]
+    return table_text(heads, ([plain(cell) for cell in row] for row in table.rows))
 
 
 def markdown(found: Finding) -> str:
     """The whole finding as Markdown."""
     parts = [f"# {found.title}", found.answer, *filter(None, map(block_markdown, found.blocks))]
     if found.failures:
-        parts += [
-            "## Failed",
-            "\n".join(f"- {where}: {why}" for where, why in found.failures.items()),
-        ]
+        parts += ["## Failed", "\n".join(f"- {at}: {why}" for at, why in found.failures.items())]
     if found.made is not None:
         about = {"made": found.made.created, **found.made.versions, **found.made.hardware}
         parts.append(", ".join(f"{name} {value}" for name, value in about.items()))
@@ -164,25 +160,18 @@ def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
-        return title + "\n\n".join(
-            filter(
-                None,
-                [
-                    block.text,
-                    "\n".join(f"- {name}: {value}" for name, value in block.facts),
-                    "\n".join(f"- {item}" for item in block.items),
-                ],
-            )
-        )
+        facts = "\n".join(f"- {name}: {value}" for name, value in block.facts)
+        parts = [block.text, facts, "\n".join(f"- {item}" for item in block.items)]
+        return title + "\n\n".join(filter(None, parts))
     if isinstance(block, Plot) or block.on == "file":
         return ""
     block = block.shown
-    rows = [
+    rows = (
         [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
         for row in block.rows
-    ]
-    note = f"\n\n{block.note}" if block.note else ""
-    return title + markdown_table([column.head for column in block.columns], rows) + note
+    )
+    table = markdown_table([column.head for column in block.columns], rows)
+    return title + table + (f"\n\n{block.note}" if block.note else "")
 
 
 def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
@@ -212,8 +201,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
-    live = [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]
-    if live:
+    if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
         text = json_text(live).replace("<", "\\u003c")
         write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
     return site.page(

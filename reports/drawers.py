@@ -125,7 +125,6 @@ def stable_steps(plot: Plot) -> Figure:
                     aspect="auto",
                 )
             for (row, column), step in np.ndenumerate(steps):
-                colour = "#1b1b1b" if step >= tried[2] or not step else "w"
                 ax.text(
                     column,
                     row,
@@ -133,7 +132,7 @@ def stable_steps(plot: Plot) -> Figure:
                     ha="center",
                     va="center",
                     fontsize=6,
-                    color=colour,
+                    color="#1b1b1b" if step >= tried[2] or not step else "w",
                 )
             ax.set_xticks(range(len(values)), [f"{value:g}" for value in values])
             ax.set_yticks(range(len(models)), models)
@@ -216,15 +215,14 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
     Series with one label, such as a line and its fit, share a colour.
     """
     own: dict[str, tuple[str, str]] = {}
-    found = []
-    for series in panel.series:
-        if series.look in BY_KEY:
-            found.append((BY_KEY[series.look].light, BY_KEY[series.look].dark))
-        elif series.style == "thin":
-            found.append(GREY)
-        else:
-            found.append(own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)]))
-    return found
+    return [
+        (BY_KEY[series.look].light, BY_KEY[series.look].dark)
+        if series.look in BY_KEY
+        else GREY
+        if series.style == "thin"
+        else own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)])
+        for series in panel.series
+    ]
 
 
 def live_data(plot: Plot) -> dict[str, Any]:

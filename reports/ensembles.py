@@ -106,12 +106,17 @@ class EnsembleView:
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
         """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
-        found = {}
-        for model, sample in self.samples.items():
-            peaks = np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
-            shares = np.arange(1, len(peaks) + 1) / len(sample.peaks)
-            found[model] = peaks.tolist(), shares.tolist()
-        return found
+        known = {
+            model: np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
+            for model, sample in self.samples.items()
+        }
+        return {
+            model: (
+                peaks.tolist(),
+                (np.arange(1, len(peaks) + 1) / len(self.samples[model].peaks)).tolist(),
+            )
+            for model, peaks in known.items()
+        }
 
     def page(self) -> Finding:
         """All that its page shows."""
@@ -140,29 +145,24 @@ class EnsembleView:
     def facts(self) -> list[tuple[str, str]]:
         """The ensemble in a few words: what is drawn, and the scene that it is drawn from."""
         drawn = Ensemble(**self.record.definition)
-        facts = [("scenes", f"{drawn.count}, seed {drawn.seed}")]
-        hidden = set()
-        for name, of, fact in (
-            ("friction", drawn.friction, "floor"),
-            ("gap (m)", drawn.gap, "wall"),
-        ):
-            facts += [(name, _distribution(of))] if of else []
-            hidden |= {fact} if of else set()
-        if drawn.pulse:
-            facts += [
-                ("pulse", "Ricker, of random phase"),
-                ("its period (s)", _distribution(drawn.pulse.period)),
-            ]
-        if noise := drawn.noise:
-            words = f"{number(noise.frequency)} Hz, damping {number(noise.damping)}"
-            facts.append(("noise", f"Kanai-Tajimi, {words}, {number(noise.strong)} s"))
-        if motion := drawn.pulse or drawn.noise:
-            facts.append(("its peak (m/s²)", _distribution(motion.amplitude)))
-            hidden.add("base")
+        pulse, noise, motion = drawn.pulse, drawn.noise, drawn.pulse or drawn.noise
+        facts = {
+            "scenes": f"{drawn.count}, seed {drawn.seed}",
+            "friction": _distribution(drawn.friction),
+            "gap (m)": _distribution(drawn.gap),
+            "pulse": pulse and "Ricker, of random phase",
+            "its period (s)": pulse and _distribution(pulse.period),
+            "noise": noise
+            and f"Kanai-Tajimi, {number(noise.frequency)} Hz, damping {number(noise.damping)},"
+            f" {number(noise.strong)} s",
+            "its peak (m/s²)": motion and _distribution(motion.amplitude),
+        }
+        known = [(name, said) for name, said in facts.items() if said]
         if "excitation" in drawn.scene:
-            return facts
-        base = Scene(**{"name": self.name, **drawn.scene})
-        return facts + [fact for fact in scene_facts(base) if fact[0] not in hidden]
+            return known
+        instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
+        base = scene_facts(Scene(**{"name": self.name, **drawn.scene}))
+        return known + [fact for fact in base if not instead.get(fact[0])]
 
     def distributions(self) -> Plot:
         """Share of scenes with a peak below each value, by model; difference from the reference.
@@ -208,13 +208,8 @@ class EnsembleView:
 
     def by_scene(self) -> Plot:
         """Peak rotation of each scene by each model against the reference's."""
-        reference, *candidates = (
-            self.references[0],
-            *(model for model in self.samples if model != self.references[0]),
-        )
-        known = looks(self.run.models)
-        panels = []
-        for model in candidates:
+        reference, known, panels = self.references[0], looks(self.run.models), []
+        for model in [one for one in self.samples if one != reference]:
             pair = Samples(self.samples[reference], self.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LEAST, MOST * 1.6))
@@ -243,8 +238,10 @@ class EnsembleView:
                 continue
             theirs, own = self.samples[against].fallen, self.samples[cell.model].fallen
             counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
-            statistics = (figures[name] for name in STATISTICS_SHOWN)
-            shown = (Mark(one.value, more=one.note.replace("], ", "]\n")) for one in statistics)
+            shown = (
+                Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
+                for name in STATISTICS_SHOWN
+            )
             rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
         falls = ("both fall", "only the reference falls", "only the model falls", "both stay")
         columns = [
@@ -271,7 +268,9 @@ class EnsembleView:
         return Table("", list(map(Column, ["scene", *names])), rows, on="file")
 
 
-def _distribution(of: Distribution) -> str:
+def _distribution(of: Distribution | None) -> str:
+    if of is None:
+        return ""
     if of.uniform is not None:
         return f"uniform {number(of.uniform[0])} to {number(of.uniform[1])}"
     assert of.lognormal is not None

@@ -122,13 +122,12 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
         for x, y, look in curves:
             style = "steps-post" if step else "default"
             ax.plot(x, y, color=look.light, linewidth=0.7, drawstyle=style)
-        if step:
-            ax.set_ylim(0.0, 1.0)
-        else:
+        low, high = 0.0, 1.0
+        if not step:
             ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
             ax.margins(x=0.0, y=0.08)
-            low, high = ax.get_ylim()
-            ax.set_ylim(min(low, -LEAST), max(high, LEAST))
+            low, high = min(ax.get_ylim()[0], -LEAST), max(ax.get_ylim()[1], LEAST)
+        ax.set_ylim(low, high)
         ax.set_axis_off()
     return figure
 
@@ -226,18 +225,15 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
                     zorder=4.0,
                 )
             until = view.falls.get(model, math.inf)
-            times = np.array(
-                [
-                    e.t
-                    for e in view.histories[model].event_list
-                    if e.kind == "wall impact" and e.t <= until
-                ]
-            )
-            if len(times):
-                at = np.interp(times, view.t, np.nan_to_num(values))
+            times = [
+                e.t
+                for e in view.histories[model].event_list
+                if e.kind == "wall impact" and e.t <= until
+            ]
+            if times:
                 ax.plot(
                     times,
-                    at,
+                    np.interp(times, view.t, np.nan_to_num(values)),
                     marker="D",
                     markersize=2.4,
                     markerfacecolor="white",

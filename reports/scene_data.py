@@ -127,20 +127,13 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
     `load_scene` reads the file back to a scene that moves in the same way.
     """
     document, records = scene_tables(scene, slug)
-    files = {f"{slug}.toml": tomlkit.dumps(document)}
+    text = tomlkit.dumps(document)
+    write_whole(folder / f"{slug}.toml", text)
     for name, record in records.items():
+        head = [f"# {re.sub(r'[^ -~]', '?', record.source)}", "time_s,acceleration_m_s2"]
         rows = [f"{record.time_step * n:.12g},{value!r}" for n, value in enumerate(record.unscaled)]
-        files[name] = (
-            "\n".join(
-                [f"# {re.sub(r'[^ -~]', '?', record.source)}", "time_s,acceleration_m_s2", *rows]
-            )
-            + "\n"
-        )
-    for name, text in files.items():
-        write_whole(folder / name, text)
-    return {name: text for name, text in files.items() if name.endswith(".toml")} | dict.fromkeys(
-        records, ""
-    )
+        write_whole(folder / name, "\n".join([*head, *rows, ""]))
+    return {f"{slug}.toml": text} | dict.fromkeys(records, "")
 
 
 def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Record]]:
@@ -151,14 +144,10 @@ def scene_tables(scene: Scene, slug: str) -> tuple[dict[str, Any], dict[str, Rec
     records: dict[str, Record] = {}
     tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
     for key in ("excitation", "vertical"):
-        excitation = getattr(scene, key)
-        if key not in tables:
-            continue
-        table = {"kind": excitation.kind} | tables[key]
+        excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
-            name = f"{slug}-{key}.csv"
             records[name] = excitation
-            table = {"kind": "record", "file": name, "scale": excitation.scale}
-        tables[key] = table
-    plain = {key: value for key, value in tables.items() if not isinstance(value, dict | list)}
-    return plain | {key: value for key, value in tables.items() if key not in plain}, records
+            tables[key] = {"kind": "record", "file": name, "scale": excitation.scale}
+        elif key in tables:
+            tables[key] = {"kind": excitation.kind} | tables[key]
+    return dict(sorted(tables.items(), key=lambda one: isinstance(one[1], dict | list))), records

@@ -25,7 +25,7 @@ from rockcheck.reports.figures import (
 )
 from rockcheck.reports.scene_data import script, write_scene_file
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import drawn_by, kind_of, looks, save, save_as
+from rockcheck.reports.style import drawn_by, kind_of, looks, save, save_as, stamp_in
 from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError, experience
@@ -113,13 +113,13 @@ def write_site(
     waiting = {
         name: stamp
         for name, stamp in stamps.items()
-        if afresh or _stamp_of(folder / _address(pages.views[name])) != stamp
+        if afresh or stamp_in(folder / _address(pages.views[name])) != stamp
     }
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting) + 1)
     current = {f"{view.slug}.html" for view in pages.views.values()}
     for page in (folder / PAGES).glob("*.html"):
-        if page.name not in current and _stamp_of(page):
+        if page.name not in current and stamp_in(page):
             for name in (page.name, *_belongings(page)):
                 (folder / PAGES / name).unlink(missing_ok=True)
     return folder / INDEX
@@ -134,8 +134,8 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     if work < FEW:
         yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
         return
-    of = pages.folder, pages.wanted
-    calls = [Call(_write_page, (*of, *one)) for one in (*stamps.items(), (INDEX, ""))]
+    every = (*stamps.items(), (INDEX, ""))
+    calls = [Call(_write_page, (pages.folder, pages.wanted, *one)) for one in every]
     yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
 
 
@@ -154,10 +154,11 @@ class _Pages:
             if name not in slugs:
                 raise unknown_name("scene of the run", name, slugs)
         chosen = {*shown(self.run), *wanted}
-        found: list[View] = [
-            *scene_views(self.run, folder, chosen),
-            *(EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles),
+        self.scenes = scene_views(self.run, folder, chosen)
+        self.ensembles = [
+            EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles
         ]
+        found: list[View] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
         links = [(view.name, _address(view)) for view in found]
         links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
@@ -185,7 +186,7 @@ class _Pages:
         write_figures(view, made(self.folder, PAGES, FIGURES))
         write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
-        beside = [None, *(one for one in self.views.values() if isinstance(one, SceneView)), None]
+        beside = [None, *self.scenes, None]
         place = beside.index(view)
         return {"files": files, "previous": beside[place - 1], "following": beside[place + 1]}
 
@@ -214,8 +215,8 @@ class _Pages:
         self.site.page(
             INDEX,
             "index.html",
-            scenes=[view for view in self.views.values() if isinstance(view, SceneView)],
-            ensembles=[view for view in self.views.values() if isinstance(view, EnsembleView)],
+            scenes=self.scenes,
+            ensembles=self.ensembles,
             worst=tables.worst_table(self.run, links),
             hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
             times=tables.times_table(self.run),
@@ -259,20 +260,12 @@ def _address(view: View) -> str:
     return f"{PAGES}/{view.slug}.html"
 
 
-@cache
-def _pages_of(folder: Path, wanted: Sequence[str]) -> _Pages:
-    """Start a process of the pool: it reads the run once for all its pages."""
-    return _Pages(folder, wanted)
+#: A process of the pool reads the run once for all its pages.
+_pages_of = cache(_Pages)
 
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-def _stamp_of(page: Path) -> str:
-    """The stamp that a page names, empty where there is no such page."""
-    found = re.search(r'<meta name="rockcheck-stamp" content="(\w+)">', head_of(page, 2000))
-    return found[1] if found else ""
 
 
 def _belongings(page: Path) -> set[str]:

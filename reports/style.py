@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import math
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -254,6 +255,7 @@ def drawn_by() -> str:
 
 
 def stamp_in(path: Path) -> str:
-    """The stamp that an SVG names near its beginning, empty where there is none."""
-    _, mark, rest = head_of(path, 4000).partition("<dc:identifier>")
-    return rest.partition("<")[0] if mark else ""
+    """The stamp that an SVG or a page names near its beginning, empty where there is none."""
+    mark = r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)'
+    found = re.search(mark, head_of(path, 4000))
+    return found[1] if found else ""

@@ -57,9 +57,8 @@ def checks_table(cells: Iterable[Cell], name: str = "") -> Table:
 
 def verdict_mark(cell: Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
-    if cell.verdict == "pass" and not cell.checks:
-        return Mark("nothing judged")
-    return Mark(VERDICTS[cell.verdict][0], cell.verdict)
+    judged = cell.verdict != "pass" or bool(cell.checks)
+    return Mark(VERDICTS[cell.verdict][0], cell.verdict) if judged else Mark("nothing judged")
 
 
 def worst_table(run: Run, links: Mapping[str, str]) -> Table:
@@ -160,9 +159,9 @@ def times_table(run: Run) -> Table:
             for place in cells
         )
         rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
-    columns = [Column(f"scene {place}", place) for place in cells]
-    mean = Column("ratio", "geometric mean, ×")
-    return Table("times", [Column("model", kind="model"), mean, *columns], rows)
+    columns = [Column("model", kind="model"), Column("ratio", "geometric mean, ×")]
+    columns += [Column(f"scene {place}", place) for place in cells]
+    return Table("times", columns, rows)
 
 
 def measures_table(view: SceneView, against: str) -> Table:
@@ -175,8 +174,8 @@ def measures_table(view: SceneView, against: str) -> Table:
         judged = [(check.figure, check) for check in cell.checks]
         for figure, check in (*judged, *((figure, None) for figure in cell.figures)):
             if figure.against == against:
-                of_measure = found.setdefault((figure.measure, figure.window), {})
-                of_measure.setdefault(cell.model, (figure, check))
+                row = found.setdefault((figure.measure, figure.window), {})
+                row.setdefault(cell.model, (figure, check))
     models = [cell.model for cell in view.cells if any(cell.model in row for row in found.values())]
     firsts = {key: next(iter(row.values()))[0] for key, row in found.items()}
     rows = [

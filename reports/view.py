@@ -210,10 +210,9 @@ class SceneView:
         """
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
-            sizes = [np.nan_to_num(np.abs(columns[name])) for columns in self.drawn.values()]
-            least = STILL * max((float(size.max()) for size in sizes), default=0.0)
-            for size in sizes:
-                moving |= size > max(least, 1e-9)
+            drawn = [columns[name] for columns in self.drawn.values()]
+            sizes = np.nan_to_num(np.abs(np.array(drawn).reshape(-1, len(self.t))))
+            moving |= (sizes > max(STILL * sizes.max(initial=0.0), 1e-9)).any(axis=0)
         rows, whole = np.flatnonzero(moving), (float(self.t[0]), float(self.t[-1]))
         if not len(rows):
             return whole
@@ -236,8 +235,7 @@ class SceneView:
         if not height:
             return None
         flights = (end - start for start, end, mode in self.spells(model) if mode == "flight")
-        longest = max(flights, default=0.0)
-        return {"height": height, "model": model, "longest": longest}
+        return {"height": height, "model": model, "longest": max(flights, default=0.0)}
 
     def spells(self, model: str) -> list[tuple[float, float, str]]:
         """The modes of motion of a model as (start in s, end in s, mode), one for each change."""
@@ -272,9 +270,8 @@ class SceneView:
 
         The difference ends with the first fall of the two.
         """
-        reference = self.drawn[against][channel]
         return {
-            model: columns[channel] - reference
+            model: columns[channel] - self.drawn[against][channel]
             for model, columns in self.drawn.items()
             if model != against
         }
@@ -363,8 +360,7 @@ class SceneView:
                 wide += [_least(x - across), -_least(-x - across)]
                 tall += [_least(y - up), -_least(-y - up)]
         for wall in self.scene.walls:
-            face = (block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0)
-            wide.append(face)
+            wide.append((block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0))
         return min(wide), max(wide), min(tall), max(tall)
 
 

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -246,8 +246,7 @@ def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], M
     """
     spreads: dict[str, Spread] = {}
     tables = {key: value for key, value in data.items() if key != CORRELATION}
-    plain = _plain(tables, (), spreads)
-    return plain, spreads, data.get(CORRELATION, {})
+    return _plain(tables, (), spreads), spreads, data.get(CORRELATION, {})
 
 
 def uncertain_scene(
@@ -325,14 +324,10 @@ def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
             return spreads[name].nominal
         return {key: _plain(item, (*place, key), spreads) for key, item in value.items()}
     if isinstance(value, list):
-        return [
-            _plain(item, (*place, part), spreads)
-            for part, item in zip(_labels(value), value, strict=True)
-        ]
+        return [_plain(item, (*place, _label(item, k)), spreads) for k, item in enumerate(value)]
     return value
 
 
-def _labels(items: Sequence[Any]) -> Iterator[str | int]:
-    """Labels of a list's tables: the side of a wall, else the index."""
-    for k, item in enumerate(items):
-        yield str(item["side"]) if isinstance(item, Mapping) and "side" in item else k
+def _label(item: Any, k: int) -> str | int:
+    """Label of the k-th table of a list: the side of a wall, else its number."""
+    return str(item["side"]) if isinstance(item, Mapping) and "side" in item else k

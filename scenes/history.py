@@ -22,7 +22,7 @@ from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.experience import Expected, expected, known
 from rockcheck.scenes.reading import read_table
-from rockcheck.scenes.writing import columns_text, json_text, write_together, write_whole
+from rockcheck.scenes.writing import columns_text, json_text, write_together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -124,8 +124,7 @@ class History(Shown):
         """The events as a table: t, kind, mode_before, mode_after, impulse."""
         import pandas as pd
 
-        rows = [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in self.event_list]
-        return pd.DataFrame(rows, columns=list(EVENT_COLUMNS))
+        return pd.DataFrame(self._event_columns())
 
     @property
     def alpha(self) -> float | None:
@@ -202,34 +201,28 @@ class History(Shown):
         """
         path = Path(path)
         check_format(path)
-        about = self._about()
-        if path.suffix.lower() in (".json", ".mat"):
-            form = _json if path.suffix.lower() == ".json" else _mat
-            write_whole(path, form(about, self.channels, self._event_columns()), named=True)
-            return
-        if path.suffix.lower() == ".parquet":
-            attrs = {ABOUT: json.loads(json.dumps(about, default=str))}
-            write_together(
-                {events_path(path): _parquet(self.events, {}), path: _parquet(self.frame, attrs)},
-                named=True,
-            )
-            return
-        table, beside = self._tables(about)
-        contents = {path: table}
-        if path.is_file() or not path.exists():  # nothing is written beside /dev/stdout
-            contents = {events_path(path): beside, **contents}
-        packed = path.suffix.lower() == ".gz"
-        write_together(
-            {one: _packed(text) if packed else text for one, text in contents.items()}, named=True
-        )
+        kind, contents = path.suffix.lower(), dict[Path, str | bytes]()
+        if kind in (".json", ".mat"):
+            form = _json if kind == ".json" else _mat
+            contents[path] = form(self._about(), self.channels, self._event_columns())
+        elif kind == ".parquet":
+            attrs = {ABOUT: json.loads(json.dumps(self._about(), default=str))}
+            contents[events_path(path)] = _parquet(self.events, {})
+            contents[path] = _parquet(self.frame, attrs)
+        else:
+            table, beside = self.packed().values() if kind == ".gz" else self._tables()
+            if path.is_file() or not path.exists():  # nothing is written beside /dev/stdout
+                contents[events_path(path)] = beside
+            contents[path] = table
+        write_together(contents, named=True)
 
     def packed(self) -> dict[str, bytes]:
         """The two files that `save` writes for ".csv.gz", by their endings.
 
         The endings are ".csv.gz" and ".events.csv.gz".
         """
-        table, events = self._tables(self._about())
-        return {".csv.gz": _packed(table), ".events.csv.gz": _packed(events)}
+        table, events = map(_packed, self._tables())
+        return {".csv.gz": table, ".events.csv.gz": events}
 
     def _about(self) -> dict[str, Any]:
         """Metadata of a history: all that a file holds beside its tables."""
@@ -246,14 +239,15 @@ class History(Shown):
             "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
         }
 
-    def _tables(self, about: Mapping[str, Any]) -> tuple[str, str]:
+    def _tables(self) -> tuple[str, str]:
         columns = {
             name: np.asarray(self.channels[name]).tolist()
             for name in COLUMNS
             if name in self.channels
         }
         rows = len(next(iter(columns.values()), ()))
-        columns[ABOUT] = [json.dumps(about, sort_keys=True, default=str), *["-"] * rows][:rows]
+        about = json.dumps(self._about(), sort_keys=True, default=str)
+        columns[ABOUT] = [about, *["-"] * rows][:rows]
         return columns_text(columns), columns_text(self._event_columns())
 
     def _event_columns(self) -> dict[str, list[Any]]:
@@ -278,7 +272,7 @@ class History(Shown):
             frame.index, pd.RangeIndex
         ):  # pandas would take the first column for names of rows
             raise InputError(f"{shown}: rows have more values than the heading has columns")
-        about = _About.of(frame, shown)
+        about, block = _about_of(frame, shown)
         channels = _checked_channels(frame, shown)
         try:
             event_list = tuple(
@@ -308,7 +302,7 @@ class History(Shown):
             settings=about.settings,
             notes=tuple(printable(note, 1000) for note in about.notes),
             uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
-            **about.block(shown),
+            **block,
         )
 
 
@@ -348,11 +342,10 @@ def _mat(
 ) -> bytes:
     from scipy.io import savemat
 
-    said = {name: value for name, value in about.items() if isinstance(value, str | int | float)}
-    said |= {
-        name: json.dumps(value, default=str)
+    said = {
+        name: json.dumps(value, default=str) if isinstance(value, dict | list) else value
         for name, value in about.items()
-        if isinstance(value, dict | list)
+        if isinstance(value, str | int | float | dict | list)
     }
     columns = {
         name: column.astype(object) if column.dtype.kind in "UO" else column
@@ -403,9 +396,9 @@ def _packed(text: str) -> bytes:
     Digits of floats hardly repeat, so short matches cost more than they save: without them
     (`Z_FILTERED`) the result is 7 % smaller. A higher level saves 3 % in twice the time.
     """
-    packer = zlib.compressobj(
+    packer = zlib.compressobj(  # 16: as gzip writes
         4, wbits=zlib.MAX_WBITS | 16, strategy=zlib.Z_FILTERED
-    )  # 16: as gzip writes
+    )
     return packer.compress(text.encode()) + packer.flush()
 
 
@@ -432,27 +425,19 @@ class _About(Frozen):
     uncertainty: Mapping[str, NonNegative] = {}
     cost: Mapping[str, Any] = {}
 
-    @classmethod
-    def of(cls, frame: pd.DataFrame, shown: str) -> _About:
-        """Read from the table. Raises `InputError`."""
-        if ABOUT not in frame.columns or not len(frame):
-            return cls()
-        try:
-            return cls(**json.loads(frame[ABOUT].iloc[0]))
-        except InputError as error:
-            raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
-        except (TypeError, ValueError, RecursionError):
-            raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
 
-    def block(self, shown: str) -> dict[str, Any]:
-        """The block's fields of a history; mass properties are checked against the sizes."""
-        given = {name: getattr(self, name) for name in (*_SIZES, *_MASS)}
-        if all(given[name] is None for name in _MASS):
-            return given
-        try:
-            return block_fields(Block(**given))
-        except InputError as error:
-            raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
+def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, dict[str, Any]]:
+    """The metadata of a table, and the block's fields: masses are checked against the sizes."""
+    text = frame[ABOUT].iloc[0] if ABOUT in frame.columns and len(frame) else "{}"
+    try:
+        about = _About(**json.loads(text))
+        given = {name: getattr(about, name) for name in (*_SIZES, *_MASS)}
+        massless = all(given[name] is None for name in _MASS)
+        return about, given if massless else block_fields(Block(**given))
+    except InputError as error:
+        raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
+    except (TypeError, ValueError, RecursionError):
+        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
 
 
 def block_fields(block: Block) -> dict[str, Any]:
@@ -468,20 +453,16 @@ def block_fields(block: Block) -> dict[str, Any]:
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:
     import pandas as pd
 
-    missing = [name for name in ("t", "theta") if name not in frame.columns]
-    if missing:
+    if missing := [name for name in ("t", "theta") if name not in frame.columns]:
         raise InputError(
             f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}"
         )
-    doubled = [name for name in COLUMNS if list(frame.columns).count(name) > 1]
-    if doubled:
+    if doubled := [name for name in COLUMNS if list(frame.columns).count(name) > 1]:
         raise InputError(f"{shown}: two columns {doubled[0]!r}")
     if len(frame) == 0:
         raise InputError(f"{shown}: no rows")
     channels: dict[str, NDArray[Any]] = {}
-    for name in COLUMNS:
-        if name not in frame.columns:
-            continue
+    for name in [one for one in COLUMNS if one in frame.columns]:
         if name == "mode":
             channels[name] = frame[name].astype(str).to_numpy()
             continue

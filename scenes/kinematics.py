@@ -109,7 +109,5 @@ def energy(
     Zero for the block standing still.
     """
     y, x_dot, y_dot = mass_motion(block, y, theta, x_dot, y_dot, theta_dot)
-    height = block.weaker_pivot.height
-    return 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2) + gravity * (
-        y - height
-    )
+    kinetic = 0.5 * (x_dot**2 + y_dot**2 + block.gyration_squared * theta_dot**2)
+    return kinetic + gravity * (y - block.weaker_pivot.height)

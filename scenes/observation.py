@@ -42,6 +42,8 @@ def observe(
     `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are
     left out. `mode` and `outcome` are derived from the motion where the model does not know them;
     `about` holds the fields of `About`. Adds a note where the record is shorter than the scene.
+    Raises `ValueError` where the block overturned and the model neither reported the event nor
+    knows the outcome.
     """
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
     rows = max(int(tipped[0]) if tipped.size else len(state), 1)
@@ -53,8 +55,11 @@ def observe(
         scene.block, channels["theta"], channels["x_dot"], channels["theta_dot"]
     )
     channels["mode"] = modes_of(scene, channels) if mode is None else mode[:rows]
-    if outcome is None:
-        outcome = _overturned(tipped, events) or outcome_of(channels)
+    told = (event.kind for event in events if event.kind.startswith("overturned"))
+    if outcome is None and not (outcome := next(told, None)):
+        if tipped.size:
+            raise ValueError("a model that lets the block overturn must report the event")
+        outcome = outcome_of(channels)
     return History(
         name=scene.name,
         model=model,
@@ -75,10 +80,9 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
     if size > LARGE:
         said.append(f"the block is {size:g} m large: lengths are in m, not mm")
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
-        if excitation.kind != "record":
-            continue
-        said += [f"the {which} record: {note}" for note in excitation.notes]
-        if excitation.quiet_after < scene.duration:
+        notes = excitation.notes if excitation.kind == "record" else ()
+        said += [f"the {which} record: {note}" for note in notes]
+        if excitation.kind == "record" and excitation.quiet_after < scene.duration:
             end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"
             said.append(f"the {which} record ends at {end}; the base is at rest after it")
     return tuple(said)
@@ -101,14 +105,3 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
         ["flight", "rest", "slide", "lean", "ladder", "rock"],
         default="slide-rock",
     )
-
-
-def _overturned(tipped: NDArray[np.intp], events: Sequence[Event]) -> str | None:
-    """The kind of the model's event `overturned left|right`, or None without one.
-
-    Raises `ValueError` where the block overturned and the model reported no event.
-    """
-    told = next((event.kind for event in events if event.kind.startswith("overturned")), None)
-    if tipped.size and told is None:
-        raise ValueError("a model that lets the block overturn must report the event")
-    return told

@@ -142,8 +142,8 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
         raise InputError("this comparison has not kept its histories")
     reference, candidate = found.histories
     style = looks([reference.model, candidate.model])
-    mine = style[reference.model]
-    other = style[candidate.model] if candidate.model != reference.model else SPARE[0]
+    mine, other = style[reference.model], style[candidate.model]
+    other = SPARE[0] if mine is other else other
     figure = new_figure(7.0, 4.0)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     rotation_lines(above, [reference, candidate], [mine.light, other.light])

@@ -100,9 +100,8 @@ def axis_labels(record: bool) -> tuple[str, str]:
     Frequency and amplitude ratio of a pulse; for a record, the size of the block relative to its
     own and the scale of the record.
     """
-    if record:
-        return "size of the block / its own", "scale of the record"
-    return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
+    of_record = "size of the block / its own", "scale of the record"
+    return of_record if record else ("\u03c9\u209a / p", "a\u209a / (g tan \u03b1)")
 
 
 def figure(plot: Plot) -> Figure:
@@ -118,8 +117,8 @@ def figure(plot: Plot) -> Figure:
     columns = 1 + max(panel["place"][2] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
     with figure_style():
-        width = PAGE if len(panels) > 1 else PAGE / 1.6
-        figure = Figure(figsize=(width, data["height"]), layout="constrained")
+        size = PAGE if len(panels) > 1 else PAGE / 1.6, data["height"]
+        figure = Figure(figsize=size, layout="constrained")
         grid = figure.add_gridspec(rows, columns)
         x, y = data["frequencies"], data["amplitudes"]
         for panel in panels:
@@ -173,11 +172,11 @@ def _legend(figure: Figure, data: Any) -> None:
     from matplotlib.patches import Patch
 
     shown = "".join(panel["outcomes"] for panel in data["panels"])
-    key = {COLOURS[name]: words for name, words in outcome_key(data["panels"]).items()}
-    if "U" not in shown:
-        del key[COLOURS["undecided"]]
-    if "key" in data:
-        key = {MARKED[letter]: words for letter, words in data["key"].items()}
+    key = {MARKED[letter]: words for letter, words in data.get("key", {}).items()} or {
+        COLOURS[name]: words
+        for name, words in outcome_key(data["panels"]).items()
+        if name != "undecided" or "U" in shown
+    }
     handles: list[Any] = [Patch(facecolor=colour, label=words) for colour, words in key.items()]
     if any(panel.get("law") for panel in data["panels"]):
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
@@ -193,8 +192,8 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
     `<name>.nodes.js` is small, and the page loads it at once. `<name>.histories.js` is loaded when
     a node is played, and is not among the scripts returned.
     """
-    data = dict(plot.data, stem=plot.name, axes=axis_labels(plot.data["record"]))
-    panels = data["panels"]
+    panels = plot.data["panels"]
+    data = plot.data | {"stem": plot.name, "axes": axis_labels(plot.data["record"])}
     data["key"] = outcome_key(panels)
     data["panels"] = [
         {name: panel[name] for name in ("title", "free", "nodes")}

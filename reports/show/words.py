@@ -59,18 +59,12 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
     """An excitation in a few words."""
     if isinstance(excitation, Record):
         return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
-    if isinstance(excitation, Ricker):
-        shape = "symmetric" if excitation.symmetric else "antisymmetric"
-        return (
-            f"{shape} Ricker pulse, {number(excitation.amplitude)} m/s²,"
-            f" period {number(excitation.period)} s"
-        )
+    if isinstance(excitation, Rest):
+        return "at rest"
+    size = f"{number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
     if isinstance(excitation, Sine):
-        return (
-            f"sine, {number(excitation.amplitude)} m/s²,"
-            f" period {number(excitation.period)} s, {excitation.cycles} cycles"
-        )
-    return "at rest"
+        return f"sine, {size}, {excitation.cycles} cycles"
+    return f"{'symmetric' if excitation.symmetric else 'antisymmetric'} Ricker pulse, {size}"
 
 
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
@@ -144,9 +138,9 @@ def history_html(history: History) -> str:
         "settings": settings,
         "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",
     }
-    known = [(name, said) for name, said in facts.items() if said]
-    notes = [("note", note) for note in history.notes]
-    return html_table(f"{history.name}, {history.model}", known + notes)
+    rows = [(name, said) for name, said in facts.items() if said]
+    rows += [("note", note) for note in history.notes]
+    return html_table(f"{history.name}, {history.model}", rows)
 
 
 def discrepancy_html(found: Discrepancy) -> str:

@@ -9,8 +9,10 @@ Only the blocks of acceleration are read. Source: COSMOS Strong Motion Data Form
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -69,17 +71,14 @@ _UP = {400: "up", 401: "down"}
 def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
     only_for_tables(path, reading, "a PEER file")
-    header = match = None
-    for index, line in enumerate(lines[:20]):
-        if match := AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line):
-            header = index
-            break
-    if header is None or match is None:
+    found = (AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in lines[:20])
+    header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
+    if match is None:
         raise fault(path, "no header line with NPTS and DT within the first 20 lines")
     stated = next(
         filter(
             None,
-            (known_unit(word) for line in lines[: header + 1] for word in _UNITS.findall(line)),
+            (known_unit(word) for line in lines[:header] for word in _UNITS.findall(line)),
         ),
         "",
     )
@@ -90,11 +89,11 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
             f" {option('unit', 'cm/s2')}",
         )
     unit = settled_unit(path, stated, reading)
-    count = checked_count(path, header + 1, "NPTS", match[1])
-    step = settled_step(path, checked_step(path, header + 1, "DT", match[2]), reading)
-    values = numbers(path, enumerate(lines[header + 1 :], header + 2), count)
+    count = checked_count(path, header, "NPTS", match[1])
+    step = settled_step(path, checked_step(path, header, "DT", match[2]), reading)
+    values = numbers(path, enumerate(lines[header:], header + 1), count)
     if len(values) != count:
-        raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header + 1)
+        raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header)
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=step,
@@ -117,13 +116,9 @@ def _at2_component(lines: list[str]) -> str:
 def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
     """ESM (DYNA 1.2): lines of KEY: value, then one acceleration a line."""
     only_for_tables(path, reading, "an ESM file")
-    header: dict[str, tuple[int, str]] = {}
-    first = len(lines)
-    for n, line in enumerate(lines, 1):
-        if not (match := _ESM_LINE.match(line)):
-            first = n
-            break
-        header[match[1]] = n, match[2].strip()
+    said = [match for match in takewhile(bool, map(_ESM_LINE.match, lines)) if match]
+    header = {match[1]: (n, match[2].strip()) for n, match in enumerate(said, 1)}
+    first = min(len(said) + 1, len(lines))
 
     def stated(key: str) -> tuple[int, str]:
         if not header.get(key, (0, ""))[1]:
@@ -139,22 +134,18 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
     if not re.fullmatch(r"[0-9]++", count_word):
         raise fault(path, f"NDATA {printable(count_word, 30)!r} is not a count", place)
     count = checked_count(path, place, "NDATA", count_word)
-    step_line, step_word = stated("SAMPLING_INTERVAL_S")
-    step = settled_step(
-        path, checked_step(path, step_line, "SAMPLING_INTERVAL_S", step_word), reading
-    )
-    units = header.get("UNITS", (0, ""))
-    unit = settled_unit(path, known_unit(units[1]), reading)
+    line, word = stated("SAMPLING_INTERVAL_S")
+    step = settled_step(path, checked_step(path, line, "SAMPLING_INTERVAL_S", word), reading)
+    unit = settled_unit(path, known_unit(header.get("UNITS", (0, ""))[1]), reading)
     values = numbers(path, enumerate(lines[first - 1 :], first))
     if len(values) != count:
         raise fault(path, f"NDATA says {count}, the file has {len(values)} samples", place)
-    stream = printable(header.get("STREAM", (0, ""))[1], 30)
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=step,
         unit=unit,
         form="ESM ASCII",
-        component=stream,
+        component=printable(header.get("STREAM", (0, ""))[1], 30),
     )
 
 
@@ -189,16 +180,14 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
     unit = settled_unit(path, "gal", reading)
     samples = values * (factor / counts * UNITS[unit])
     mean = float(np.mean(samples))
-    step = settled_step(path, 1.0 / hertz, reading)
-    found = Recording(
+    said = f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+    return Recording(
         samples=samples - mean,
-        time_step=step,
+        time_step=settled_step(path, 1.0 / hertz, reading),
         unit=unit,
         form="K-NET ASCII",
         component=printable(header.get("Dir.", (0, ""))[1], 30),
-    )
-    return found.noted(
-        f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+        notes=(said,),
     )
 
 
@@ -216,29 +205,21 @@ def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, fo
 
 
 @dataclass
-class _Channel:
-    """Header values of the next block of accelerations, as far as they are read.
+class _Block:
+    """What is known of the next block of accelerations, from its headers and its own first line.
 
-    `step` is the line of the time step, and its value (s).
+    `step` is the line of the time step, and its value (s); `count` samples, in all some whole
+    `seconds` where these are stated; `across` numbers stand on a line, each `width` characters
+    wide.
     """
 
     name: str = ""
-    step: tuple[int, float] | None = None
-
-
-@dataclass(frozen=True)
-class _Block:
-    """Header values of a block of accelerations.
-
-    `count` samples; `step` is the line of the time step, and its value (s); `across` numbers stand
-    on a line, each `width` characters wide.
-    """
-
-    count: str
-    step: tuple[int, float]
-    unit: str
-    across: int
-    width: int
+    step: tuple[int, float] = (0, math.nan)
+    count: str = ""
+    seconds: str = ""
+    unit: str = ""
+    across: int = 8
+    width: int = 10
 
     @property
     def height(self) -> int:
@@ -259,31 +240,30 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
     """Every block of acceleration, in the file's order."""
     only_for_tables(path, reading, "a V2 file")
     found: list[Recording] = []
-    channel, index = _Channel(), 0
+    block, index = _Block(), 0
     while index < len(lines):
         line = lines[index][:_WIDE]
         index += 1
         if header := _HEADER.match(line):
-            index = _heed(path, lines, index, header, channel)
-        elif block := COSMOS_BLOCK.match(line):
-            if channel.step is None:
+            index = _heed(path, lines, index, header, block)
+        elif said := COSMOS_BLOCK.match(line):
+            if not block.step[0]:
                 raise fault(path, "no real header before this block states the time step", index)
-            stated = known_unit(block[3]) or _COSMOS_UNITS.get(block[4] or "", "")
-            about = _Block(block[1], channel.step, stated, int(block[5]), int(block[6]))
-            found.append(_recording(path, lines, index, about, channel.name, reading))
-            _check_seconds(path, index, block[2], found[-1])
-            channel, index = _Channel(), index + about.height
-        elif block := CSMIP_BLOCK.match(line):
-            rest = line[block.end() :]
-            shape, unit = _CSMIP_FORMAT.search(rest), _CSMIP_UNIT.search(rest)
-            across, width = map(int, shape.groups()) if shape else (8, 10)
-            stated = known_unit(unit[1]) if unit else ""
-            step = index, number(path, index, block[2])
-            about = _Block(block[1], step, stated, across, width)
-            found.append(_recording(path, lines, index, about, channel.name, reading))
-            channel, index = _Channel(), index + about.height
+            block.count, block.seconds = said[1], said[2] or ""
+            block.unit = known_unit(said[3]) or _COSMOS_UNITS.get(said[4] or "", "")
+            block.across, block.width = int(said[5]), int(said[6])
+        elif said := CSMIP_BLOCK.match(line):
+            rest = line[said.end() :]
+            block.count, block.step = said[1], (index, number(path, index, said[2]))
+            if unit := _CSMIP_UNIT.search(rest):
+                block.unit = known_unit(unit[1])
+            if shape := _CSMIP_FORMAT.search(rest):
+                block.across, block.width = map(int, shape.groups())
         elif named := _CHANNEL.search(line):
-            channel.name = named[2]
+            block.name = named[2]
+        if block.count:
+            found.append(_recording(path, lines, index, block, reading))
+            block, index = _Block(), index + block.height
     if not found:
         raise fault(
             path,
@@ -292,9 +272,7 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
     return found
 
 
-def _heed(
-    path: Path, lines: list[str], index: int, header: re.Match[str], channel: _Channel
-) -> int:
+def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
     """Take direction and time step from a block of header values; returns the line after it."""
     across, width = int(header[4]), int(header[5])
     rows = min(int(header[3][:6]), len(lines) - index)
@@ -308,18 +286,18 @@ def _heed(
     if header[2].lower() == "integer":
         if re.fullmatch(r"[0-9]{1,3}", word(54)[1]):
             degrees = int(word(54)[1])
-            channel.name = _UP.get(degrees, f"{degrees} deg" if degrees <= 360 else channel.name)
+            block.name = _UP.get(degrees, f"{degrees} deg" if degrees <= 360 else block.name)
     else:
         for place, seconds in ((62, 1e-3), (34, 1.0)):
             n, text = word(place)
             if text and (value := number(path, n, text)) > 0.0:
-                channel.step = n, float(f"{value * seconds:.12g}")
+                block.step = n, float(f"{value * seconds:.12g}")
                 break
     return index + rows
 
 
 def _recording(
-    path: Path, lines: list[str], index: int, about: _Block, name: str, reading: Reading
+    path: Path, lines: list[str], index: int, about: _Block, reading: Reading
 ) -> Recording:
     count = checked_count(path, index, "the count of points", about.count)
     if about.across < 1 or about.width < 1:
@@ -342,25 +320,15 @@ def _recording(
             f"the header says {count} points of acceleration, the block has {len(values)}",
             index,
         )
+    length = count * seconds
+    # A time step of another record would be a silent fault.
+    if about.seconds and abs(length - int(about.seconds[:9])) > 1.0 + 0.01 * length:
+        said = f"{count} points every {seconds:g} s are {length:.6g} s"
+        raise fault(path, f"{said}, not {about.seconds[:9]} secs", index)
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=seconds,
         unit=unit,
         form="V2",
-        component=printable(name, 30),
+        component=printable(about.name, 30),
     )
-
-
-def _check_seconds(path: Path, index: int, stated: str | None, record: Recording) -> None:
-    """Raise `InputError` if the stated whole seconds do not match the samples.
-
-    A time step of another record would be a silent fault.
-    """
-    length = len(record.samples) * record.time_step
-    if stated and abs(length - int(stated[:9])) > 1.0 + 0.01 * length:
-        raise fault(
-            path,
-            f"{len(record.samples)} points every {record.time_step:g} s are {length:.6g} s, not"
-            f" {stated[:9]} secs",
-            index,
-        )

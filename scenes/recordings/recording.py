@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -83,10 +83,6 @@ class Recording:
     form: str
     component: str = ""
     notes: tuple[str, ...] = ()
-
-    def noted(self, *notes: str) -> Recording:
-        """The same recording with further notes."""
-        return replace(self, notes=(*self.notes, *notes))
 
 
 def fault(path: Path, said: str, line: int | None = None) -> InputError:

@@ -136,12 +136,8 @@ class _Cells:
         for n, line in self.rows:
             cells = self.layout.words(self.path, n, line)
             if len(cells) != self.width:
-                said = (
-                    f"the header names {self.width}"
-                    if self.names
-                    else f"the first line has {self.width}"
-                )
-                raise fault(self.path, f"{len(cells)} fields where {said}", n)
+                whose = "the header names" if self.names else "the first line has"
+                raise fault(self.path, f"{len(cells)} fields where {whose} {self.width}", n)
             if time is not None:
                 times.append(number(self.path, n, cells[time]))
                 words.append(cells[time])
@@ -249,20 +245,12 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, st
 
 
 def _unclear(cells: _Cells) -> InputError:
-    if not cells.names:
-        return fault(
-            cells.path,
-            f"{cells.width} columns; give that of the accelerations: {option('column', 2)}",
-            cells.rows[0][0],
-        )
-    line = cells.rows[0][0] - 1 if cells.rows else 1
-    shown = printable(", ".join(cells.names))
-    return fault(
-        cells.path,
-        f"columns {shown!r}; name them time_s and exactly one of {', '.join(NAMED)}, or give the"
-        f" column: {option('column', 2)}",
-        line,
-    )
+    line = cells.rows[0][0] - bool(cells.names) if cells.rows else 1
+    said = f"{cells.width} columns; give that of the accelerations"
+    if cells.names:
+        said = f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
+        said += f" {', '.join(NAMED)}, or give the column"
+    return fault(cells.path, f"{said}: {option('column', 2)}", line)
 
 
 def _chosen(cells: _Cells, column: int | str) -> int:

@@ -106,7 +106,7 @@ DOORS = {
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/scenes.py", "validation/studies/work_precision/timings.py", "reports/site.py"}
+    | {"commands/scenes.py", "validation/studies/work_precision/timings.py"}
     | {"reports/style.py", "reports/document.py", "validation/paper/measures.py"}
     | {"validation/studies/conformance/study.py"},
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -54,10 +54,7 @@ class Discrepancy(Shown):
 
     def figure(self, measure: str) -> Figure:
         """The figure of a measure; KeyError for an unknown one."""
-        for found in self.figures:
-            if found.measure == measure:
-                return found
-        raise KeyError(measure)
+        return {found.measure: found for found in self.figures}[measure]
 
     @cached_property
     def table(self) -> pd.DataFrame:
@@ -89,34 +86,22 @@ def compare(
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
         check_kind(history, History, "simulate or History.load", key)
-    if scene is None and not _same_block(reference.block, candidate.block):
+    blocks = [one.block for one in (reference, candidate) if one.block is not None]
+    if scene is None and len(blocks) == 2 and not _same_block(*blocks):
+        known = (
+            [pair for pair in one.model_dump().items() if pair[1] is not None] for one in blocks
+        )
+        said = (", ".join(f"{name} = {value}" for name, value in one) for one in known)
         raise InputError(
-            f"is needed: the histories are of two blocks, {_words(reference.block)} and"
-            f" {_words(candidate.block)}",
-            "scene",
+            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
         )
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
-    window = "" if until is None else f"{until:g}s"
-    chosen = (
-        [m for m in DIFFERENCES.values() if not m.on_request]
-        if measures is None
-        else [DIFFERENCES[name] for name in measures]
-    )
-    figures = tuple(
-        evaluate(
-            measure,
-            pair,
-            "rad" if pair.alpha is None else "alpha",
-            against=reference.model,
-            window=window,
-            until=until,
-        )
-        for measure in chosen
-    )
+    chosen, angle = _chosen(DIFFERENCES, measures), "rad" if pair.alpha is None else "alpha"
+    figures = _figures(chosen, pair, angle, until, reference.model)
     gap, fall = _gap(pair, until)
     return Discrepancy(
         reference.model,
@@ -130,25 +115,13 @@ def compare(
     )
 
 
-def _same_block(one: Block | None, other: Block | None) -> bool:
-    """Whether the blocks agree within the digits of a hand-written file; True if one is unknown."""
-    if one is None or other is None:
-        return True
+def _same_block(one: Block, other: Block) -> bool:
+    """Whether the blocks agree within the digits of a hand-written file."""
     first, second = (
         (block.half_width, block.half_height, *block.offset, block.gyration_squared)
         for block in (one, other)
     )
     return bool(np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius))
-
-
-def _words(block: Block | None) -> str:
-    return (
-        ""
-        if block is None
-        else ", ".join(
-            f"{name} = {value}" for name, value in block.model_dump().items() if value is not None
-        )
-    )
 
 
 def describe(
@@ -160,14 +133,23 @@ def describe(
 ) -> tuple[Figure, ...]:
     """The figures of one history, up to `until` (s): peak rotation, impacts, hop and so on."""
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
+    return _figures(_chosen(FIGURES, measures), motion, "alpha", until)
+
+
+def _chosen(known: Mapping[str, Measure], names: Collection[str] | None) -> list[Measure]:
+    """The measures of these names; None: all but those that are `on_request`."""
+    if names is None:
+        return [measure for measure in known.values() if not measure.on_request]
+    return [known[name] for name in names]
+
+
+def _figures(
+    chosen: Sequence[Measure], what: object, angle: str, until: float | None, against: str = ""
+) -> tuple[Figure, ...]:
     window = "" if until is None else f"{until:g}s"
-    chosen = (
-        [m for m in FIGURES.values() if not m.on_request]
-        if measures is None
-        else [FIGURES[name] for name in measures]
-    )
     return tuple(
-        evaluate(measure, motion, "alpha", window=window, until=until) for measure in chosen
+        evaluate(measure, what, angle, against=against, window=window, until=until)
+        for measure in chosen
     )
 
 
@@ -186,13 +168,12 @@ def evaluate(
     except Unavailable as error:
         result = math.nan, str(error)
     value, note = result if isinstance(result, tuple) else (result, "")
-    unit = angle if measure.unit == "angle" else measure.unit
     if not math.isfinite(value):
         note = note or ("infinite" if math.isinf(value) else "not a number")
     return Figure(
         measure=measure.name,
         label=measure.label,
-        unit=unit,
+        unit=angle if measure.unit == "angle" else measure.unit,
         value=float(value) if math.isfinite(value) else None,
         against=against,
         window=window,

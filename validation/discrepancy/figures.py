@@ -241,19 +241,11 @@ class Pair:
     def channels(self, name: str) -> tuple[Array, Array]:
         """One column of both on `time`: reference, candidate."""
         if name not in self.cache:
-            for history in (self.reference, self.candidate):
-                if name not in history.channels:
-                    raise Unavailable(f"{history.model} has no column {name}")
+            both = [WindowedHistory(one) for one in (self.reference, self.candidate)]
+            curves = [(one.channel("t"), one.channel(name)) for one in both]
             if len(self.time) == 0:
                 raise Unavailable("the histories have no time in common")
-            self.cache[name] = tuple(
-                np.interp(
-                    self.time,
-                    np.asarray(h.channels["t"], dtype=float),
-                    np.asarray(h.channels[name], dtype=float),
-                )
-                for h in (self.reference, self.candidate)
-            )
+            self.cache[name] = tuple(np.interp(self.time, *curve) for curve in curves)
         return self.cache[name]
 
     @cached_property
@@ -377,9 +369,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         for left, events, matched in zip(alone, both, taken, strict=True):
             weak = WEAK_IMPACT * max((abs(e.impulse) for e in events), default=0.0)
             left += [e for n, e in enumerate(events) if n not in matched and abs(e.impulse) >= weak]
-    in_time = attrgetter("t")
     return MatchedImpacts(
-        sorted(pairs, key=lambda two: two[0].t), *(sorted(some, key=in_time) for some in alone)
+        sorted(pairs, key=lambda two: two[0].t),
+        *(sorted(some, key=attrgetter("t")) for some in alone),
     )
 
 

@@ -119,12 +119,11 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
             )
         columns[column] = (name, factor)
     history = History.load(path, columns={column: name for column, (name, _) in columns.items()})
-    channels: dict[str, Any] = {}
-    for name, factor in columns.values():
-        if name in history.channels:
-            channels[name] = (
-                history.channels[name] if factor == 1.0 else factor * history.channels[name]
-            )
+    channels: dict[str, Any] = {
+        name: history.channels[name] if factor == 1.0 else factor * history.channels[name]
+        for name, factor in columns.values()
+        if name in history.channels
+    }
     channels["t"] = channels["t"] + offset
     si = all(factor == 1.0 for _, factor in columns.values())
     return dataclasses.replace(
@@ -149,12 +148,9 @@ def _meaning(column: str, shown: str) -> tuple[str, float]:
     )
     if plain in MEANINGS:
         return MEANINGS[plain]
-    for name in sorted(UNITS, key=len, reverse=True):
-        if plain.startswith(f"{name}_"):
-            units = ", ".join(UNITS[name])
-            raise InputError(
-                f"{shown}: column {printable(column)!r}: give a unit of {name}: {units}"
-            )
+    if name := max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default=""):
+        said = f"{shown}: column {printable(column)!r}: give a unit of {name}:"
+        raise InputError(f"{said} {', '.join(UNITS[name])}")
     return column, 1.0
 
 
@@ -223,10 +219,10 @@ def mean_history(tests: Sequence[History]) -> History:
     t = t[(t >= start) & (t <= end)]
     if len(t) < 2:
         raise InputError("the tests have no time in common", "files")
-    columns = {name for name in AVERAGED if all(name in test.channels for test in tests)}
     stacked = {
         name: np.array([np.interp(t, test.channels["t"], test.channels[name]) for test in tests])
-        for name in sorted(columns)
+        for name in sorted(AVERAGED)
+        if all(name in test.channels for test in tests)
     }
     channels = {"t": t, **{name: rows.mean(axis=0) for name, rows in stacked.items()}}
     return dataclasses.replace(

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.validation.discrepancy.figures import Array, Measure, Undefined, by_name
+from rockcheck.validation.discrepancy.figures import Array, Measure, Unavailable, Undefined, by_name
 
 #: Peaks below this (alpha) have no ratio worth a logarithm.
 SMALLEST_PEAK = 1e-3
@@ -52,21 +52,23 @@ class Samples:
     candidate: Sample
 
     def log_ratios(self) -> Array:
-        """ln(c/r) of the peaks where neither falls and both rock."""
+        """ln(c/r) of the peaks where neither falls and both rock; at least two."""
         r, c = self.reference, self.candidate
         rocks, too = (~sample.fallen & (sample.peaks > SMALLEST_PEAK) for sample in (r, c))
         if np.sum(rocks) < 2:
             raise Undefined("fewer than two scenes in which the reference rocks and does not fall")
         usable = rocks & too
+        if np.sum(usable) < 2:
+            raise Unavailable(FEW)
         return np.log(c.peaks[usable] / r.peaks[usable])
 
 
 def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
     """The peaks of both (alpha), limited to `fallen`, which is also the value of fallen blocks."""
-    r, c = (
-        np.where(one.fallen, fallen, np.minimum(one.peaks, fallen))
-        for one in (samples.reference, samples.candidate)
-    )
+    both = samples.reference, samples.candidate
+    r, c = (np.where(one.fallen, fallen, np.minimum(one.peaks, fallen)) for one in both)
+    if np.any(np.isnan(r)) or np.any(np.isnan(c)):
+        raise Unavailable(FAILED)
     return r, c
 
 
@@ -74,8 +76,6 @@ def _ks_distance(samples: Samples) -> tuple[float, str]:
     from scipy.stats import ks_2samp
 
     r, c = _distributions(samples, math.inf)
-    if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        return math.nan, FAILED
     # The test takes no infinities, but only order counts.
     ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[1]
     found = ks_2samp(ranks[: len(r)], ranks[len(r) :])
@@ -85,10 +85,7 @@ def _ks_distance(samples: Samples) -> tuple[float, str]:
 def _area_metric(samples: Samples) -> tuple[float, str]:
     from scipy.stats import wasserstein_distance
 
-    r, c = _distributions(samples, 1.0)
-    if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        return math.nan, FAILED
-    return float(wasserstein_distance(r, c)), ""
+    return float(wasserstein_distance(*_distributions(samples, 1.0))), ""
 
 
 def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
@@ -101,17 +98,10 @@ def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
     return count / of, f"[{interval.low:.3f}, {interval.high:.3f}], {count} of {of}"
 
 
-def _share_of(samples: Samples, one: Sample) -> tuple[float, str]:
-    """Share of the scenes in which `one` falls that both fall in."""
-    return _share(samples.reference.fallen & samples.candidate.fallen, int(np.sum(one.fallen)))
-
-
 def _peak_bias(samples: Samples) -> tuple[float, str]:
     from scipy.stats import t
 
     ratios = samples.log_ratios()
-    if len(ratios) < 2:
-        return math.nan, FEW
     most = t.ppf(0.5 + 0.5 * CONFIDENCE, len(ratios) - 1)
     half = float(most * np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
     mean = float(np.mean(ratios))
@@ -122,8 +112,6 @@ def _peak_scatter(samples: Samples) -> tuple[float, str]:
     from scipy.stats import chi2
 
     ratios = samples.log_ratios()
-    if len(ratios) < 2:
-        return math.nan, FEW
     scatter, free = float(np.std(ratios, ddof=1)), len(ratios) - 1
     low, high = (
         scatter * math.sqrt(free / chi2.ppf(0.5 + sign * 0.5 * CONFIDENCE, free))
@@ -168,7 +156,9 @@ STATISTICS = by_name(
         "1",
         "Share of the scenes in which the candidate falls that the reference falls in too; 1 if it"
         " falls in none.",
-        lambda two: _share_of(two, two.candidate),
+        lambda two: _share(
+            two.reference.fallen & two.candidate.fallen, int(np.sum(two.candidate.fallen))
+        ),
     ),
     _agreement(
         "overturning_recall",
@@ -176,7 +166,9 @@ STATISTICS = by_name(
         "1",
         "Share of the scenes in which the reference falls that the candidate falls in too; 1 if it"
         " falls in none.",
-        lambda two: _share_of(two, two.reference),
+        lambda two: _share(
+            two.reference.fallen & two.candidate.fallen, int(np.sum(two.reference.fallen))
+        ),
     ),
     Measure(
         "peak_bias",

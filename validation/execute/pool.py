@@ -208,8 +208,7 @@ class Pool:
             first = bool(call.compiles) and call.compiles not in self._compiled
             compiling |= {call.compiles} if first else set()
             seconds = call.seconds + COMPILING if first else call.seconds
-            futures = self._schedule(call, seconds, first)
-            running.update(dict.fromkeys(futures, (call, seconds)))
+            running |= dict.fromkeys(self._schedule(call, seconds, first), (call, seconds))
         waiting.extendleft(reversed(held))
 
     def _room(self) -> int:
@@ -290,12 +289,12 @@ def _follow(run: Any) -> None:
 
 def death(code: int) -> str:
     """How a process ended, from its exit code."""
-    if code < 0:
-        try:
-            return f"crashed: {signal.Signals(-code).name}"
-        except ValueError:
-            return f"crashed: signal {-code}"
-    return f"the process ended with code {code}"
+    names = {-one: one.name for one in signal.Signals}
+    return (
+        f"crashed: {names.get(code, f'signal {-code}')}"
+        if code < 0
+        else f"the process ended with code {code}"
+    )
 
 
 class Cluster(Pool):
@@ -316,9 +315,8 @@ class Cluster(Pool):
     def __exit__(self, *fault: Any) -> None:
         self._stack.__exit__(*fault)
 
-    def _workers(self) -> dict[str, Any]:
-        found: dict[str, Any] = self._pool.scheduler_info(n_workers=-1)["workers"]
-        return found
+    def _workers(self) -> Any:
+        return self._pool.scheduler_info(n_workers=-1)["workers"]
 
     def _room(self) -> int:
         return AHEAD * max(1, sum(about["nthreads"] for about in self._workers().values()))

@@ -224,10 +224,8 @@ def version_of(library: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
-    libraries = sorted(
-        {library for known in FAMILIES.values() for library in known.libraries} | {"pandas"}
-    )
-    found = {name: version_of(name) for name in libraries}
+    libraries = {library for known in FAMILIES.values() for library in known.libraries}
+    found = {name: version_of(name) for name in sorted(libraries | {"pandas"})}
     own = {"rockcheck": version_of("rockcheck"), "python": platform.python_version()}
     return own | {name: version for name, version in found.items() if version != "absent"}
 
@@ -248,8 +246,6 @@ def hardware() -> dict[str, str]:
 
 def _processor() -> str:
     cpuinfo = Path("/proc/cpuinfo")
-    if cpuinfo.exists():
-        for line in cpuinfo.read_text(encoding="utf-8", errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    text = cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.exists() else ""
+    named = re.search(r"^model name[^:\n]*:(.*)$", text, re.MULTILINE)
+    return named[1].strip() if named else platform.processor() or platform.machine()

@@ -80,9 +80,7 @@ class Store:
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
-        write_whole(
-            self.folder / HISTORIES / f"{name}.json", _sealed(name, {**record, "files": hashes})
-        )
+        self.put_record(HISTORIES, name, {**record, "files": hashes})
         if history is not None:
             self._remember(name, history)
 
@@ -107,15 +105,9 @@ class Store:
 
     def get(self, name: str) -> dict[str, Any] | None:
         """The record of a history whose files are whole, else None."""
-        base = self.folder / HISTORIES
-        record = self.get_record(HISTORIES, name)
-        files = record.pop("files", None) if record else None
-        if (
-            record is None
-            or not isinstance(files, dict)
-            or TABLE not in files
-            or not files.keys() <= SUFFIXES
-        ):
+        base, record = self.folder / HISTORIES, self.get_record(HISTORIES, name) or {}
+        files = record.pop("files", None)
+        if not isinstance(files, dict) or not {TABLE} <= files.keys() <= SUFFIXES:
             return None
         try:
             whole = all(
@@ -128,7 +120,9 @@ class Store:
 
     def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
         """Keep a result that is one record, such as a cell's figures."""
-        write_whole(self.folder / kind / f"{name}.json", _sealed(name, content))
+        sealed = {"content": content, "sha256": _seal(name, content)}
+        text = json.dumps(sealed, sort_keys=True, separators=(",", ":"))
+        write_whole(self.folder / kind / f"{name}.json", text + "\n")
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
         """The content of a result that is one record; None where it is missing or damaged."""
@@ -162,17 +156,6 @@ class Store:
             ):  # another run was quicker, or it is a folder, which is not ours
                 if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
                     path.unlink()
-
-
-def _sealed(name: str, content: Mapping[str, Any]) -> str:
-    return (
-        json.dumps(
-            {"content": content, "sha256": _seal(name, content)},
-            sort_keys=True,
-            separators=(",", ":"),
-        )
-        + "\n"
-    )
 
 
 def _seal(name: str, content: Mapping[str, Any]) -> str:

@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import History, InputError, ModelFailure, Scene
+from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene
 from rockcheck.scenes.base import MOST
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build_own, is_own
 from rockcheck.validation.execute.pool import Failure, guarded
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
+
+#: What a batch sums of the cost of its runs.
+SUMMED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,22 +84,22 @@ def play(task: Task | BatchTask) -> Played:
 
 def _play_batch(task: BatchTask, began: float) -> Played:
     """Peak |theta| (alpha) and outcome of each scene; None and the reason where it failed."""
-    peaks: list[float | None] = []
-    outcomes: list[str] = []
-    cost = {"wall_seconds": 0.0, "cpu_seconds": 0.0, "set_up": 0.0, "steps": 0, "evaluations": 0}
-    trace = ""
-    for scene in task.scenes:
-        found = guarded(_simulate, task, scene)
-        if isinstance(found, Failure):
-            trace = trace or found.traceback
-            peaks.append(None)
-            outcomes.append(found.reason)
-            continue
-        peaks.append(found.peak_rotation / scene.block.alpha)
-        outcomes.append(found.outcome)
-        cost = {key: value + getattr(found.cost, key) for key, value in cost.items()}
-    cost["worker_seconds"] = time.perf_counter() - began
-    return Played({"peaks": peaks, "outcomes": outcomes, "cost": cost}, traceback=trace)
+    found = [guarded(_end_of, task, scene) for scene in task.scenes]
+    failed = [one for one in found if isinstance(one, Failure)]
+    costs = [one[2] for one in found if not isinstance(one, Failure)]
+    ends = [(None, one.reason) if isinstance(one, Failure) else one[:2] for one in found]
+    cost = {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
+    record = {
+        "peaks": [peak for peak, _ in ends],
+        "outcomes": [outcome for _, outcome in ends],
+        "cost": {**cost, "worker_seconds": time.perf_counter() - began},
+    }
+    return Played(record, traceback=next((one.traceback for one in failed if one.traceback), ""))
+
+
+def _end_of(task: Work, scene: Scene) -> tuple[float, str, Cost]:
+    history = _simulate(task, scene)
+    return history.peak_rotation / scene.block.alpha, history.outcome, history.cost
 
 
 def _simulate(task: Work, scene: Scene) -> History:

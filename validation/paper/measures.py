@@ -212,10 +212,10 @@ def matters_most(paper: Paper, most: str) -> Measured:
 
     By parameter; the one called `most` must have the largest mean.
     """
-    means = {}
-    for k, axis in enumerate(AXES):
-        two = combinations(np.moveaxis(paper.safe, k, 0), 2)
-        means[axis] = float(np.mean([np.mean(one != other) for one, other in two]))
+    means = {
+        axis: float(np.mean([np.mean(one != other) for one, other in combinations(safe, 2)]))
+        for axis, safe in ((axis, np.moveaxis(paper.safe, k, 0)) for k, axis in enumerate(AXES))
+    }
     rows = [Row(most, f"{share(means[most])} of the nodes")]
     rows += [Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most]
     return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
@@ -224,19 +224,19 @@ def matters_most(paper: Paper, most: str) -> Measured:
 def side_decides(paper: Paper) -> Measured:
     """Nodes that are safe with the wall on one side only, at either friction."""
     depends = np.mean(paper.safe[0] != paper.safe[1], axis=(-2, -1))
-    rows = []
-    for gap, e in np.ndindex(*SIZES[2:]):
-        low, high = depends[:, gap, e]
-        value = f"the side decides at {share(low)} of the nodes at μ 0.3, at {share(high)} at μ 0.6"
-        rows.append(Row(about((None, None, gap, e)), value, bool(low > high)))
-    return rows, {}
+    said = "the side decides at {} of the nodes at μ 0.3, at {} at μ 0.6"
+    return [
+        Row(about((None, None, gap, e)), said.format(share(low), share(high)), bool(low > high))
+        for gap, e in np.ndindex(*SIZES[2:])
+        for low, high in (depends[:, gap, e],)
+    ], {}
 
 
 def one_impact(paper: Paper) -> Measured:
     """Share of the nodes overturning with one impact without the wall that the wall makes safe."""
-    rows, shares = [], []
+    rows, shares, f = [], [], paper.frequencies
     for mu, tongue in sorted(paper.tongues.items()):
-        safe, f = paper.safe[0, AXES["friction"].index(mu), 0, 0], paper.frequencies
+        safe = paper.safe[0, AXES["friction"].index(mu), 0, 0]
         for low, high in (ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)):
             there = tongue & ((f >= low) & (f <= high))
             part = float(np.mean(safe[there])) if there.any() else 0.0
@@ -269,9 +269,10 @@ def least_amplitude(paper: Paper) -> Measured:
     walls = {wall: value for wall, value in paper.least.items() if wall}
     none = paper.least[None]
     rows = [Row("no wall", f"overturns from a_p = {none:.2f} g tan α")]
-    for (gap, e), value in walls.items():
-        what = f"right wall, {1000 * gap:g} mm, e {e:g}"
-        rows.append(Row(what, f"from {value:.2f} g tan α", value < none))
+    rows += [
+        Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {value:.2f} g tan α", value < none)
+        for (gap, e), value in walls.items()
+    ]
     said = ", ".join(f"{value:.1f} (e = {e:g})" for (_, e), value in walls.items())
     return rows, {"without": none, "walls": said}
 
@@ -543,8 +544,7 @@ def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
     ]
     size = f"{len(paper.amplitudes)} x {len(paper.frequencies)}"
     note = f"Each sentence of section 5 and the conclusions, judged by spectra of {size} nodes."
-    title = "What the paper says of them, checked"
-    yield Table("claims", columns, rows, title, note)
+    yield Table("claims", columns, rows, "What the paper says of them, checked", note)
     yield _areas(paper)
     yield _rows(
         "claim-figures",
@@ -587,8 +587,7 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
 
 
 def _map(one: Shown, column: int) -> dict[str, Any]:
-    letters = np.where(one.safe, STANDS, FALLEN)
-    letters[one.gained], letters[one.lost] = GAINED, LOST
+    letters = np.select([one.lost, one.gained, one.safe], [LOST, GAINED, STANDS], FALLEN)
     shown = "".join(letters.ravel())
     return {"title": one.case, "free": True, "outcomes": shown, "place": [0, 1, column]}
 
@@ -611,10 +610,8 @@ def _areas(paper: Paper) -> Plot:
     for side, of_side in zip(AXES["side"], areas, strict=True):
         series = []
         for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True):
-            series += [
-                Series(f"μ {mu:g}, e {e:g}", gaps, of_mu[:, n].tolist())
-                for n, e in enumerate(RESTITUTIONS)
-            ]
+            lines = zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
+            series += [Series(f"μ {mu:g}, e {e:g}", gaps, line) for e, line in lines]
             level = [float(free)] * len(gaps)
             series.append(Series(f"μ {mu:g}, no wall", gaps, level, style="dots"))
         panels.append(Panel(f"Wall on the {side}", series))

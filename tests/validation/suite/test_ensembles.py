@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from rockcheck.scenes import InputError
+from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.motions import Distribution
@@ -120,7 +121,8 @@ def test_statistics_of_known_samples():
         falls.reference,
         Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")),
     )
-    assert math.isnan(STATISTICS["ks_distance"].evaluate(lost)[0])
+    unknown = evaluate(STATISTICS["ks_distance"], lost, "alpha")
+    assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
 
 def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
@@ -202,9 +204,9 @@ def test_only_scenes_in_which_both_rock_have_a_ratio():
     both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
     assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
     for name in ("peak_bias", "peak_scatter"):
-        value, remark = STATISTICS[name].evaluate(samples([0.1, 0.2], [0.1, 1e-4]))
-        assert np.isnan(value)
-        assert remark == "fewer than two scenes in which both rock and neither falls"
+        found = evaluate(STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
+        assert found.value is None
+        assert found.note == "fewer than two scenes in which both rock and neither falls"
 
 
 def test_shares_have_wilsons_interval():
