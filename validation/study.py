@@ -23,8 +23,6 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
 from rockcheck.scenes.progress import OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
@@ -172,12 +170,7 @@ class _Run:
         self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
         self.force, self.heard = force, heard
         self.began = time.monotonic()
-        try:
-            self.store = Store(folder, study.kinds)
-        except OSError as error:
-            raise InputError(
-                f"{printable(folder)}: cannot be used as the output folder: {error.strerror}"
-            ) from None
+        self.store = Store(folder, study.kinds)
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
 

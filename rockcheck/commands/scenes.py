@@ -11,19 +11,21 @@ import typer
 from rockcheck.commands import answer, console
 from rockcheck.scenes import InputError, load_scene, named_scenes
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.writing import write_new
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.finding import Finding, Table, text
-from rockcheck.validation.suite.suites import describe_suite, named_suites
+from rockcheck.validation.suite.suites import named_suites
 
 
 def run() -> None:
     """List the named scenes, suites and models, with a line each."""
     from rockcheck.reports.document import show
 
+    suites = {name: read_toml(path) for name, path in named_suites().items()}
     listings = {
         "scene": {name: load_scene(name).description for name in named_scenes()},
-        "suite": {name: describe_suite(path) for name, path in named_suites().items()},
+        "suite": {name: one.get("description", "") for name, one in suites.items()},
         "model": {name: family.summary for name, family in FAMILIES.items()},
     }
     tables = [

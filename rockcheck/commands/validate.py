@@ -1,4 +1,4 @@
-"""`rockcheck validate`: the main job."""
+"""`rockcheck validate`: the main job; `rockcheck accept`: its figures become the expected ones."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from rockcheck.commands import (
     suite_names,
     tell_left_out,
     tell_missing,
+    told,
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
@@ -29,6 +30,8 @@ from rockcheck.commands.report import keep, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import compiles
+from rockcheck.validation.finding import Finding, Text
+from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
@@ -207,3 +210,52 @@ def tell_faults(finished: Run, folder: Path) -> None:
             else f"{where}: traceback in {path}"
         )
         print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
+
+
+def accept(
+    suite: SuiteArgument = None,
+    reason: Annotated[
+        str | None,
+        typer.Option(
+            "--reason",
+            help="Why limits are loosened or figures moved; it is written into the file.",
+        ),
+    ] = None,
+    played: Played = Played(),
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show the changes, write none.")
+    ] = False,
+    allow_code: AllowCodeOption = None,
+) -> None:
+    """Make today's figures the expected ones.
+
+    They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
+    moved, the last two only with --reason.
+    """
+    name = suite or "paper"
+    folder = usable_folder(played.out)
+    loaded = load_suite(name, allow_code=allow_code or ())
+    tell_left_out(loaded.left_out)
+    finished = play(loaded, folder, played)
+    changes, refused = acceptance.accept(loaded, finished, reason, write=not dry_run)
+    tell_faults(finished, folder)
+    failed = finished.exit_code if finished.verdict == "error" else 0
+    done = "would be written to" if dry_run else "in"
+    told(
+        Finding(
+            "accept",
+            loaded.name,
+            f"{len(changes)} changes {done} {finished.tolerances_file}",
+            [
+                Text(items=changes),
+                Text(items=[f"not accepted: {line}" for line in refused], verdict="fail"),
+            ],
+            data={
+                "changes": changes,
+                "refused": refused,
+                "file": finished.tolerances_file,
+                "written": not dry_run,
+            },
+            exit_code=failed or int(bool(refused)),
+        )
+    )

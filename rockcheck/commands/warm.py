@@ -12,13 +12,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from rich.table import Table
-
 from rockcheck.commands import JobsOption, answer, console, progress
 from rockcheck.scenes import Scene, load_scene
-from rockcheck.scenes.progress import OnProgress, announcing, unheard
+from rockcheck.scenes.progress import announcing
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.finding import Column, Finding, Table, text
 
 
 def _played(name: str) -> tuple[Any, Scene]:
@@ -58,22 +57,6 @@ PARTS: Mapping[str, Callable[[], object]] = {
 }
 
 
-def warm(jobs: int, *, on_progress: OnProgress = unheard) -> dict[str, float]:
-    """Compile what is not in the cache, in up to `jobs` processes.
-
-    Returns the time of each part of `PARTS`, s. Raises the error of a part.
-    """
-    taken: dict[str, float] = {}
-    on_progress(0, len(PARTS), "")
-    with Pool(max(1, min(jobs, len(PARTS)))) as pool:
-        for ended in pool.run(deque(Call(compile_part, (name,), key=name) for name in PARTS)):
-            if ended.error is not None:
-                raise ended.error
-            taken[ended.call.key] = ended.result
-            on_progress(len(taken), len(PARTS), ended.call.key)
-    return {name: taken[name] for name in PARTS}
-
-
 def compile_part(name: str) -> float:
     """Compile one part of `PARTS`, or find it in the cache; returns how long that took, s."""
     began = time.perf_counter()
@@ -88,14 +71,19 @@ def run(jobs: JobsOption = None) -> None:
     rockcheck; what is compiled already is only looked up. Afterwards no command waits for a
     compiler.
     """
-    screen = console()
-    screen.print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
-    with progress("compiling") as on_progress, announcing(None):
-        taken = warm(jobs or os.cpu_count() or 1, on_progress=on_progress)
-    table = Table(box=None, pad_edge=False)
-    table.add_column("compiled code for")
-    table.add_column("s", justify="right")
-    for name, seconds in taken.items():
-        table.add_row(name, f"{seconds:.1f}")
-    screen.print(table)
-    answer({"seconds": taken})
+    from rockcheck.reports.document import show
+
+    console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
+    taken: dict[str, float] = {}
+    pool = Pool(min(jobs or os.cpu_count() or 1, len(PARTS)))
+    with progress("compiling") as on_progress, announcing(None), pool:
+        on_progress(0, len(PARTS), "")
+        for ended in pool.run(deque(Call(compile_part, (name,), key=name) for name in PARTS)):
+            if ended.error is not None:
+                raise ended.error
+            taken[ended.call.key] = ended.result
+            on_progress(len(taken), len(PARTS), ended.call.key)
+    seconds = {name: taken[name] for name in PARTS}
+    columns = [text("compiled code for"), Column("s", digits=2)]
+    show(Finding("warm", "", "", [Table("compiled", columns, list(seconds.items()))]), console())
+    answer({"seconds": seconds})

@@ -374,12 +374,12 @@ def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
     assert "left out: station.V2 up (vertical" in told
     assert "report: rockcheck-report/index.html\n" in told
     run = Run.load("rockcheck-report")
-    assert run.places == ("rack, station 360 deg", "rack, station 90 deg")
+    assert tuple(run.by_scene()) == ("rack, station 360 deg", "rack, station 90 deg")
     assert [cell.status for cell in run.cells] == ["done"] * 8
-    assert [run.load_scene(name).excitation.peak for name in run.places] == pytest.approx(
+    assert [run.load_scene(name).excitation.peak for name in run.by_scene()] == pytest.approx(
         [0.31, 0.27], abs=1e-7
     )
-    for place in run.places:
+    for place in run.by_scene():
         assert (
             Path("rockcheck-report")
             / "pages"

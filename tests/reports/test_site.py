@@ -2,6 +2,7 @@
 are reproducible."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -217,7 +218,7 @@ def test_only_what_would_show_something_else_is_written_again(
     assert "2026-01-02" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
     slower = finished.cells[0].model_copy(
-        update={"cost": finished.cells[0].cost.model_copy(update={"wall_seconds": 9.0})}
+        update={"cost": replace(finished.cells[0].cost, wall_seconds=9.0)}
     )
     finished.model_copy(update={"cells": (slower, *finished.cells[1:])}).save(tmp_path)
     write_site(tmp_path, afresh=False)

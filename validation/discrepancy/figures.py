@@ -66,6 +66,16 @@ class Figure(Stored):
     note: str = ""
 
     @property
+    def windowed(self) -> str:
+        """Measure and window, as tolerances name them."""
+        return f"{self.measure}@{self.window}" if self.window else self.measure
+
+    @property
+    def title(self) -> str:
+        """Measure, window and reference, as tolerances name them."""
+        return f"{self.windowed} against {self.against}" if self.against else self.windowed
+
+    @property
     def undefined(self) -> bool:
         """Whether the measure is undefined here, so that nothing is judged; the note says why."""
         return self.value is None and self.note.startswith(NOT_DEFINED)

@@ -26,7 +26,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.history import History
 from rockcheck.scenes.reading import read_bytes, read_json, within
 from rockcheck.scenes.writing import made, write_whole
@@ -50,7 +50,7 @@ def name_of(*parts: str) -> str:
 
 @dataclass(frozen=True)
 class Store:
-    """The results of some kinds in a folder. Raises `OSError` where the folder cannot be made."""
+    """The results of some kinds in a folder; raises `InputError` where that cannot be used."""
 
     folder: Path
     kinds: tuple[str, ...] = (HISTORIES, COMPARISONS)
@@ -59,8 +59,13 @@ class Store:
     )
 
     def __post_init__(self) -> None:
-        for kind in self.kinds:
-            made(self.folder, kind)
+        try:
+            for kind in self.kinds:
+                made(self.folder, kind)
+        except OSError as error:
+            raise InputError(
+                f"{printable(self.folder)}: cannot be used as the output folder: {error.strerror}"
+            ) from None
 
     def history(self, name: str) -> Path:
         """Path of a history's CSV."""

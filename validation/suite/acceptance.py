@@ -18,7 +18,7 @@ from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Check, Run
 from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, Windowed, judge
+from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, judge
 
 #: Limit and drift band of a new line: multiples of a difference from the perfect value, and of a
 #: cell's own figure.
@@ -57,12 +57,11 @@ def _accept(
     )
     before = len(changes)
     for cell, check in run.checks():
-        if cell.scene not in suite.scenes and cell.scene not in suite.ensembles:
+        ours = cell.scene in suite.scenes or cell.scene in suite.ensembles
+        if check.verdict == "not defined" or not ours:
             continue
         figure = check.figure
-        if check.verdict == "not defined":
-            continue
-        against, key = figure.against or OWN_FIGURES, str(Windowed(figure.measure, figure.window))
+        against, key = figure.against or OWN_FIGURES, figure.windowed
         where = f"[{cell.scene}.{cell.model}.{against}] {key}"
         line = _accepted(check, reason)
         if isinstance(line, str):
@@ -113,7 +112,7 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     )
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
     line: dict[str, Any] = {
-        "expected": _short(expected),
+        "expected": float(f"{expected:.8g}"),
         "limit": limit,
         "drift": drift,
         "why": why,
@@ -158,10 +157,6 @@ def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:
             tables[name] = tomlkit.table(is_super_table=depth < len(path) - 1)
         tables = tables[name]
     return tables
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.8g}")
 
 
 def _round(value: float, down: bool = False) -> float:

@@ -15,7 +15,6 @@ expected at M/delta, with a relative standard deviation sigma: `History.expected
 
 from __future__ import annotations
 
-import json
 import math
 import os
 import re
@@ -47,7 +46,6 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.suite.results import Cell, Run, value_of
-from rockcheck.validation.suite.tables import title, title_of
 from rockcheck.validation.suite.tolerances import MEASURES
 
 T = TypeVar("T")
@@ -154,13 +152,13 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     place = {"scene": old.scene, "model": old.model}
     said = [
         {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
-        | {("verdict", title(check)): check.words for check in cell.checks}
+        | {("verdict", check.figure.title): check.words for check in cell.checks}
         for cell in (old, new)
     ]
     for (what, name), was, now in _pairs(*said):
         if was != now:
             yield Change(**place, what=what, name=name, before=was, after=now)
-    figures = [{title_of(figure): figure for figure in cell.figures} for cell in (old, new)]
+    figures = [{figure.title: figure for figure in cell.figures} for cell in (old, new)]
     for name, one, other in _pairs(*figures):
         if (
             one
@@ -202,7 +200,9 @@ class Moment(Stored):
 
 def moment_of(run: Run, folder: Path) -> Moment:
     """A run as a line of a history; the suite lies in `folder`."""
-    names = [(f"{cell.scene}, {cell.model}: {title(check)}", check) for cell, check in run.checks()]
+    names = [
+        (f"{cell.scene}, {cell.model}: {check.figure.title}", check) for cell, check in run.checks()
+    ]
     return Moment(
         created=run.created,
         commit=commit_of(folder),
@@ -264,13 +264,11 @@ def read_history(path: Path) -> list[Moment]:
         if not line.strip():
             continue
         try:
-            found.append(Moment.model_validate(json.loads(line)))
+            found.append(Moment.model_validate_json(line))
         except ValidationError as error:
             raise InputError(
                 f"{printable(path)}, line {n}: not a run of a history: {from_validation(error)}"
             ) from None
-        except (ValueError, RecursionError):
-            raise InputError(f"{printable(path)}, line {n}: not a run of a history") from None
     return found
 
 
@@ -281,11 +279,15 @@ class Trend(Stored):
     values: tuple[float | None, ...]
 
     @property
+    def known(self) -> list[float]:
+        """The values that are not missing."""
+        return [value for value in self.values if value is not None]
+
+    @property
     def spread(self) -> float:
         """Largest less smallest value over the largest magnitude; 0 if fewer than two are known."""
-        known = [value for value in self.values if value is not None]
-        most = max(map(abs, known), default=0.0)
-        return (max(known) - min(known)) / most if most > 0.0 else 0.0
+        most = max(map(abs, self.known), default=0.0)
+        return (max(self.known) - min(self.known)) / most if most > 0.0 else 0.0
 
     @property
     def moved(self) -> bool:
@@ -294,16 +296,6 @@ class Trend(Stored):
             return False
         check = self.name.rpartition(": ")[2]
         return _moved(re.split("[@ ]", check)[0], *self.values[-2:])
-
-
-def trends(moments: Sequence[Moment]) -> list[Trend]:
-    """Every figure of the last run over all runs, the largest spread first."""
-    last = moments[-1].figures if moments else {}
-    found = [
-        Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments))
-        for name in last
-    ]
-    return sorted(found, key=lambda trend: -trend.spread)
 
 
 #: Most figures drawn (those that varied most), and most moved figures listed; the table has
@@ -317,7 +309,12 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     Lists the figures that moved since the run before, draws and tabulates those that varied, and
     lists the runs.
     """
-    every, last = trends(moments), moments[-1]
+    last = moments[-1]
+    every = [
+        Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments))
+        for name in last.figures
+    ]
+    every.sort(key=lambda trend: -trend.spread)
     found = [trend for trend in every if trend.spread > 0.0]
     moved = [trend for trend in every if trend.moved]
     before = f" since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
@@ -335,10 +332,9 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         panels.append(
             Panel(one.name.replace(": ", "\n", 1), [Series("", numbers, one.values), marked])
         )
-    rows = []
-    for one in found:
-        known = [value for value in one.values if value is not None]
-        rows.append([one.name, one.values[0], min(known), max(known), *one.values[-2:]])
+    rows = [
+        [one.name, one.values[0], min(one.known), max(one.known), *one.values[-2:]] for one in found
+    ]
     columns = [Column(name) for name in ("first", "least", "most", "before", "now")]
     made = [
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]

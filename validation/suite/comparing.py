@@ -31,7 +31,7 @@ from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import CostRecord, value_of
 from rockcheck.validation.suite.suites import ModelVariant
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, OWN_FIGURES, Windowed
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
@@ -91,8 +91,6 @@ class Planned(Task):
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
 #: request.
 Asked = tuple[Planned | None, list[Windowed]]
-#: A figure as it is kept: measure, unit, value, window, until, note. Its label is the measure's.
-FigureRow = tuple[str, str, float | None, str, float | None, str]
 
 
 class CellRecord(Stored):
@@ -114,34 +112,17 @@ class ComparisonRecord(Stored):
     with a cell's own figures.
     """
 
-    figures: tuple[FigureRow, ...]
+    figures: tuple[Figure, ...]
     gaps: dict[str, tuple[str, bool]]
     impact_law: LawFollowed | None = None
     overturned_at: float | None = None
 
     @field_validator("figures")
     @classmethod
-    def _known(cls, rows: tuple[FigureRow, ...]) -> tuple[FigureRow, ...]:
-        if unknown := {row[0] for row in rows} - MEASURES.keys():
+    def _known(cls, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
+        if unknown := {figure.measure for figure in figures} - MEASURES.keys():
             raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
-        return rows
-
-    def figures_against(self, name: str) -> list[Figure]:
-        """The figures, `name` being the reference's or OWN_FIGURES."""
-        against = "" if name == OWN_FIGURES else name
-        return [
-            Figure(
-                measure=measure,
-                label=MEASURES[measure].label,
-                unit=unit,
-                value=value,
-                against=against,
-                window=window,
-                until=until,
-                note=note,
-            )
-            for measure, unit, value, window, until, note in self.figures
-        ]
+        return figures
 
 
 def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
@@ -314,7 +295,7 @@ def _compute(
         )
     law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
     return ComparisonRecord(
-        figures=tuple((f.measure, f.unit, f.value, f.window, f.until, f.note) for f in figures),
+        figures=tuple(figures),
         gaps=gaps,
         impact_law=law,
         overturned_at=None if yardstick else candidate.overturned_at,
@@ -375,12 +356,8 @@ def _other_outcome(
 
 def _both(name: str, mine: Numerical, other: Numerical | None) -> tuple[float | None, str]:
     """The combined numerical uncertainty of both runs; None and the reason if one is unknown."""
-    total = 0.0
-    for found in (mine, other):
-        if found is None:
-            continue
-        u = found.u_num(name)
-        if u is None:
-            return None, found.reason(name)
-        total = math.hypot(total, u)
-    return total, ""
+    known = [found for found in (mine, other) if found]
+    parts = [found.u_num(name) for found in known]
+    if None in parts:
+        return None, known[parts.index(None)].reason(name)
+    return math.hypot(*(u for u in parts if u is not None)), ""

@@ -69,11 +69,6 @@ class RecordSet(Reading):
     vertical: bool = False
     scenes: tuple[Word, ...] = ()
 
-    @property
-    def reading(self) -> Reading:
-        """The reading options, for what the files do not state."""
-        return Reading(**{name: getattr(self, name) for name in Reading.model_fields})
-
 
 def under_records(
     scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
@@ -91,8 +86,8 @@ def under_records(
             if name not in scenes:
                 raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
         files = files_of(given.files, folder)
-        motions, vertical = motions_of(files, given.reading)
-        upward = verticals_of(files, given.reading) if given.vertical else {}
+        motions, vertical = motions_of(files, given)
+        upward = verticals_of(files, given) if given.vertical else {}
         left_out += [] if given.vertical else vertical
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
@@ -144,14 +139,11 @@ def _record(motion: Recording, label: str, scale: float) -> Record:
 def _labels(names: Sequence[str]) -> list[str]:
     """Names of records as allowed in names of scenes; endings only where names would be equal."""
     short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
-    return [
-        _allowed(one if short.count(one) == 1 else name)
-        for one, name in zip(short, names, strict=True)
-    ]
-
-
-def _allowed(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name)[-_LONGEST_RECORD:].strip() or "record"
+    chosen = (
+        one if short.count(one) == 1 else name for one, name in zip(short, names, strict=True)
+    )
+    plain = (re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name) for name in chosen)
+    return [name[-_LONGEST_RECORD:].strip() or "record" for name in plain]
 
 
 #: Time step of the generated records, s.
@@ -192,11 +184,10 @@ class Pulse(Frozen):
             self.amplitude.draw(chance),
         )
         t = np.arange(0.0, 4.0 * period, RECORD_STEP)
-        parts = (
+        even, odd = (
             Ricker(amplitude=1.0, period=period, symmetric=symmetric).acceleration(t)
             for symmetric in (True, False)
         )
-        even, odd = parts
         return Record.from_samples(
             amplitude * (math.cos(phase) * even + math.sin(phase) * odd), RECORD_STEP
         )

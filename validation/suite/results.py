@@ -16,7 +16,8 @@ This module does not know how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
@@ -24,6 +25,7 @@ from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import from_validation, printable, suggestion
+from rockcheck.scenes.history import Cost
 from rockcheck.scenes.reading import read_json, within
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
@@ -99,21 +101,10 @@ class Check(Stored):
         )
 
 
-class CostRecord(Stored):
-    """The cost of a cell's run: `scenes.Cost`, and the worker's wall time.
+@dataclass(frozen=True, kw_only=True)
+class CostRecord(Cost):
+    """The cost of a cell's run; `worker_seconds` covers set-up, simulation and writing."""
 
-    `worker_seconds` covers set-up, simulation and writing.
-    """
-
-    wall_seconds: float = 0.0
-    cpu_seconds: float = 0.0
-    set_up: float = 0.0
-    steps: int = 0
-    evaluations: int = 0
-    energy_gains: int = 0
-    largest_energy_gain: float = 0.0
-    rules: dict[str, int] = Field(default_factory=dict)
-    error_estimate: float | None = None
     worker_seconds: float = 0.0
 
 
@@ -295,11 +286,6 @@ class Run(Stored):
             (cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None
         )
 
-    @property
-    def places(self) -> tuple[str, ...]:
-        """Names of scenes and ensembles that have cells, in order."""
-        return tuple(self.by_scene())
-
     def by_scene(self) -> dict[str, dict[str, Cell]]:
         """All cells by scene or ensemble, and by model, in order; for loops over all cells."""
         found: dict[str, dict[str, Cell]] = {}
@@ -334,9 +320,10 @@ class Run(Stored):
         Makes the folder if need be. Returns the path of `run.json`.
         """
         write_whole(
-            made(folder) / SCHEMA_FILE, json.dumps(schema(), indent=1, sort_keys=True) + "\n"
+            made(folder) / SCHEMA_FILE,
+            json.dumps(self.model_json_schema(), indent=1, sort_keys=True) + "\n",
         )
-        return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())))
+        return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())) + "\n")
 
     @classmethod
     def load(cls, folder: str | Path) -> Run:
@@ -383,31 +370,14 @@ def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
     return max(verdicts, key=SEVERITY.index, default="pass")
 
 
-def _by_line(data: Mapping[str, Any]) -> str:
-    """JSON with a line per value, and per element of a list or object.
+def _by_line(value: Any, depth: int = 2) -> str:
+    """JSON with a line per value, and per element of a list or object, down to `depth`.
 
     It takes two thirds of the size of indented JSON.
     """
-    fields = []
-    for name, value in data.items():
-        if value and isinstance(value, dict):
-            text = (
-                "{\n"
-                + ",\n".join(f"{json.dumps(key)}: {_compact(part)}" for key, part in value.items())
-                + "\n}"
-            )
-        elif value and isinstance(value, list):
-            text = "[\n" + ",\n".join(map(_compact, value)) + "\n]"
-        else:
-            text = _compact(value)
-        fields.append(f"{json.dumps(name)}: {text}")
-    return "{\n" + ",\n".join(fields) + "\n}\n"
-
-
-def _compact(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
-
-
-def schema() -> dict[str, Any]:
-    """The JSON schema of `run.json`."""
-    return Run.model_json_schema()
+    if not depth or not value or not isinstance(value, dict | list):
+        return json.dumps(value, ensure_ascii=False, separators=(",", ":"))
+    if isinstance(value, list):
+        return "[\n" + ",\n".join(_by_line(one, depth - 1) for one in value) + "\n]"
+    lines = (f"{json.dumps(key)}: {_by_line(one, depth - 1)}" for key, one in value.items())
+    return "{\n" + ",\n".join(lines) + "\n}"

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
+from functools import partial
 from itertools import groupby
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes import Scene
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import compiles, has_wheel, is_own, not_installed
@@ -33,7 +34,7 @@ from rockcheck.validation.suite.comparing import (
     inputs_of,
 )
 from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import Cell, CostRecord, EnsembleRecord, Run, Strict
+from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run, Strict
 from rockcheck.validation.suite.suites import ModelVariant, Suite
 from rockcheck.validation.suite.tolerances import (
     MEASURES,
@@ -42,10 +43,16 @@ from rockcheck.validation.suite.tolerances import (
     Windowed,
     floor_of,
     judge,
-    judged_beside,
 )
 from rockcheck.validation.uncertainty import numerical
 from rockcheck.validation.uncertainty.population import Inputs
+
+#: Parts of the cost that add up over the batches of an ensemble.
+ADDED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations", "worker_seconds")
+#: Remark on a gap in a measured history.
+SHIFTS = (
+    "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
+)
 
 
 class BatchRecord(Stored):
@@ -93,13 +100,7 @@ class SuiteStudy(Study):
     kinds = (HISTORIES, COMPARISONS)
 
     def __init__(self, suite: Suite, folder: Path) -> None:
-        self.suite = suite
-        try:
-            self.store = Store(folder)
-        except OSError as error:
-            raise InputError(
-                f"{folder}: cannot be used as the output folder: {error.strerror}"
-            ) from None
+        self.suite, self.store = suite, Store(folder)
         limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
         asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
@@ -110,19 +111,19 @@ class SuiteStudy(Study):
         self.batches = [
             batch for found in suite.ensemble_cells() for batch in self._batches(*found)
         ]
+        self.items: list[Planned] = [*self.cells, *self.batches]
+        self.by_scene: dict[str, dict[str, Planned]] = {}
+        for cell in self.cells:
+            self.by_scene.setdefault(cell.place, {})[cell.variant.label] = cell
         self.read_back: set[Planned] = set()
         self.records: dict[Planned, Any] = {}  # `CellRecord`, `BatchRecord`
-        self.failures: dict[Planned, str] = {}
-        self.traces: set[Planned] = set()
-        self.compared: dict[Planned, Cell] = {}
-        self.by_place = {(cell.place, cell.variant.label): cell for cell in self.cells}
-        self.by_scene = {
-            scene: list(of) for scene, of in groupby(self.cells, key=lambda cell: cell.place)
+        self.failures = {
+            item: missing
+            for item in self.items
+            if (missing := not_installed(item.variant.family_name))
         }
-        self.items: list[Planned] = [*self.cells, *self.batches]
-        for item in self.items:
-            if missing := not_installed(item.variant.family_name):
-                self.failures[item] = missing
+        self.traces: set[Planned] = set()
+        self.compared: dict[str, list[Cell]] = {}
 
     def _planned(
         self, scene: Scene, variant: ModelVariant, depends: Mapping[str, Any], **of: Any
@@ -176,10 +177,9 @@ class SuiteStudy(Study):
         found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            if found is not None:
-                self.records[task] = _record_of(task).model_validate(found)
-                self.read_back.add(task)
-                return workers.Played(found)
+            self.records[task] = _record_of(task).model_validate(found)
+            self.read_back.add(task)
+            return workers.Played(found or {})
         return None
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
@@ -198,46 +198,36 @@ class SuiteStudy(Study):
             self.store.put_record(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
-        """Compare the cells of a scene, once all are there."""
-        cells = self.by_scene[scene]
-        if all(cell in self.records or cell in self.failures for cell in cells):
-            for cell in cells:
-                self.compared.setdefault(cell, self._cell(cell))
+        """Compare and judge the cells of a scene, once all are there."""
+        cells, found = self.by_scene[scene], dict[str, Cell]()
+        if scene in self.compared or not all(
+            cell in self.records or cell in self.failures for cell in cells.values()
+        ):
+            return
+        reference = self.suite.suite_of(scene).reference
+        for label in sorted(cells, key=lambda label: label != reference):
+            found[label] = self._cell(cells[label], found.get(reference))
+        self.compared[scene] = [found[label] for label in cells]
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The run, as the data of a finding."""
         suite = self.suite
-        for task, result in done.items():
-            if isinstance(result, Failure):
-                self.failures[task] = result.reason
-                if result.traceback:
-                    self.traces.add(task)
+        failed = {task: one for task, one in done.items() if isinstance(one, Failure)}
+        self.failures |= {task: one.reason for task, one in failed.items()}
+        self.traces |= {task for task, one in failed.items() if one.traceback}
         if any(item not in done and item not in self.failures for item in self.items):
             return Finding(self.name, suite.name, "interrupted", complete=False)
+        inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
+        cells: list[Cell] = []
         for scene in self.by_scene:
             self._compare(scene)
-        inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
-        found = [self.compared[planned] for planned in self.cells]
-        beside = {name: list(of) for name, of in groupby(found, key=lambda cell: cell.scene)}
-        found = [self._judged_beside(cell, beside[cell.scene]) for cell in found]
-        cells = [
-            self._explained(cell, beside[cell.scene], inputs.get(cell.scene)) for cell in found
-        ]
+            cells += self._explained(scene, inputs.get(scene))
         ensembles: list[EnsembleRecord] = []
         for ensemble, batches in groupby(self.batches, key=lambda batch: batch.ensemble):
             if ensemble is not None:
                 record, of_ensemble = self._ensemble(ensemble, list(batches))
                 ensembles.append(record)
                 cells += of_ensemble
-        # in a user's own model an exception is that model's fault, not rockcheck's
-        faults = {
-            (task.place, task.variant.label): {
-                "traceback": f"{FAULTS}/{task.name}.txt",
-                "unexpected": not is_own(task.variant.family_name),
-            }
-            for task in self.traces
-        }
-        cells = [cell.model_copy(update=faults.get((cell.scene, cell.model), {})) for cell in cells]
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
@@ -273,132 +263,125 @@ class SuiteStudy(Study):
             exit_code=finished.exit_code,
         )
 
-    def _cell(self, planned: Planned) -> Cell:
-        scene, label, suite = planned.scene, planned.variant.label, self.suite
-        about: dict[str, Any] = {
-            "scene": scene.name,
-            "model": label,
-            "key": planned.key,
-            "read_back": planned in self.read_back,
+    def _about(self, parts: Sequence[Planned], key: str, reason: str = "") -> dict[str, Any]:
+        """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
+        place, variant = parts[0].place, parts[0].variant
+        status = "failed" if reason else "done"
+        if missing := not_installed(variant.family_name):
+            status = "absent" if has_wheel(variant.family_name) else "unavailable"
+        traced = [f"{FAULTS}/{part.name}.txt" for part in parts if part in self.traces]
+        return {
+            "scene": place,
+            "model": variant.label,
+            "settings": dict(variant.settings),
+            "key": key,
+            "status": status,
+            "reason": missing or reason,
+            "read_back": all(part in self.read_back for part in parts),
+            "traceback": traced[0] if traced else "",
+            # in a user's own model an exception is that model's fault, not rockcheck's
+            "unexpected": bool(traced) and not is_own(variant.family_name),
         }
+
+    def _cell(self, planned: Planned, reference: Cell | None) -> Cell:
+        """The cell, compared and judged; `reference` is the reference's cell of that scene."""
+        about = self._about([planned], planned.key, self.failures.get(planned, ""))
         if planned in self.failures:
-            missing = not_installed(planned.variant.family_name)
-            absent = "absent" if has_wheel(planned.variant.family_name) else "unavailable"
-            about["status"] = absent if missing else "failed"
-            return Cell(
-                **about, reason=self.failures[planned], settings=dict(planned.variant.settings)
-            )
-        record = self.records[planned]
-        required = suite.required(scene.name, label)
-        own = suite.suite_of(scene.name)
+            return Cell(**about)
+        scene, label, record = planned.scene, planned.variant.label, self.records[planned]
+        own, required = self.suite.suite_of(scene.name), self.suite.required(scene.name, label)
         asked: dict[str, Asked] = {}
         for name in dict.fromkeys(
             [OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]
         ):
-            reference = None if name == OWN_FIGURES else self.by_place.get((scene.name, name))
-            if name == OWN_FIGURES or (
-                reference is not None and reference is not planned and reference in self.records
-            ):
-                extra = sorted(
-                    p.what
-                    for p in required
-                    if p.against == name and (p.what.window or p.what.definition.on_request)
+            other = None if name == OWN_FIGURES else self.by_scene[scene.name].get(name)
+            if name == OWN_FIGURES or (other is not planned and other in self.records):
+                asked[name] = (
+                    other,
+                    sorted(
+                        p.what
+                        for p in required
+                        if p.against == name and (p.what.window or p.what.definition.on_request)
+                    ),
                 )
-                asked[name] = reference, extra
         found = compared(self.store, scene, planned, asked)
-        figures = [figure for name, one in found.items() for figure in one.figures_against(name)]
+        figures = [figure for one in found.values() for figure in one.figures]
         gaps = {
             (name, window): gap for name, one in found.items() for window, gap in one.gaps.items()
         }
-        checks = []
-        for place, kind in required.items() if suite.judged else ():
-            figure = _figure(figures, place)
-            of_window = gaps.get((place.against, place.what.window), ("", False))
-            text, fall = gaps.get((place.against, str(place.what)), of_window)
-            gap = "" if fall and kind == "model form" else text
-            if gap and kind == "measured" and not fall:
-                gap += (
-                    "; `offset` of the measured model shifts its times,"
-                    " a window such as theta_rms@8s ends sooner"
-                )
-            measure = place.what.definition
-            floor = floor_of(measure, scene, record.numerical)
-            checks.append(
-                judge(
-                    figure,
-                    own.tolerances.get(place),
-                    kind=kind,
-                    measure=measure,
-                    gap=gap,
-                    floor=floor,
-                )
-            )
+        floor = partial(floor_of, scene=scene, numerical=record.numerical)
+        checks = list(self._checks(scene.name, label, figures, gaps, floor))
+        moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
+        same_equations = Place(scene.name, label, own.reference, Windowed("theta_rms"))
+        if moved and reference and own.kind(same_equations) == "numerical":
+            beside = as_expected(reference)
+            checks = list(self._checks(scene.name, label, figures, gaps, floor, beside))
         return Cell(
-            **about,
-            status="done",
-            settings=record.settings,
-            history=f"{HISTORIES}/{planned.name}{TABLE}",
-            outcome=record.outcome,
-            overturned_at=found[OWN_FIGURES].overturned_at,
-            notes=record.notes,
-            cost=record.cost,
-            figures=tuple(figures),
-            checks=tuple(checks),
-            numerical=record.numerical,
-            impact_law=found[OWN_FIGURES].impact_law,
+            **about
+            | {
+                "settings": record.settings,
+                "history": f"{HISTORIES}/{planned.name}{TABLE}",
+                "outcome": record.outcome,
+                "overturned_at": found[OWN_FIGURES].overturned_at,
+                "notes": record.notes,
+                "cost": record.cost,
+                "figures": tuple(figures),
+                "checks": tuple(checks),
+                "numerical": record.numerical,
+                "impact_law": found[OWN_FIGURES].impact_law,
+            }
         )
 
-    def _judged_beside(self, cell: Cell, cells: Sequence[Cell]) -> Cell:
-        """The cell with its own figures judged beside the reference's, if one is not as expected.
+    def _checks(
+        self,
+        scene: str,
+        model: str,
+        figures: Sequence[Figure],
+        gaps: Mapping[tuple[str, str], tuple[str, bool]],
+        floor: Callable[[Measure], float | None],
+        beside: Mapping[tuple[str, str], float | None] = MappingProxyType({}),
+    ) -> Iterator[Check]:
+        """The judged figures of a cell; `gaps` by reference and window, or measure and window.
 
-        Only if both solve the same equations. A figure of the reference that is itself not as
-        expected is no yardstick.
+        `beside` has the reference's own figures, by measure and window, where these are yardsticks.
         """
-        own = self.suite.suite_of(cell.scene)
-        moved = next(
-            (check for check in cell.checks if check.kind == "absolute" and check.weighs != "pass"),
-            None,
-        )
-        reference = next(
-            (other for other in cells if other.model == own.reference and other is not cell), None
-        )
-        if moved is None or reference is None:
-            return cell
-        if (
-            own.kind(Place(cell.scene, cell.model, own.reference, Windowed(moved.figure.measure)))
-            != "numerical"
-        ):
-            return cell
-        known = {(f.measure, f.window): f.value for f in reference.figures if not f.against}
-        for check in reference.checks:
-            if check.verdict != "pass" and not check.figure.against:
-                known.pop((check.figure.measure, check.figure.window), None)
-        checks = (
-            judged_beside(check, known.get((check.figure.measure, check.figure.window)))
-            if check.kind == "absolute"
-            else check
-            for check in cell.checks
-        )
-        return cell.model_copy(update={"checks": tuple(checks)})
+        own = self.suite.suite_of(scene)
+        for place, kind in self.suite.required(scene, model).items() if own.judged else ():
+            what, line = place.what, own.tolerances.get(place)
+            of_window = gaps.get((place.against, what.window), ("", False))
+            text, fall = gaps.get((place.against, str(what)), of_window)
+            gap = "" if fall and kind == "model form" else text
+            yield judge(
+                _figure(figures, place),
+                line,
+                kind=kind,
+                measure=what.definition,
+                gap=gap + SHIFTS if gap and kind == "measured" and not fall else gap,
+                floor=floor(what.definition),
+                beside=beside.get((what.measure, what.window))
+                if line and kind == "absolute"
+                else None,
+            )
 
-    def _explained(self, cell: Cell, cells: Sequence[Cell], inputs: Inputs | None) -> Cell:
-        """The cell with the verdicts on its differences from the references.
+    def _explained(self, scene: str, inputs: Inputs | None) -> Iterator[Cell]:
+        """The cells of a scene with the verdicts on their differences from the references.
 
-        These are among `cells`, the scene's cells, if they finished. Unchanged if its numerical
-        error is unknown.
+        Only of those that finished, and whose numerical error is known.
         """
-        own = self.suite.suite_of(cell.scene)
-        if cell.numerical is None:
-            return cell
-        references = {
-            other.model: (other.figures, self.records[self.by_place[cell.scene, other.model]])
-            for other in cells
-            if other.model in {own.reference, own.model_form} - {cell.model}
-            and other.status == "done"
+        own, cells = self.suite.suite_of(scene), self.compared[scene]
+        records: dict[str, Any] = {
+            label: self.records.get(one) for label, one in self.by_scene[scene].items()
         }
-        mine, scene = self.records[self.by_place[cell.scene, cell.model]], own.scenes[cell.scene]
-        found = explanations(scene, cell.figures, mine, references, inputs)
-        return cell.model_copy(update={"explanations": tuple(found)})
+        for cell in cells:
+            references = {
+                other.model: (other.figures, records[other.model])
+                for other in cells
+                if other.model in {own.reference, own.model_form} - {cell.model}
+                and other.status == "done"
+            }
+            mine = records[cell.model]
+            found = mine and explanations(own.scenes[scene], cell.figures, mine, references, inputs)
+            yield cell.model_copy(update={"explanations": tuple(found or ())})
 
     def _ensemble(
         self, ensemble: Ensemble, batches: Sequence[Planned]
@@ -407,78 +390,84 @@ class SuiteStudy(Study):
             label: list(found)
             for label, found in groupby(batches, key=lambda batch: batch.variant.label)
         }
-        samples: dict[str, Sample] = {}
-        for label, parts in by_model.items():
-            peaks: list[float | None] = []
-            outcomes: list[str] = []
-            for part in parts:
-                record, count = self.records.get(part), len(part.numbers)
-                peaks += record.peaks if record else [None] * count
-                outcomes += record.outcomes if record else [self.failures[part]] * count
-            samples[label] = Sample(np.array(peaks, dtype=float), tuple(outcomes))
+        played = {label: [self._batch(part) for part in found] for label, found in by_model.items()}
+        peaks = {
+            label: tuple(peak for one in found for peak in one.peaks)
+            for label, found in played.items()
+        }
+        outcomes = {
+            label: tuple(outcome for one in found for outcome in one.outcomes)
+            for label, found in played.items()
+        }
+        samples = {
+            label: Sample(np.array(peaks[label], dtype=float), outcomes[label]) for label in peaks
+        }
         whole = EnsembleRecord(
             name=ensemble.name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
-            peaks={
-                label: tuple(peak if math.isfinite(peak) else None for peak in sample.peaks)
-                for label, sample in samples.items()
-            },
-            outcomes={label: tuple(sample.outcomes) for label, sample in samples.items()},
+            peaks=peaks,
+            outcomes=outcomes,
         )
-        return whole, [self._ensemble_cell(parts, samples) for parts in by_model.values()]
+        cells = [
+            self._ensemble_cell(parts, samples, [one.cost for one in played[label]])
+            for label, parts in by_model.items()
+        ]
+        return whole, cells
 
-    def _ensemble_cell(self, batches: Sequence[Planned], samples: Mapping[str, Sample]) -> Cell:
-        variant, place = batches[0].variant, batches[0].place
-        own, origin = samples[variant.label], self.suite.suite_of(place)
-        played = (self.records[batch] for batch in batches if batch in self.records)
-        costs = [record.cost.model_dump(exclude_unset=True) for record in played]
-        about: dict[str, Any] = {
-            "scene": place,
-            "model": variant.label,
-            "key": provenance.digest("".join(batch.key for batch in batches)),
-            "settings": dict(variant.settings),
-            "read_back": all(batch in self.read_back for batch in batches),
-            "cost": CostRecord(
-                **{key: sum(cost[key] for cost in costs) for key in (costs[0] if costs else ())}
-            ),
-        }
-        if missing := not_installed(variant.family_name):
-            about["status"] = "absent" if has_wheel(variant.family_name) else "unavailable"
-            return Cell(**about, reason=missing)
+    def _batch(self, batch: Planned) -> BatchRecord:
+        """The record of a batch; of one that failed, the reason for each of its scenes."""
+        count, reason = len(batch.numbers), self.failures.get(batch, "")
+        found: BatchRecord = self.records.get(batch) or BatchRecord(
+            peaks=(None,) * count, outcomes=(reason,) * count, cost=CostRecord()
+        )
+        return found
+
+    def _ensemble_cell(
+        self,
+        batches: Sequence[Planned],
+        samples: Mapping[str, Sample],
+        costs: Sequence[CostRecord],
+    ) -> Cell:
+        place, label = batches[0].place, batches[0].variant.label
+        own, origin, reason = samples[label], self.suite.suite_of(place), ""
         if own.failures:
-            reason = next(
-                outcome
-                for peak, outcome in zip(own.peaks, own.outcomes, strict=True)
-                if not math.isfinite(peak)
-            )
-            return Cell(
-                **about,
-                status="failed",
-                reason=f"{own.failures} of {len(own.peaks)} scenes failed; the first: {reason}",
-            )
-        required = origin.required(place, variant.label)
+            first = own.outcomes[int(np.argmin(np.isfinite(own.peaks)))]
+            reason = f"{own.failures} of {len(own.peaks)} scenes failed; the first: {first}"
+        key = provenance.digest("".join(batch.key for batch in batches))
+        about = self._about(batches, key, reason)
+        about["cost"] = CostRecord(**{name: sum(getattr(c, name) for c in costs) for name in ADDED})
+        if about["status"] != "done":
+            return Cell(**about)
+        required = self.suite.required(place, label)
         figures = [
             evaluate(measure, Samples(samples[name], own), "alpha", against=name)
             for name in dict.fromkeys(
                 [origin.reference, origin.model_form, *(place.against for place in required)]
             )
-            if name in samples and name != variant.label
+            if name in samples and name != label
             for measure in STATISTICS.values()
         ]
-        checks = [
-            judge(
-                _figure(figures, place),
-                origin.tolerances.get(place),
-                kind=kind,
-                measure=place.what.definition,
-            )
-            for place, kind in required.items()
-        ]
+        checks = self._checks(place, label, figures, {}, lambda measure: None)
         outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
-        return Cell(
-            **about, status="done", outcome=outcome, figures=tuple(figures), checks=tuple(checks)
-        )
+        return Cell(**about, outcome=outcome, figures=tuple(figures), checks=tuple(checks))
+
+
+def as_expected(reference: Cell) -> dict[tuple[str, str], float | None]:
+    """The reference's own figures, by measure and window, but for those not as expected.
+
+    One that is not as expected itself is no yardstick.
+    """
+    moved = {
+        (check.figure.measure, check.figure.window)
+        for check in reference.checks
+        if check.verdict != "pass" and not check.figure.against
+    }
+    return {
+        (one.measure, one.window): one.value
+        for one in reference.figures
+        if not one.against and (one.measure, one.window) not in moved
+    }
 
 
 def in_order(items: Sequence[Planned]) -> list[Planned]:

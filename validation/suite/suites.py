@@ -73,7 +73,7 @@ from rockcheck.scenes.files import (
 )
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
-from rockcheck.validation.execute.models import Family, build, check_allowed, family, is_own
+from rockcheck.validation.execute.models import build, check_allowed, family, is_own
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
@@ -153,11 +153,6 @@ class ModelVariant:
     #: Folders in which a user-defined model may lie: the suite's.
     search_path: tuple[str, ...] = ()
 
-    @property
-    def family(self) -> Family:
-        """The kind of model."""
-        return family(self.family_name)
-
 
 @dataclass(frozen=True)
 class Suite:
@@ -198,6 +193,11 @@ class Suite:
             found.setdefault((place.scene, place.model), []).append(place)
         return found
 
+    @property
+    def parts(self) -> tuple[Suite, ...]:
+        """The suites that it joins, or the suite itself."""
+        return self.included or (self,)
+
     def suite_of(self, scene: str) -> Suite:
         """The suite that a scene or an ensemble comes from: this one, or the included one."""
         return next(
@@ -207,16 +207,20 @@ class Suite:
 
     def cells(self) -> Iterator[tuple[Scene, ModelVariant]]:
         """All cells, scene by scene."""
-        for suite in self.included or (self,):
-            for scene, model in _played(suite.scenes, suite.models):
-                yield suite.scenes[scene], suite.models[model]
+        return (
+            (suite.scenes[scene], suite.models[model])
+            for suite in self.parts
+            for scene, model in _played(suite.scenes, suite.models)
+        )
 
     def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, ModelVariant]]:
         """All ensembles with the scene that they are drawn from, model by model."""
-        for suite in self.included or (self,):
-            for ensemble, base in suite.ensembles.values():
-                for model in suite.models.values():
-                    yield ensemble, base, model
+        return (
+            (ensemble, base, model)
+            for suite in self.parts
+            for ensemble, base in suite.ensembles.values()
+            for model in suite.models.values()
+        )
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
@@ -265,10 +269,8 @@ class Suite:
         """
         if place.against == OWN_FIGURES:
             return "exact" if place.what.definition.exact else "absolute"
-        if "measured" in (
-            self.models[place.model].family_name,
-            self.models[place.against].family_name,
-        ):
+        families = [self.models[label].family_name for label in (place.model, place.against)]
+        if "measured" in families:
             return "measured"
         scene = (
             self.ensembles[place.scene][1]
@@ -276,18 +278,13 @@ class Suite:
             else self.scenes[place.scene]
         )
         may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
-        differ = self.models[place.model].family.flies != self.models[place.against].family.flies
+        differ = len({family(name).flies for name in families}) > 1
         return "model form" if may_hop and differ else "numerical"
 
 
 def named_suites() -> dict[str, Path]:
     """Names and files of the suites that come with the package."""
     return {path.stem: path for path in sorted((DATA / "suites").glob("*.toml"))}
-
-
-def describe_suite(path: Path) -> str:
-    """A suite file's description, without loading its scenes."""
-    return str(read_toml(path).get("description", ""))
 
 
 def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
@@ -409,22 +406,22 @@ def is_scene(source: str) -> bool:
 
 
 def _check_names(
-    given: SuiteFile, models: Container[str], scenes: Collection[str], ensembles: Collection[str]
+    given: SuiteFile, models: Collection[str], scenes: Collection[str], ensembles: Collection[str]
 ) -> None:
     """Raise `InputError` where something is missing, named twice, or unknown."""
-    for key, label in (("reference", given.reference), ("model_form", given.model_form)):
-        if label and label not in models:
-            raise InputError(
-                f"{label!r} is not among the suite's models: {', '.join(given.models) or 'none'}",
-                key,
-            )
-    if not given.models:
-        raise InputError("no model; at least the reference is needed", "models")
-    if not scenes and not ensembles:
-        raise InputError("no scene; at least one is needed", "scenes")
-    for name in ensembles:
-        if name in scenes:
-            raise InputError(f"{name!r} is a scene, too", "ensemble.name")
+    known = ", ".join(models) or "none"
+    faults = [
+        (label and label not in models, key, f"{label!r} is not among the suite's models: {known}")
+        for key, label in (("reference", given.reference), ("model_form", given.model_form))
+    ]
+    faults += [
+        (not models, "models", "no model; at least the reference is needed"),
+        (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
+    ]
+    faults += [(one in scenes, "ensemble.name", f"{one!r} is a scene, too") for one in ensembles]
+    for wrong, key, said in faults:
+        if wrong:
+            raise InputError(said, key)
     for key, texts in given.require:
         book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
         for text in texts:

@@ -57,7 +57,7 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
 
 def not_shown(run: Run) -> list[str]:
     """A line with the number of scenes that are not `shown`; empty if there are none."""
-    more = len(run.places) - len(shown(run))
+    more = len(run.by_scene()) - len(shown(run))
     said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
     return [said] if more else []
 
@@ -94,7 +94,9 @@ def verdict_table(run: Run) -> Table:
         if cell.scene not in places:
             continue
         near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
-        judged = windowed(near) if near else "as it must be" if cell.checks else "nothing judged"
+        judged = (
+            near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
+        )
         idle = cell.status == "done" and not cell.checks
         state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
         rows.append(
@@ -201,7 +203,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
 def improvements(run: Run) -> Iterator[str]:
     """The figures that are better than expected, a line each."""
     yield from (
-        f"{place(cell)}: {title(check)}: {check.reason}"
+        f"{place(cell)}: {check.figure.title}: {check.reason}"
         for cell, check in run.checks()
         if check.verdict == "better"
     )
@@ -212,7 +214,7 @@ def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
     if cell.status != "done":
         yield f"{place(cell)}: {cell.reason}"
     yield from (
-        f"{place(cell)}: {title(check)}: {check.reason}"
+        f"{place(cell)}: {check.figure.title}: {check.reason}"
         for check in cell.checks
         if check.fails(strict)
     )
@@ -221,22 +223,6 @@ def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
 def place(cell: Cell) -> str:
     """The cell's scene and model."""
     return f"{cell.scene}, {cell.model}"
-
-
-def title(check: Check) -> str:
-    """The check as tolerances name it: measure, window, and its reference."""
-    return title_of(check.figure)
-
-
-def title_of(figure: Figure) -> str:
-    """The figure as tolerances name it."""
-    against = f" against {figure.against}" if figure.against else ""
-    return f"{figure.measure}{'@' if figure.window else ''}{figure.window}{against}"
-
-
-def windowed(check: Check) -> str:
-    """Measure and window of a check, as tolerances name them."""
-    return title_of(check.figure).partition(" ")[0]
 
 
 def used(check: Check) -> float:
@@ -294,7 +280,7 @@ def share(check: Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
     if asks(check):
-        return f"{windowed(check)} {value_words(figure.value, yes_no=True)}"
+        return f"{figure.windowed} {value_words(figure.value, yes_no=True)}"
     value = (
         "-"
         if figure.value is None
@@ -303,7 +289,7 @@ def share(check: Check) -> str:
         else f"{figure.value:.2e}"
     )
     limit = "none" if check.limit is None else f"{check.limit:.2g}"
-    return f"{windowed(check)} {value} / {limit}"
+    return f"{figure.windowed} {value} / {limit}"
 
 
 def files_of(run: Run) -> Iterator[Table]:
@@ -334,15 +320,15 @@ def junit(run: Run) -> str:
     ways. A check that is not defined is skipped.
     """
     document = JUnitXml(f"rockcheck {run.suite}")
-    for scene, cells in run.by_scene().items():
-        suite = TestSuite(scene)
-        suite.extend([case for cell in cells.values() for case in _cases(cell, run.strict)])
+    suites = [
+        (scene, [case for cell in cells.values() for case in _cases(cell, run.strict)])
+        for scene, cells in run.by_scene().items()
+    ]
+    faults = [_case("tolerances", fault, Failure(fault)) for fault in run.faults]
+    for name, cases in [*suites, *([("tolerances", faults)] if faults else [])]:
+        suite = TestSuite(name)
+        suite.extend(cases)
         document.append(suite)  # `add_testsuite` searches all suites added before
-    if run.faults:
-        suite = TestSuite("tolerances")
-        for fault in run.faults:
-            suite.add_testcase(_case("tolerances", fault, Failure(fault)))
-        document.append(suite)
     document.update_statistics()
     return inert(bytes(document.tostring()).decode()) + "\n"  # XML allows no control characters
 
@@ -367,15 +353,14 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
         failure = Failure(check.reason, check.verdict) if check.fails(strict) else None
         yield _case(
             place,
-            title(check),
+            check.figure.title,
             Skipped(check.reason) if check.verdict == "not defined" else failure,
         )
 
 
 def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> TestCase:
     case = TestCase(name, place)
-    if result is not None:
-        case.result = [result]
+    case.result = [] if result is None else [result]
     return case
 
 

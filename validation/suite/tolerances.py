@@ -81,11 +81,6 @@ class Windowed:
         return cls(name, window)
 
     @property
-    def seconds(self) -> float | None:
-        """The window's end in s, None for the whole time and for the horizon."""
-        return float(self.window[:-1]) if self.window.endswith("s") else None
-
-    @property
     def definition(self) -> Measure:
         """The measure itself."""
         return MEASURES[self.measure]
@@ -253,26 +248,6 @@ def judge(
         why=given.why,
         gap=gap,
         floor=least,
-        beside=beside,
-    )
-
-
-def judged_beside(check: Check, beside: float | None) -> Check:
-    """The check judged again with the reference's figure as a yardstick.
-
-    Unchanged without that figure or a tolerance.
-    """
-    if check.limit is None or beside is None:
-        return check
-    line = Tolerance(limit=check.limit, expected=check.expected, drift=check.drift, why=check.why)
-    measure = MEASURES[check.figure.measure]
-    return judge(
-        check.figure,
-        line,
-        kind=check.kind,
-        measure=measure,
-        gap=check.gap,
-        floor=check.floor,
         beside=beside,
     )
 

@@ -1,29 +1,111 @@
-"""`rockcheck conformance`: a card an engine."""
+"""`rockcheck benchmark`, `rockcheck stress`, `rockcheck conformance`: the models under test."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import dataclasses
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
 from rockcheck.commands import (
     OUT,
     AllowCodeOption,
+    JobsOption,
+    OutOption,
     Played,
     answer,
     console,
     model_names,
+    one_of,
     setting_of,
     studied,
+    tell_missing,
     usable_folder,
 )
 from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import NotInstalled, printable, unknown_name
+
+#: Nothing begins later than this; what was left out begins with the next run.
+MINUTES = 25.0
+
+BenchmarkArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="[WHAT]",
+        help="all, ebm (batches), models (work and precision), skipping, or convergence.",
+    ),
+]
 
 
-def run(
+def benchmark(
+    what: BenchmarkArgument = "all",
+    out: OutOption = OUT / "benchmark",
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings.")] = False,
+    jobs: JobsOption = None,
+) -> None:
+    """Run time against error, for every model.
+
+    Work and precision, compiled batches, what a scene does not need, and what engines converge to.
+    """
+    from rockcheck.validation.studies.work_precision.study import What, WorkPrecision
+
+    part: What = one_of("benchmark", what, get_args(What))
+    tell_missing()
+    studied(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)
+
+
+StressArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break)."
+    ),
+]
+
+
+def stress(
+    what: StressArgument = "all",
+    played: Played = Played(OUT / "stress"),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Some thousand runs, below a minute.")
+    ] = False,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed", min=0, help="Of the random scenes; scene k of a seed is always the same."
+        ),
+    ] = 1,
+    runs: Annotated[
+        int | None,
+        typer.Option(
+            "--runs", min=1, help="Runs of each model (100,000 of event-based ones, else 2,000)."
+        ),
+    ] = None,
+    model: Annotated[
+        list[str] | None, typer.Option("--model", help="Only this model; repeatable.")
+    ] = None,
+) -> None:
+    """Numerical stability: where the models break.
+
+    Random scenes over all allowed settings, checked for invariants, and the steps at which
+    engines break. Writes a page, tables, and of failures the smallest scene files that show them.
+    An interrupted run resumes where it ended.
+    Exit 1 where an event-based model breaks an invariant.
+    """
+    from rockcheck.validation.execute.models import not_installed
+    from rockcheck.validation.studies.stress.players import PLAYERS
+    from rockcheck.validation.studies.stress.study import Stress, What
+
+    part: What = one_of("stress", what, get_args(What))
+    for name in model or ():
+        if missing := not_installed(one_of("model", name, PLAYERS).split()[0]):
+            raise NotInstalled(missing, name)
+    tell_missing()
+    study = Stress(part, seed, quick, runs, tuple(model or ()))
+    studied(study, played)
+
+
+def conformance(
     engine: Annotated[
         list[str] | None,
         typer.Option(
@@ -88,7 +170,7 @@ def run(
         if unknown := given.keys() - (WANTED.keys() - {"restitution"}):
             raise unknown_name("setting", min(unknown), WANTED.keys() - {"restitution"})
         wanted = tuple(Tune(name, tune, **given) for name in names)
-        studied(Tuning(wanted), replace(played, out=played.out / "tuned"))
+        studied(Tuning(wanted), dataclasses.replace(played, out=played.out / "tuned"))
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
     players = [named(name, kind, given) for name in names for kind in kinds]
