@@ -90,7 +90,7 @@ def run_batch(
     done. Where a row reaches a cap or has no consistent motion: `ModelFailure` if `strict`, else
     only its `ending` says so.
     """
-    refuse_bouc_wen(model)
+    refuse_undecided(model)
     count, kept = len(packed), parts + 1 if parts and not until_decided else 0
     motion, modes = np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
     log, found = np.empty((count, 0, 5)), np.empty(count, FOUND)
@@ -147,7 +147,7 @@ def play_ensemble(
     Raises `InputError` where the model cannot play one of them, or has Bouc-Wen friction, and
     `ModelFailure`.
     """
-    refuse_bouc_wen(model)
+    refuse_undecided(model)
     first, count = scenes[0], len(scenes)
     step = max(first.output_step, first.duration / rows) if rows else first.duration
     t = first.replace(output_step=step).output_times if rows else np.empty(0)
@@ -189,7 +189,7 @@ def play_ensemble(
     )
 
 
-def refuse_bouc_wen(model: EventBasedModel) -> None:
-    """Raises `InputError`: a batch knows when a run is decided by Coulomb's friction or none."""
-    if model.friction == "bouc-wen":
+def refuse_undecided(model: EventBasedModel) -> None:
+    """Raises `InputError` where the model's runs do not know when they are decided."""
+    if not model.decides:
         raise InputError("a batch has Coulomb's friction or none", "friction")

@@ -59,6 +59,11 @@ class EventBasedModel(Frozen):
             return "ebm-bouc-wen"
         return "ebm" if self.pivot == "bilateral" else "ebm-unilateral"
 
+    @property
+    def decides(self) -> bool:
+        """Whether a run knows when its outcome is certain: Coulomb's friction, or none."""
+        return self.friction != "bouc-wen"
+
     def finer(self) -> Self:
         """The same model at a hundredth of its tolerance, but at least the finest tolerance.
 

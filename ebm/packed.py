@@ -21,8 +21,8 @@ from rockcheck.scenes.compiled import for_types_of
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
-#: The event loops that are compiled, by whether friction is Bouc-Wen's.
-_READY: dict[bool, Callable[..., None]] = {}
+#: The event loops that are compiled, by a model's friction.
+_READY: dict[str, Callable[..., None]] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +145,6 @@ def loop_of(model: Any, *given: Any) -> Callable[..., None]:
 
     It is specialised to the types of `given`, which are always the same.
     """
-    bouc_wen = model.friction == "bouc-wen"
-    if bouc_wen not in _READY:
-        _READY[bouc_wen] = for_types_of(march.play_bouc_wen if bouc_wen else march.play, *given)
-    return _READY[bouc_wen]
+    if model.friction not in _READY:
+        _READY[model.friction] = for_types_of(march.LOOPS[model.friction], *given)
+    return _READY[model.friction]

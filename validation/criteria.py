@@ -85,6 +85,8 @@ def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
     `ratios` are a/(g alpha) at `times` in 1/p. From the uplift s0 on, where the ratio first
     exceeds 1: the integral of f(s) exp(-(s - s0)) reaches 1 (linearised equation of motion).
     """
+    from scipy.integrate import trapezoid
+
     s, f = np.asarray(times, dtype=float), np.asarray(ratios, dtype=float)
     above = np.flatnonzero(f > 1.0)
     if not above.size:
@@ -94,7 +96,7 @@ def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
         part = (1.0 - f[first - 1]) / (f[first] - f[first - 1])
         start = s[first - 1] + part * (s[first] - s[first - 1])
         s, f = np.concatenate([[start], s[first:]]), np.concatenate([[1.0], f[first:]])
-    return bool(np.trapezoid(f * np.exp(s[0] - s), s) >= 1.0)
+    return bool(trapezoid(f * np.exp(s[0] - s), s) >= 1.0)
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 
 from rockcheck.ebm.core import contacts, lanes, motion
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
-from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.series import (
     AHEAD,
     INSTANT,
@@ -32,22 +32,28 @@ from rockcheck.ebm.core.series import (
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
-# What a guard is; a rate is the rate of its combination.
-KIND = np.array(
-    (Kind.POSITION,) * 5 + (Kind.FORCE,) * 5 + (Kind.RATE,) + (Kind.FORCE,) * 2 + (Kind.POSITION,)
-)
-# The series that a guard can combine. The guard itself fills the empty places: it has no weight.
-_COMBINES = np.array(
-    [(Row.PHI, Row.GUARD, Row.GUARD)] * 2
-    + [(Row.COS, Row.Y, Row.GUARD)]
-    + [(Row.SIN, Row.COS, Row.XI)] * 2
-    + [(Row.P, Row.GUARD, Row.GUARD), (Row.Q, Row.NA, Row.GUARD), (Row.NB, Row.GUARD, Row.GUARD)]
-    + [(Row.P, Row.Q, Row.GUARD)] * 2
-    + [(Row.PHI, Row.SIN, Row.XI)]
-    + [(Row.P, Row.Q, Row.GUARD)] * 2
-    + [(Row.GUARD, Row.GUARD, Row.GUARD)]
-)
+#: Each guard, in the order of `Guard`: what it is, and the series that it can combine. A rate is
+#: that of its combination.
+GUARDS: dict[int, tuple[int, ...]] = {
+    Guard.PHI: (Kind.POSITION, Row.PHI),
+    Guard.TOPPLE: (Kind.POSITION, Row.PHI),
+    Guard.LANDING: (Kind.POSITION, Row.COS, Row.Y),
+    Guard.TIP_GAP: (Kind.POSITION, Row.SIN, Row.COS, Row.XI),
+    Guard.FAR_GAP: (Kind.POSITION, Row.SIN, Row.COS, Row.XI),
+    Guard.FLOOR_PUSH: (Kind.FORCE, Row.P),
+    Guard.TIP_PUSH: (Kind.FORCE, Row.Q, Row.NA),
+    Guard.FAR_PUSH: (Kind.FORCE, Row.NB),
+    Guard.CONE_PLUS: (Kind.FORCE, Row.P, Row.Q),
+    Guard.CONE_MINUS: (Kind.FORCE, Row.P, Row.Q),
+    Guard.SLIP: (Kind.RATE, Row.PHI, Row.SIN, Row.XI),
+    Guard.UPLIFT_PLUS: (Kind.FORCE, Row.P, Row.Q),
+    Guard.UPLIFT_MINUS: (Kind.FORCE, Row.P, Row.Q),
+    Guard.LOADS: (Kind.POSITION,),
+}
+KIND = np.array([GUARDS[which][0] for which in GUARDS])
 _MOST = 3
+# The series that a guard combines. The guard itself fills the empty places: it has no weight.
+_COMBINES = np.array([[*GUARDS[which][1:], *[Row.GUARD] * _MOST][:_MOST] for which in GUARDS])
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the
 # order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
@@ -81,7 +87,7 @@ def drop(a, which):
 def fill_guards(block, state, a):
     """Writes the guards of the mode into the table."""
     mode = state.mode
-    for which in range(GUARDS):
+    for which in range(len(KIND)):
         drop(a, which)
     if mode.family == Family.FLAT:
         _fill_flat(block, mode, a)
@@ -363,7 +369,7 @@ def first_event(run):
     state, a = run.state, run.a
     order, h, slack = state.order, state.length, state.slack
     tau, which = h, Guard.NONE
-    for k in range(GUARDS):
+    for k in range(len(KIND)):
         if _stays_positive(k, order, tau, slack, a):
             continue
         degree = guard(k, order, a)

@@ -195,3 +195,7 @@ def play_bouc_wen(rows, states, work, records, found):
     """As `play`, with Bouc-Wen friction."""
     for i in range(len(rows.durations)):
         _play_row_bouc_wen(rows, i, states[0], work, records, found)
+
+
+#: The event loop with each friction of a model's settings.
+LOOPS = {"coulomb": play, "no-slip": play, "bouc-wen": play_bouc_wen}

@@ -22,7 +22,7 @@ import numpy as np
 
 from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import GUARDS, Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
 from rockcheck.scenes.compiled import inner_kernel
@@ -134,7 +134,7 @@ def wrong_by(block, base, run, measured):
     guards.fill_guards(block, run.state, run.a)
     smooth = min(ground.next_kink(base.horizontal, t), ground.next_kink(base.vertical, t)) - t
     worst = 0.0
-    for which in range(GUARDS):
+    for which in range(len(guards.KIND)):
         ahead = guards.seen(guards.KIND[which], smooth)
         if not guards.starts_positive(which, ahead, a):
             worst = max(worst, _guard_wrong_by(mode, which, order, ahead, a, measured))

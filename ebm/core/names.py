@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from enum import IntEnum
+from typing import Any
 
 #: Whether a block translates upright (theta = 0) or is tilted.
 Family = IntEnum("Family", "FLAT TILT", start=0)
@@ -17,61 +18,6 @@ Shape = IntEnum("Shape", "STILL GAUSSIAN SINE SAMPLED", start=0)
 #: What a series is made of: its noise, and how far ahead it is judged, differ.
 Kind = IntEnum("Kind", "POSITION RATE FORCE", start=0)
 
-#: Rows of the workspace.
-Row = IntEnum(
-    "Row",
-    {
-        # Series of the motion, in the letters of ebm.core.motion.
-        "PHI": 0,
-        "OMEGA": 1,
-        "SIN": 2,
-        "COS": 3,
-        "U": 4,
-        "G": 5,
-        "XI": 6,
-        "Y": 7,
-        "P": 8,
-        "Q": 9,
-        "NA": 10,
-        "NB": 11,
-        # The guard that is looked at.
-        "GUARD": 12,
-        # What the general solution needs: known terms, forces found, arms, and the walls' push.
-        "KNOWN": 13,
-        "FOUND": 14,
-        "FLOOR_ARM": 15,
-        "WALL_ARM": 16,
-        "WALL_PUSH": 17,
-        # Rows in which the small linear system of the contacts is put together, three each.
-        "CONSTRAINT": 18,
-        "COLUMN": 21,
-        "MATRIX": 24,
-        "INVERSE": 27,
-        # The last angle whose sine and cosine were taken, and these: the end of a step is the start
-        # of the next one.
-        "ANGLE": 30,
-        # The guards of the mode, a row each: the weights of the series in it (see ebm.core.guards).
-        "TABLE": 31,
-        # Bouc-Wen friction: z, V and what the recurrences need.
-        "Z": 45,
-        "V": 46,
-        "Z2": 47,
-        "SPIN2": 48,
-        "WEIGHT": 49,
-        "ARM": 50,
-        "TURN": 51,
-        "REACH": 52,
-        "INERTIA": 53,
-        "LOAD": 54,
-        "PUSH": 55,
-        "ZA": 56,
-        "LEVER": 57,
-        "DEN": 58,
-        "TORQUE": 59,
-    },
-)
-ROWS = 60
-
 #: What must not turn negative in a mode, in order of priority at one instant: floor before walls,
 #: contacts before friction. The last one is of Bouc-Wen friction: z comes to the sign of V, from
 #: where the pivot loads.
@@ -82,7 +28,67 @@ Guard = IntEnum(
     start=-1,
 )
 
-GUARDS = 14
+
+def _rows(widths: dict[str, int]) -> Any:
+    """An enumeration of the first rows of what takes these numbers of rows, one after the other."""
+    first = itertools.accumulate(widths.values(), initial=0)
+    return IntEnum("Row", [*zip([*widths, "END"], first, strict=True)])
+
+
+#: Rows of the workspace, with the number of rows that each takes.
+Row = _rows(
+    {
+        # Series of the motion, in the letters of ebm.core.motion.
+        "PHI": 1,
+        "OMEGA": 1,
+        "SIN": 1,
+        "COS": 1,
+        "U": 1,
+        "G": 1,
+        "XI": 1,
+        "Y": 1,
+        "P": 1,
+        "Q": 1,
+        "NA": 1,
+        "NB": 1,
+        # The guard that is looked at.
+        "GUARD": 1,
+        # What the general solution needs: known terms, forces found, arms, and the walls' push.
+        "KNOWN": 1,
+        "FOUND": 1,
+        "FLOOR_ARM": 1,
+        "WALL_ARM": 1,
+        "WALL_PUSH": 1,
+        # Where the small linear system of the contacts is put together.
+        "CONSTRAINT": 3,
+        "COLUMN": 3,
+        "MATRIX": 3,
+        "INVERSE": 3,
+        # The last angle whose sine and cosine were taken, and these: the end of a step is the start
+        # of the next one.
+        "ANGLE": 1,
+        # The guards of the mode: the weights of the series in each (see ebm.core.guards).
+        "TABLE": len(Guard) - 1,
+        # Bouc-Wen friction: z, V and what the recurrences need.
+        "Z": 1,
+        "V": 1,
+        "Z2": 1,
+        "SPIN2": 1,
+        "WEIGHT": 1,
+        "ARM": 1,
+        "TURN": 1,
+        "REACH": 1,
+        "INERTIA": 1,
+        "LOAD": 1,
+        "PUSH": 1,
+        "ZA": 1,
+        "LEVER": 1,
+        "DEN": 1,
+        "TORQUE": 1,
+    }
+)
+
+ROWS = int(Row.END)
 
 #: Events of the log; not in it: none, and the end of rest, whose event depends on the next mode.
 Event = IntEnum(
@@ -92,20 +98,21 @@ Event = IntEnum(
     start=-2,
 )
 
-#: Names of the events, and of the modes' codes (see ebm.core.running).
-EVENT_NAMES = (
-    "uplift",
-    "slip",
-    "stick",
-    "floor impact",
-    "wall impact",
-    "lift-off",
-    "landing",
-    "release",
-    "settled",
-    "overturned left",
-    "overturned right",
-)
+#: Names of the events.
+EVENT_NAMES: dict[int, str] = {
+    Event.UPLIFT: "uplift",
+    Event.SLIPS: "slip",
+    Event.STICKS: "stick",
+    Event.FLOOR_IMPACT: "floor impact",
+    Event.WALL_IMPACT: "wall impact",
+    Event.LIFT_OFF: "lift-off",
+    Event.LANDS: "landing",
+    Event.RELEASE: "release",
+    Event.SETTLED: "settled",
+    Event.FELL_LEFT: "overturned left",
+    Event.FELL_RIGHT: "overturned right",
+}
+#: Names of the modes' codes (see `ebm.core.state.mode_code`).
 MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
 
 #: How a run ended.

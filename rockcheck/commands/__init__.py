@@ -11,7 +11,7 @@ import tempfile
 import threading
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -196,7 +196,7 @@ def progress(title: str) -> Iterator[OnProgress]:
     over = threading.Event()
     if bar.disable and _voice.get() != "quiet":
         threading.Thread(target=_tell_lines, args=[title, task, over], daemon=True).start()
-    with bar:
+    with nullcontext() if bar.disable else bar:
         try:
             yield on_progress
         finally:

@@ -133,7 +133,7 @@ def broken_without_walls(
     return CheckedRun(
         figures={"ends": 0.0, "mirror": 3.0 if scene.walls else 0.0},
         outcome="at rest",
-        gains=1,
+        counts={"gaining": 1},
         rules={"settles": 2},
     )
 

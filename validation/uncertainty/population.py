@@ -113,7 +113,7 @@ def decided(scene: Scene, player: Any) -> History:
 
 def compiled(player: object) -> TypeGuard[EventBasedModel]:
     """Whether the model plays whole batches compiled."""
-    return isinstance(player, EventBasedModel) and player.friction != "bouc-wen"
+    return isinstance(player, EventBasedModel) and player.decides
 
 
 @dataclass(frozen=True)

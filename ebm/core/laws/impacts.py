@@ -145,7 +145,7 @@ def wall_impact(b, corner, e, w1, xdot1):
     """A corner strikes the wall, by the cascade of Fig. 3: branch, w2, xdot2, N, P, v2.
 
     Case I is the top corner (S = Sw), case II the bottom one. N >= 0 is the wall's impulse. (31) is
-    the identity map while the pivot is on the floor, so it does not appear. Of `b` (a `Setting`)
+    the identity map while the pivot is on the floor, so it does not appear. Of `b` (a SETTING)
     friction is used.
     """
     Sw = corner.Sw

@@ -12,7 +12,7 @@ from rockcheck.ebm.core import (
     guards,
     series,
 )
-from rockcheck.ebm.core.names import GUARDS, Guard, Kind, Row
+from rockcheck.ebm.core.names import Guard, Kind, Row
 from rockcheck.ebm.core.state import workspace
 
 NOISES = series.NOISE.tolist()
@@ -174,7 +174,7 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
         guards.first_event(run)
         return float(state.tau), int(state.guard)
 
-    for which in range(GUARDS):
+    for which in range(len(guards.KIND)):
         guards.drop(a, which)
     a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
     a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0

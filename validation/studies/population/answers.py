@@ -561,13 +561,8 @@ def _strips(found: Found) -> list[Block]:
         for q in QUANTITIES
         if len(found.moved[q.name]) > 1
     ]
-    plot = Plot(
-        "motion",
-        "How far each run moves",
-        kind="strips",
-        data=strips,
-        note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
-    )
+    note = "A point a run that stands; the bar goes from 16 to 84 %, its line is the median."
+    plot = Plot("motion", "How far each run moves", kind="strips", data=strips, note=note)
     return [plot] if strips else []
 
 
@@ -681,21 +676,20 @@ def _criteria(criteria: Sequence[Mapping[str, Any]]) -> Table:
         text("unit"),
         Column("unsafe", help="Runs that moved farther than estimated."),
     ]
-    rows = []
-    for row in criteria:
-        estimates = row["unsafe"] is not None
-        shown = {
+    shown = [
+        {
             **row,
+            "motion": None if row["unsafe"] is None else row["motion"],
+            "unit": "" if row["unsafe"] is None else _unit(row["unit"]),
             "predicts": f"{row['predicts']} of {row['of']}",
-            "motion": row["motion"] if estimates else None,
-            "unit": _unit(row["unit"]) if estimates else "",
             "unsafe": Mark(row["unsafe"], "changed" if row["unsafe"] else ""),
         }
-        rows.append([shown[column.name] for column in columns])
+        for row in criteria
+    ]
     return Table(
         "criteria",
         columns,
-        rows,
+        [[row[column.name] for column in columns] for row in shown],
         "What hand methods say",
         note="Estimates to be judged, not judges: in how many runs it happens by the method and by"
         " the simulation, and in how many both agree; medians of estimate and motion.",

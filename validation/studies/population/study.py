@@ -307,7 +307,6 @@ def ida(
     measure: str = "",
     capacities: Sequence[float] = CAPACITIES,
     model: str = "ebm-unilateral",
-    left_out: Sequence[str] = (),
 ) -> Population:
     """Peak rotation of the scene's block under each record, scaled to each intensity.
 
@@ -334,7 +333,6 @@ def ida(
             "unit": unit,
             "intensities": levels.tolist(),
             "capacities": list(capacities),
-            "left_out": list(left_out),
         },
     )
 
@@ -346,8 +344,6 @@ def fragility(
     frequencies: tuple[float, float],
     *,
     model: str = "ebm",
-    settings: Mapping[str, Any] | None = None,
-    left_out: Sequence[str] = (),
 ) -> Population:
     """The probability of overturning over the intensity, with the wall and without.
 
@@ -379,11 +375,10 @@ def fragility(
         across=Column("intensity", "peak acceleration / (g tan α)"),
         limits={"": MOST},
         model=model,
-        settings=settings or {},
+        settings={},
         data={
             "scene": scene.name,
             "pga_g": slope / GRAVITY_OF_RECORDS,
-            "left_out": list(left_out),
         },
         other={
             "per_unit": slope / GRAVITY_OF_RECORDS,

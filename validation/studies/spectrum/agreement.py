@@ -142,9 +142,8 @@ def _shares(
         # at least two, one on each side
         chosen = first_of(near, max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count)))
         where = one.amplitudes[i[chosen]], one.frequencies[j[chosen]]
-        if not plays(one, panel):
-            continue
-        if (found := book.outcomes(panel.scene, *where, one.model, one.settings)) is None:
+        how = panel.scene, *where, one.model, one.settings
+        if not plays(one, panel) or (found := book.outcomes(*how)) is None:
             continue
         sides.setdefault(one.model, found[0])
         for part in (True, False):

@@ -137,15 +137,13 @@ class CheckedRun:
     figures: dict[str, float]
     failure: str = ""
     outcome: str = ""
-    events: int = 0
-    #: Impacts that added energy where the impact law is known to do so (see `rules`), and the most
-    #: that one added.
-    gains: int = 0
+    #: "events"; "gaining": 1 where impacts added energy, as their law is known to do (see `rules`);
+    #: "horizons": 1 where the horizon of predictability had to be computed.
+    counts: Mapping[str, int] = field(default_factory=dict)
+    #: The most energy that an impact added.
     largest_gain: float = 0.0
     #: How often each modelling choice was made.
     rules: Mapping[str, int] = field(default_factory=dict)
-    #: Whether the horizon of predictability had to be computed.
-    horizons: int = 0
     #: Invariants that could not be judged.
     unjudged: tuple[str, ...] = ()
 
@@ -193,11 +191,13 @@ def check_run(
     return CheckedRun(
         figures={name: figure for name, figure in figures.items() if only in ("", name)},
         outcome=history.outcome,
-        events=len(history.event_list),
-        gains=cost.energy_gains,
+        counts={
+            "events": len(history.event_list),
+            "gaining": int(cost.energy_gains > 0),
+            "horizons": horizon.found,
+        },
         largest_gain=cost.largest_energy_gain,
         rules=cost.rules,
-        horizons=horizon.found,
         failure=horizon.failure,
         unjudged=("energy",) if audit and "energy" not in figures else (),
     )

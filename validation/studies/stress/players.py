@@ -158,7 +158,9 @@ class Approximate(Player):
         if not figures["finite"]:
             motion = motion_of(scene, history)
             figures |= {"depth": self.depth(motion), "source": energy_without_source(motion)}
-        return CheckedRun(figures=figures, outcome=history.outcome, events=len(history.event_list))
+        return CheckedRun(
+            figures=figures, outcome=history.outcome, counts={"events": len(history.event_list)}
+        )
 
     def depth(self, motion: Motion) -> float:
         """Deepest penetration over what the model states.

@@ -73,25 +73,27 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     """
     tables = _tables(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
-    for path, _ in places:
-        yield _with(tables, path)
+    yield from (_with(tables, path) for path, _ in places)
     unit = math.sqrt(scene.block.radius / scene.gravity)
     for factor in (0.25, 0.5, 0.9):
         if factor * scene.duration > 0.01 * unit:
             shorter = {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
             yield tables | shorter
-    for path, value in places:
-        if isinstance(value, list):
-            yield _with(tables, path, value[: len(value) // 2])
-            yield _with(tables, path, value[:-1])
+    yield from (
+        _with(tables, path, value[:count])
+        for path, value in places
+        if isinstance(value, list)
+        for count in (len(value) // 2, -1)
+    )
     if not 0.5 < scene.block.radius < 2.0:  # rounding would change it again
         yield tables | {"block": scene.block.scaled(1.0 / scene.block.radius)}
     numbers = [(path, value) for path, value in places if isinstance(value, float)]
-    for path, _ in numbers:
-        yield _with(tables, path, 0.0)
-    for digits in (1, 2, 4, 8):
-        for path, value in numbers:
-            yield _with(tables, path, float(f"{value:.{digits}g}"))
+    yield from (_with(tables, path, 0.0) for path, _ in numbers)
+    yield from (
+        _with(tables, path, float(f"{value:.{digits}g}"))
+        for digits in (1, 2, 4, 8)
+        for path, value in numbers
+    )
 
 
 def _tables(scene: Scene) -> dict[str, Any]:
@@ -203,7 +205,6 @@ class RunTotals:
     def see(self, played: CheckedRun, seed: int, number: int) -> None:
         """Count one more run."""
         figures = played.figures
-        counts = {"runs": 1, "events": played.events, "gaining": int(played.gains > 0)}
         self.add(
             RunTotals(
                 model=self.model,
@@ -219,7 +220,7 @@ class RunTotals:
                 ],
                 outcomes=Counter([played.outcome or "failed"]),
                 rules=Counter(played.rules),
-                counts=Counter(counts | {"horizons": played.horizons}),
+                counts=Counter({"runs": 1, **played.counts}),
                 largest_gain=played.largest_gain,
             )
         )

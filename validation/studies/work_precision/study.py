@@ -102,22 +102,25 @@ class WorkPrecision(Study):
 
     def _batches(self) -> Iterator[Task]:
         nodes = 20 if self.quick else timings.NODES
-        for case in timings.CASES:
-            yield Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
-        for size in timings.QUICK_SIZES if self.quick else timings.SIZES:
-            for threads in sorted({1, os.cpu_count() or 1}):
-                yield Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
+        yield from (
+            Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
+            for case in timings.CASES
+        )
+        yield from (
+            Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
+            for size in (timings.QUICK_SIZES if self.quick else timings.SIZES)
+            for threads in sorted({1, os.cpu_count() or 1})
+        )
         if not self.quick:
             yield Measure("cold start", "none", 1, where="timed", expected=15.0)
         times = 1 if self.quick else COLD_STARTS
         yield Measure("cold start", "filled", times, where="timed", expected=1.5 * times)
 
     def _savings(self) -> Iterator[Task]:
+        rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
         for name in timings.KINDS:
-            if name.startswith("batches") and name.endswith("quick") != self.quick:
-                continue
-            rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
-            yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
+            if not name.startswith("batches") or name.endswith("quick") == self.quick:
+                yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
 
     def _models(self) -> Iterator[Task]:
         """Interleaved, so that other load of the machine affects all models equally.
@@ -356,12 +359,13 @@ def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
             )
         )
         panels.append(Panel(family, series))
-    name = title.lower().replace(" ", "-")
-    x, y = (
-        Axis("CPU s a simulated s", log=True),
-        Axis("RMS error of θ / α", log=True, limits=(FLOOR, 3.0)),
+    return Plot(
+        title.lower().replace(" ", "-"),
+        f"Work and precision: {title.lower()}",
+        panels=panels,
+        x=Axis("CPU s a simulated s", log=True),
+        y=Axis("RMS error of θ / α", log=True, limits=(FLOOR, 3.0)),
     )
-    return Plot(name, f"Work and precision: {title.lower()}", panels=panels, x=x, y=y)
 
 
 def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
@@ -463,17 +467,13 @@ def _batches(
             f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
             f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
         )
-        lines = [
-            (case, [row for row in times if row.case == case.name and row.error_95 > 0.0])
-            for case in timings.CASES
-        ]
         series = [
             Series(
                 f"{case.name}: {case.words}",
-                [row.error_95 for row in rows],
-                [1e6 * row.cpu for row in rows],
+                [row.error_95 for row in times if row.case == case.name and row.error_95 > 0.0],
+                [1e6 * row.cpu for row in times if row.case == case.name and row.error_95 > 0.0],
             )
-            for case, rows in lines
+            for case in timings.CASES
         ]
         yield Plot(
             "batches",
@@ -485,28 +485,32 @@ def _batches(
             "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
         )
     if starts:
-        rows = [[start.cache, start.importing, start.first_simulation] for start in starts]
-        columns = [
-            text("cache", "compile cache"),
-            Column("importing", "import", "s"),
-            Column("first_simulation", "first run", "s"),
-        ]
-        yield Table("cold-starts", columns, rows, "Cold starts")
+        yield Table(
+            "cold-starts",
+            [
+                text("cache", "compile cache"),
+                Column("importing", "import", "s"),
+                Column("first_simulation", "first run", "s"),
+            ],
+            [[start.cache, start.importing, start.first_simulation] for start in starts],
+            "Cold starts",
+        )
     if sizes:
         threads = sorted({one.threads for one in sizes})
         wall = {(one.runs, one.threads): 1e6 * one.wall for one in sizes}
-        columns = [
-            Column("runs"),
-            *(Column(f"threads_{n}", f"{n} thread{'s' * (n > 1)}", "μs a run") for n in threads),
-        ]
-        rows = [
-            [count, *(wall.get((count, n)) for n in threads)]
-            for count in dict.fromkeys(one.runs for one in sizes)
-        ]
         yield Table(
             "batch-sizes",
-            columns,
-            rows,
+            [
+                Column("runs"),
+                *(
+                    Column(f"threads_{n}", f"{n} thread{'s' * (n > 1)}", "μs a run")
+                    for n in threads
+                ),
+            ],
+            [
+                [count, *(wall.get((count, n)) for n in threads)]
+                for count in dict.fromkeys(one.runs for one in sizes)
+            ],
             "Cost of a batch against its size",
             "Random pulses, packing included.",
             on="page",

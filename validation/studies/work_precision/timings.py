@@ -576,14 +576,8 @@ def _started(model: Any) -> Any:
     return data
 
 
-def _found(root: ET.Element, path: str) -> ET.Element:
-    element = root.find(path)
-    assert element is not None
-    return element
-
-
 def _solid(root: ET.Element) -> None:
-    body = _found(root, "worldbody/body")
+    body = next(root.iter("body"))
     for joint in body.findall("joint"):
         body.remove(joint)
     body.insert(0, ET.Element("freejoint"))
@@ -591,10 +585,10 @@ def _solid(root: ET.Element) -> None:
 
 def _flagged(root: ET.Element) -> None:
     """Energies, two sensors, and a touch of actuation that nobody reads."""
-    option = _found(root, "option")
+    option = next(root.iter("option"))
     flags = option.find("flag")
     (ET.SubElement(option, "flag") if flags is None else flags).set("energy", "enable")
-    ET.SubElement(_found(root, "worldbody/body"), "site", {"name": "centre"})
+    ET.SubElement(next(root.iter("body")), "site", {"name": "centre"})
     sensors = ET.SubElement(root, "sensor")
     ET.SubElement(sensors, "accelerometer", {"site": "centre"})
     ET.SubElement(sensors, "gyro", {"site": "centre"})
@@ -602,7 +596,7 @@ def _flagged(root: ET.Element) -> None:
 
 def _unpaired(root: ET.Element) -> None:
     """No contact with the wall that is out of reach."""
-    contact = _found(root, "contact")
+    contact = next(root.iter("contact"))
     for pair in contact.findall("pair"):
         if "floor" not in (pair.get("geom1"), pair.get("geom2")):
             contact.remove(pair)
@@ -610,7 +604,7 @@ def _unpaired(root: ET.Element) -> None:
 
 def _all_collide(root: ET.Element) -> None:
     """Every corner with every surface, found by the engine's broad phase in place of the pairs."""
-    root.remove(_found(root, "contact"))
+    root.remove(next(root.iter("contact")))
     collides = {"contype": "1", "conaffinity": "1", "condim": "3", "friction": "1 0 0"}
     for geom in root.iter("geom"):
         geom.attrib.update(collides)
