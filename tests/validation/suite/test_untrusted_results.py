@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, _sealed
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -74,6 +74,10 @@ def edited(path: Path, change: Callable[[Any], Any]) -> None:
     path.write_text(json.dumps(walk(json.loads(path.read_text()))))
 
 
+def sealed(path: Path, content: dict[str, Any]) -> None:
+    Store(path.parents[1]).put_record(path.parent.name, path.stem, content)
+
+
 DAMAGE: dict[str, Callable[[Path], Any]] = {
     "a figure edited": lambda path: edited(
         path, lambda value: 0.5 * value + 7.0 if isinstance(value, float) else value
@@ -92,10 +96,10 @@ DAMAGE: dict[str, Callable[[Path], Any]] = {
     ),
     "not text": lambda path: path.write_bytes(b"\xff\xfe\x00"),
     "deep": lambda path: path.write_text("[" * 100_000),
-    "another shape, well hashed": lambda path: path.write_text(
-        _sealed(path.stem, {"figures": 7, "peaks": [1], "outcome": 3})
+    "another shape, well hashed": lambda path: sealed(
+        path, {"figures": 7, "peaks": [1], "outcome": 3}
     ),
-    "empty, well hashed": lambda path: path.write_text(_sealed(path.stem, {})),
+    "empty, well hashed": lambda path: sealed(path, {}),
 }
 
 
