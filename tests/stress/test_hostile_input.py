@@ -27,14 +27,7 @@ from rockcheck.scenes import History, InputError, load_scene
 from rockcheck.scenes.recordings import read_components
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.store import (
-    COMPARISONS,
-    HISTORIES,
-    SUFFIXES,
-    TABLE,
-    Store,
-    name_of,
-)
+from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, name_of
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
 
@@ -359,7 +352,7 @@ def test_a_record_names_no_file_but_its_own(tmp_path, stored):
     record = tmp_path / "histories" / "a.json"
     files = json.loads(record.read_text())["content"]["files"]
     for name in ("x" * 5000, "/../../../../etc/passwd", "\0", "\ud800"):
-        store.put_record(HISTORIES, "a", {"files": {**files, name: "0"}})
+        store.put_record("histories", "a", {"files": {**files, name: "0"}})
         assert store.get("a") is None
 
 

@@ -73,9 +73,8 @@ class Planned(Task):
         part = f", from {self.numbers.start}" if self.ensemble else ""
         return f"{self.place}, {self.variant.label}{part}"
 
-    @property
-    def work(self) -> workers.Task | workers.BatchTask:
-        """The work for a worker."""
+    def play(self) -> workers.Played:
+        """The history, or the peaks of a batch."""
         model: dict[str, Any] = {
             "label": self.variant.label,
             "family": self.variant.family_name,
@@ -83,9 +82,11 @@ class Planned(Task):
             "search_path": self.variant.search_path,
         }
         if self.ensemble is None:
-            return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
+            return workers.play(
+                workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
+            )
         scenes = tuple(self.ensemble.drawn(self.scene, n) for n in self.numbers)
-        return workers.BatchTask(scenes=scenes, **model)
+        return workers.play(workers.BatchTask(scenes=scenes, **model))
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on

@@ -162,11 +162,6 @@ class SuiteStudy(Study):
         """All cells and batches of models that are installed."""
         return in_order([item for item in self.items if item in done or item not in self.failures])
 
-    @staticmethod
-    def play(task: Planned) -> workers.Played:
-        """The history, or the peaks of a batch."""
-        return workers.play(task.work)
-
     def file(self, task: Any) -> str:
         """Name of the cell's files."""
         return str(task.name)
@@ -390,44 +385,45 @@ class SuiteStudy(Study):
             label: list(found)
             for label, found in groupby(batches, key=lambda batch: batch.variant.label)
         }
-        played = {label: [self._batch(part) for part in found] for label, found in by_model.items()}
-        peaks = {
-            label: tuple(peak for one in found for peak in one.peaks)
-            for label, found in played.items()
-        }
-        outcomes = {
-            label: tuple(outcome for one in found for outcome in one.outcomes)
-            for label, found in played.items()
-        }
+        played = {label: self._together(parts) for label, parts in by_model.items()}
         samples = {
-            label: Sample(np.array(peaks[label], dtype=float), outcomes[label]) for label in peaks
+            label: Sample(np.array(one.peaks, dtype=float), one.outcomes)
+            for label, one in played.items()
         }
         whole = EnsembleRecord(
             name=ensemble.name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
-            peaks=peaks,
-            outcomes=outcomes,
+            peaks={label: one.peaks for label, one in played.items()},
+            outcomes={label: one.outcomes for label, one in played.items()},
         )
         cells = [
-            self._ensemble_cell(parts, samples, [one.cost for one in played[label]])
+            self._ensemble_cell(parts, samples, played[label].cost)
             for label, parts in by_model.items()
         ]
         return whole, cells
 
-    def _batch(self, batch: Planned) -> BatchRecord:
-        """The record of a batch; of one that failed, the reason for each of its scenes."""
-        count, reason = len(batch.numbers), self.failures.get(batch, "")
-        found: BatchRecord = self.records.get(batch) or BatchRecord(
-            peaks=(None,) * count, outcomes=(reason,) * count, cost=CostRecord()
+    def _together(self, batches: Sequence[Planned]) -> BatchRecord:
+        """Batches as one; each scene of a batch that failed has its reason."""
+        found: list[BatchRecord] = [
+            self.records.get(batch)
+            or BatchRecord(
+                peaks=(None,) * len(batch.numbers),
+                outcomes=(self.failures.get(batch, ""),) * len(batch.numbers),
+                cost=CostRecord(),
+            )
+            for batch in batches
+        ]
+        return BatchRecord(
+            peaks=tuple(peak for one in found for peak in one.peaks),
+            outcomes=tuple(outcome for one in found for outcome in one.outcomes),
+            cost=CostRecord(
+                **{name: sum(getattr(one.cost, name) for one in found) for name in ADDED}
+            ),
         )
-        return found
 
     def _ensemble_cell(
-        self,
-        batches: Sequence[Planned],
-        samples: Mapping[str, Sample],
-        costs: Sequence[CostRecord],
+        self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
     ) -> Cell:
         place, label = batches[0].place, batches[0].variant.label
         own, origin, reason = samples[label], self.suite.suite_of(place), ""
@@ -436,7 +432,7 @@ class SuiteStudy(Study):
             reason = f"{own.failures} of {len(own.peaks)} scenes failed; the first: {first}"
         key = provenance.digest("".join(batch.key for batch in batches))
         about = self._about(batches, key, reason)
-        about["cost"] = CostRecord(**{name: sum(getattr(c, name) for c in costs) for name in ADDED})
+        about["cost"] = cost
         if about["status"] != "done":
             return Cell(**about)
         required = self.suite.required(place, label)

@@ -49,6 +49,7 @@ table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. 
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -544,18 +545,12 @@ def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
 
 def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
     for choice in itertools.product(*grid.axes):
-        table: Any = {key: value for key, value in grid.scene.items() if key != "name"}
-        names = [grid.scene["name"]] if "name" in grid.scene else []
         for alternative in choice:
             if not isinstance(alternative.get("name"), str):
                 raise InputError("each alternative needs a name", "grid.axes")
-            names.append(alternative["name"])
-            table = _merged(
-                table, {key: value for key, value in alternative.items() if key != "name"}
-            )
-        yield scene_from(
-            {**table, "name": "-".join(map(str, names))}, folder=folder, default_name="scene"
-        )
+        names = [str(part["name"]) for part in (grid.scene, *choice) if "name" in part]
+        table = functools.reduce(_merged, choice, grid.scene)
+        yield scene_from({**table, "name": "-".join(names)}, folder=folder, default_name="scene")
 
 
 def _merged(base: Any, change: Any) -> Any:

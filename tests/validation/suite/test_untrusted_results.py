@@ -74,8 +74,9 @@ def edited(path: Path, change: Callable[[Any], Any]) -> None:
     path.write_text(json.dumps(walk(json.loads(path.read_text()))))
 
 
-def sealed(path: Path, content: dict[str, Any]) -> None:
-    Store(path.parents[1]).put_record(path.parent.name, path.stem, content)
+def sealed(path, content):
+    """Replace a record by another one with its right hash."""
+    Store(path.parent.parent).put_record(path.parent.name, path.stem, content)
 
 
 DAMAGE: dict[str, Callable[[Path], Any]] = {
