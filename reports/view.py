@@ -196,10 +196,10 @@ class SceneView:
     @cached_property
     def drawn(self) -> dict[str, dict[str, Array]]:
         """The `values` up to the fall, NaN from there on."""
-        standing = {model: self.t <= self.falls.get(model, math.inf) for model in self.values}
         return {
-            m: {name: np.where(standing[m], v, math.nan) for name, v in columns.items()}
-            for m, columns in self.values.items()
+            model: {name: np.where(stands, column, math.nan) for name, column in columns.items()}
+            for model, columns in self.values.items()
+            for stands in (self.t <= self.falls.get(model, math.inf),)
         }
 
     @cached_property

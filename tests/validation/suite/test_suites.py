@@ -1,7 +1,5 @@
 """Suite files: combinations of scenes, variants of models, and faults told in one line."""
 
-from __future__ import annotations
-
 import pytest
 
 from rockcheck.scenes import InputError
