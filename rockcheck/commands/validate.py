@@ -188,7 +188,7 @@ def run(
 
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    models = [(one.family_name, one.settings) for one in suite.models.values()]
+    models = [(one.family, one.settings) for one in suite.models.values()]
     said = ", may compile first" if any(compiles(*one) for one in models) else ""
     with progress(f"{suite.name}{said}") as told:
         how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}

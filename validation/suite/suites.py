@@ -76,6 +76,7 @@ from rockcheck.scenes.files import (
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import build, check_allowed, family, is_own
+from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
@@ -148,17 +149,6 @@ class SuiteFile(Frozen):
 
 
 @dataclass(frozen=True)
-class ModelVariant:
-    """A model of a suite: label, name of its family, and settings."""
-
-    label: str
-    family_name: str
-    settings: Mapping[str, Any]
-    #: Folders in which a user-defined model may lie: the suite's.
-    search_path: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
 class Suite:
     """A suite, ready to run: every scene and every model's settings are validated."""
 
@@ -169,7 +159,7 @@ class Suite:
     reference: str
     model_form: str
     scenes: Mapping[str, Scene]
-    models: Mapping[str, ModelVariant]
+    models: Mapping[str, Work]
     tolerances: Tolerances = field(repr=False)
     #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table
     #: `[tolerances]`.
@@ -204,7 +194,7 @@ class Suite:
             self,
         )
 
-    def cells(self) -> Iterator[tuple[Scene, ModelVariant]]:
+    def cells(self) -> Iterator[tuple[Scene, Work]]:
         """All cells, scene by scene."""
         return (
             (suite.scenes[scene], suite.models[model])
@@ -212,7 +202,7 @@ class Suite:
             for scene, model in _played(suite.scenes, suite.models)
         )
 
-    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, ModelVariant]]:
+    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
         """All ensembles with the scene that they are drawn from, model by model."""
         return (
             (ensemble, base, model)
@@ -268,7 +258,7 @@ class Suite:
         """
         if place.against == OWN_FIGURES:
             return "exact" if place.what.definition.exact else "absolute"
-        families = [self.models[label].family_name for label in (place.model, place.against)]
+        families = [self.models[label].family for label in (place.model, place.against)]
         if "measured" in families:
             return "measured"
         scene = (
@@ -425,7 +415,7 @@ def _check_names(
 
 
 def _tolerances(
-    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, ModelVariant]
+    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, Work]
 ) -> Tolerances:
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
@@ -441,7 +431,7 @@ def _tolerances(
     return tolerances
 
 
-def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
+def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
     for scene in scenes:
         yield from (
@@ -484,7 +474,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
 
 def _variant(
     label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]
-) -> ModelVariant:
+) -> Work:
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
@@ -499,9 +489,11 @@ def _variant(
             check_allowed(name, allow_code)
         except InputError as error:
             raise InputError(error.reason, f"models.{printable(label)}") from None
-        return ModelVariant(label, name, settings, (str(folder.absolute()),))
+        return Work(
+            label=label, family=name, settings=settings, search_path=(str(folder.absolute()),)
+        )
     build(name, settings)
-    return ModelVariant(label, name, settings)
+    return Work(label=label, family=name, settings=settings)
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:

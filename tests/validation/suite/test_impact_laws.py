@@ -10,10 +10,11 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute.store import COMPARISONS, Store
+from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import ModelVariant, load_suite
+from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import markdown, summary
 
 # Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no
@@ -200,7 +201,7 @@ def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> 
         "mujoco": [],
     }.items():
         assert list(under_other_laws(scene, suite.models[name])) == laws
-    assert under_other_laws(scene, ModelVariant("paper", "ebm", {})) == {}
+    assert under_other_laws(scene, Work(label="paper", family="ebm", settings={})) == {}
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:
