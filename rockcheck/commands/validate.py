@@ -41,22 +41,6 @@ from rockcheck.validation.suite.tables import finding_of, summary
 #: The folder of the trend's page.
 TREND = "trend"
 Strictness = Literal["worse", "both"]
-SuiteArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[SUITE]",
-        help="A named suite or a .toml file (default: paper).",
-        autocompletion=suite_names,
-    ),
-]
-WhatArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[SUITE or SCENE]",
-        help="Named, or a .toml file (default: suite paper).",
-        autocompletion=suite_names,
-    ),
-]
 
 
 @dataclass(frozen=True)
@@ -90,7 +74,14 @@ class OfScene:
 
 
 def run(
-    what: WhatArgument = None,
+    what: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SUITE or SCENE]",
+            help="Named, or a .toml file (default: suite paper).",
+            autocompletion=suite_names,
+        ),
+    ] = None,
     of_scene: OfScene = OfScene(),
     played: Played = Played(),
     force: Annotated[
@@ -213,7 +204,14 @@ def tell_faults(finished: Run, folder: Path) -> None:
 
 
 def accept(
-    suite: SuiteArgument = None,
+    suite: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SUITE]",
+            help="A named suite or a .toml file (default: paper).",
+            autocompletion=suite_names,
+        ),
+    ] = None,
     reason: Annotated[
         str | None,
         typer.Option(
