@@ -35,7 +35,7 @@ from rockcheck.validation.suite.comparing import (
 )
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run, Strict
-from rockcheck.validation.suite.suites import ModelVariant, Suite
+from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import (
     MEASURES,
     OWN_FIGURES,
@@ -101,11 +101,13 @@ class SuiteStudy(Study):
 
     def __init__(self, suite: Suite, folder: Path) -> None:
         self.suite, self.store = suite, Store(folder)
-        limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
+        limits = [suite.suite_of(name).given.limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
         asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
         self.cells = [
-            self._planned(scene, variant, asked if suite.suite_of(scene.name).uncertainty else {})
+            self._planned(
+                scene, variant, asked if suite.suite_of(scene.name).given.uncertainty else {}
+            )
             for scene, variant in suite.cells()
         ]
         self.batches = [
@@ -118,32 +120,30 @@ class SuiteStudy(Study):
         self.read_back: set[Planned] = set()
         self.records: dict[Planned, Any] = {}  # `CellRecord`, `BatchRecord`
         self.failures = {
-            item: missing
-            for item in self.items
-            if (missing := not_installed(item.variant.family_name))
+            item: missing for item in self.items if (missing := not_installed(item.variant.family))
         }
         self.traces: set[Planned] = set()
         self.compared: dict[str, list[Cell]] = {}
 
     def _planned(
-        self, scene: Scene, variant: ModelVariant, depends: Mapping[str, Any], **of: Any
+        self, scene: Scene, variant: workers.Work, depends: Mapping[str, Any], **of: Any
     ) -> Planned:
         own, settings = self.suite.suite_of(scene.name), {**variant.settings, **depends}
         if "ensemble" in of:
             own = self.suite.suite_of(of["ensemble"].name)
-        kind = variant.family_name
+        kind = variant.family
         return Planned(
             scene,
             variant,
             variant.label,
             provenance.cell_key(scene, kind, settings, variant.search_path),
-            own.uncertainty,
+            own.given.uncertainty,
             **of,
-            seconds=own.limits.seconds,
+            seconds=own.given.limits.seconds,
             compiles=compiles(kind, variant.settings),
         )
 
-    def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[Planned]:
+    def _batches(self, ensemble: Ensemble, base: Scene, variant: workers.Work) -> Iterator[Planned]:
         """An ensemble in batches.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
@@ -226,7 +226,7 @@ class SuiteStudy(Study):
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
-            description=suite.description,
+            description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             reference=suite.reference,
             model_form=suite.model_form,
@@ -235,7 +235,9 @@ class SuiteStudy(Study):
             cells=tuple(cells),
             ensembles=tuple(ensembles),
             inputs=inputs,
-            printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
+            printed=tuple(
+                name for name in suite.scenes if suite.suite_of(name).given.print_figures
+            ),
             faults=tuple(
                 f"tolerance [{place}] has no cell in the suite"
                 for place in suite.tolerances
@@ -262,8 +264,8 @@ class SuiteStudy(Study):
         """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
         place, variant = parts[0].place, parts[0].variant
         status = "failed" if reason else "done"
-        if missing := not_installed(variant.family_name):
-            status = "absent" if has_wheel(variant.family_name) else "unavailable"
+        if missing := not_installed(variant.family):
+            status = "absent" if has_wheel(variant.family) else "unavailable"
         traced = [f"{FAULTS}/{part.name}.txt" for part in parts if part in self.traces]
         return {
             "scene": place,
@@ -275,7 +277,7 @@ class SuiteStudy(Study):
             "read_back": all(part in self.read_back for part in parts),
             "traceback": traced[0] if traced else "",
             # in a user's own model an exception is that model's fault, not rockcheck's
-            "unexpected": bool(traced) and not is_own(variant.family_name),
+            "unexpected": bool(traced) and not is_own(variant.family),
         }
 
     def _cell(self, planned: Planned, reference: Cell | None) -> Cell:

@@ -1,12 +1,8 @@
 """What is read back is not trusted: a result that was damaged, edited or exchanged is found, and
 played or compared again."""
 
-from __future__ import annotations
-
 import json
 import os
-import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -47,10 +43,7 @@ ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch) -> Callable[[], Run]:
-    monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
+def run(tmp_path, faulty) -> Callable[[], Run]:
     (tmp_path / "mine.toml").write_text(SUITE)
 
     def run() -> Run:
