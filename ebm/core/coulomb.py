@@ -1,4 +1,23 @@
-"""Coulomb's friction behind its four doors: `expand`, `locate`, `advance` and `after_event`."""
+"""Coulomb's friction behind its four doors: `expand`, `locate`, `advance` and `after_event`.
+
+How to add a law of friction: a module beside this one, with the same doors and `LOOKS_AHEAD`.
+
+- `expand`: the series PHI to Q of the mode, in the pivot's frame (see `ebm.core.motion`); in the
+  state `order`, `place` and `length`.
+- `locate`: `tau` and `guard`. `fill_guards`, then `drop` for the cone and slip guards that the law
+  has not, then `first_event`.
+- `advance`: the law's own variable at the end of the step; a field of STATE, set by `march.begin`.
+- `after_event`, at the start, after an impact and after a guard: the mode that follows,
+  `modes.slacken` where nothing was struck, and the event (`tell`).
+- `LOOKS_AHEAD`: whether rest may be skipped to the next time at which abs(u) leaves its limit
+  (`ebm.core.rest`).
+
+Its constants stand in SETTING (`ebm.natural.setting_of`). Impacts have Coulomb's friction, mu_s and
+mu_k of SETTING: say what these are. Its loop is a `play` in `ebm.core.march` and a line in `LOOPS`;
+then `EventBasedModel` (`friction`, `name`, `check`, `decides`), a family in
+`validation.execute.models` and a look in `reports.style`, `rockcheck warm`, and the players of the
+stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's integration.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,20 @@ that stay open. A guard is a linear combination of the series of a step (positio
 their rates; GUARDS lists them, and a table in the workspace holds the weights that a mode gives
 them. The first root of a guard is an event; the signs with which they leave zero select the mode
 (see ebm.core.modes).
+
+How to add a guard:
+
+1. `ebm.core.names`: a member of `Guard`. Its place is its priority at one instant, and up to
+   FAR_GAP a guard is a gap, whose end is an impact. No other name in `ebm` may be the same.
+2. A line in `GUARDS`, and in `fill_guards` its weights, positive as long as the mode may last.
+3. `rock_guards_hold`: ROCK takes a short cut past the table, so that a guard of ROCK is bounded
+   there, too.
+4. `ebm.core.coulomb._release` and `ebm.core.bouc_wen._follow` say which event its end is. A new one
+   is a member of `Event` with a line in `EVENT_NAMES`, and stands in the glossary.
+
+A guard ends its mode, and takes part in the choice of the next one (`ebm.core.modes.wrong_by`): it
+is not negative in a mode that may begin. What only tells, as the passing of an angle, is no guard:
+`ebm.core.moving.advance` finds the top of a swing so, by a root of its own, and `note` writes it.
 """
 
 from __future__ import annotations
