@@ -31,7 +31,15 @@ from rockcheck.reports.show.words import (
 )
 from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, label_of, looks, save, stamp_of, undrawn
 from rockcheck.scenes.errors import inert
-from rockcheck.scenes.writing import json_text, made, markdown_table, table_text, write_whole
+from rockcheck.scenes.writing import (
+    finite,
+    json_text,
+    made,
+    markdown_table,
+    script_text,
+    table_text,
+    write_whole,
+)
 from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
@@ -202,8 +210,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     site = Site(folder, f"rockcheck: {found.title}", above)
     site.assets()
     if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
-        text = json_text(live).replace("<", "\\u003c")
-        write_whole(folder / "curves.js", f"window.rockcheckCurves = {text};\n")
+        write_whole(folder / "curves.js", script_text("window.rockcheckCurves", finite(live)))
     return site.page(
         "index.html",
         "finding.html",

@@ -269,9 +269,8 @@ class EnsembleView:
 
 
 def _distribution(of: Distribution | None) -> str:
-    if of is None:
-        return ""
-    if of.uniform is not None:
+    if of and of.uniform:
         return f"uniform {number(of.uniform[0])} to {number(of.uniform[1])}"
-    assert of.lognormal is not None
-    return f"lognormal, median {number(of.lognormal[0])}, σ {number(of.lognormal[1])}"
+    if of and of.lognormal:
+        return f"lognormal, median {number(of.lognormal[0])}, σ {number(of.lognormal[1])}"
+    return ""

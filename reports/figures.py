@@ -284,7 +284,7 @@ def _decades(fine: float, largest: float) -> dict[float, str]:
     top = math.floor(math.log10(max(largest, fine)))
     low = max(math.ceil(math.log10(fine)), top - 2)
     ticks = {0.0: "0"}
-    for power in {low, top} if low < top else {top}:
+    for power in {min(low, top), top}:
         words = f"10{str(power).translate(SUPERSCRIPTS)}"
         ticks |= {10.0**power: words, -(10.0**power): f"−{words}"}
     return ticks

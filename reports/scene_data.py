@@ -10,7 +10,6 @@ place holds the number of its line, so that lines on which models agree are kept
 from __future__ import annotations
 
 import base64
-import json
 import re
 import zlib
 from collections.abc import Sequence
@@ -27,11 +26,6 @@ from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, SceneView
 from rockcheck.scenes import Scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS, Record
 from rockcheck.scenes.writing import write_whole
-
-
-def packed(values: ArrayLike) -> str:
-    """Values as base64 of little-endian float32."""
-    return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
 
 
 def packed_lines(lines: Sequence[ArrayLike]) -> str:
@@ -111,12 +105,6 @@ def payload(view: SceneView) -> dict[str, Any]:
         ],
     }
     return {**data, "lines": packed_lines(lines)}
-
-
-def script(view: SceneView) -> str:
-    """The payload as a script that assigns it to `rockcheck`, written in ASCII."""
-    text = json.dumps(payload(view), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    return f"window.rockcheck = {text};\n"
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

@@ -23,7 +23,7 @@ from rockcheck.reports.figures import (
     thumbnail,
     write_figures,
 )
-from rockcheck.reports.scene_data import script, write_scene_file
+from rockcheck.reports.scene_data import payload, write_scene_file
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import drawn_by, kind_of, looks, save, save_as, stamp_in
 from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
@@ -32,7 +32,7 @@ from rockcheck.scenes import InputError, experience
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import MOST_BYTES, head_of
-from rockcheck.scenes.writing import made, write_whole
+from rockcheck.scenes.writing import made, script_text, write_whole
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.execute.provenance import digest
@@ -184,7 +184,8 @@ class _Pages:
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
         """Write a scene's figures and data; returns what its page shows beside the view."""
         write_figures(view, made(self.folder, PAGES, FIGURES))
-        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", script(view))
+        data = script_text("window.rockcheck", payload(view))
+        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", data)
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
         beside = [None, *self.scenes, None]
         place = beside.index(view)

@@ -81,7 +81,6 @@ def worst_table(run: Run, links: Mapping[str, str]) -> Table:
 
 
 def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
-    """One check: expected and actual value, limit, share of it used, and why it is no pass."""
     figure, weighs = check.figure, "" if check.verdict == "not defined" else check.weighs
     against = f"against {label_of(figure.against)}, " if figure.against else ""
     return [

@@ -196,10 +196,10 @@ class SceneView:
     @cached_property
     def drawn(self) -> dict[str, dict[str, Array]]:
         """The `values` up to the fall, NaN from there on."""
-        standing = {model: self.t <= self.falls.get(model, math.inf) for model in self.values}
         return {
-            m: {name: np.where(standing[m], v, math.nan) for name, v in columns.items()}
-            for m, columns in self.values.items()
+            model: {name: np.where(stands, column, math.nan) for name, column in columns.items()}
+            for model, columns in self.values.items()
+            for stands in (self.t <= self.falls.get(model, math.inf),)
         }
 
     @cached_property
@@ -350,18 +350,24 @@ class SceneView:
     def extent(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top of everything that the block and the walls reach, m."""
         block = self.scene.block
-        wide = [-block.half_width, block.half_width]
-        tall = [0.0, 2.0 * block.half_height]
+        faces = [
+            (block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0)
+            for wall in self.scene.walls
+        ]
+        wide = [np.array([-block.half_width, block.half_width, *faces])]
+        tall = [np.array([0.0, 2.0 * block.half_height])]
         for columns in self.values.values():
-            theta, x, y = columns["theta"] * block.alpha, columns["x"], columns["y"]
-            across = block.half_diagonal * np.sin(np.abs(theta) + block.box_angle)
-            up = block.half_diagonal * np.cos(block.box_angle - np.abs(theta))
-            with np.errstate(invalid="ignore"):
-                wide += [_least(x - across), -_least(-x - across)]
-                tall += [_least(y - up), -_least(-y - up)]
-        for wall in self.scene.walls:
-            wide.append((block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0))
-        return min(wide), max(wide), min(tall), max(tall)
+            tilt, x, y = np.abs(columns["theta"] * block.alpha), columns["x"], columns["y"]
+            across = block.half_diagonal * np.sin(tilt + block.box_angle)
+            up = block.half_diagonal * np.cos(block.box_angle - tilt)
+            wide += [x - across, x + across]
+            tall += [y - up, y + up]
+        left, right, bottom, top = (
+            float(edge(np.concatenate(places)))
+            for places in (wide, tall)
+            for edge in (np.nanmin, np.nanmax)
+        )
+        return left, right, bottom, top
 
 
 def scene_views(
@@ -410,7 +416,6 @@ def all_figures(cell: Cell) -> list[Figure]:
 
 
 def _history_of(cell: Cell, folder: Path) -> History | str:
-    """The cell's history, or why there is none."""
     if cell.status != "done" or cell.history is None:
         return cell.reason or "no history"
     try:
@@ -418,8 +423,3 @@ def _history_of(cell: Cell, folder: Path) -> History | str:
         return History.load(within(folder, cell.history))
     except InputError as error:
         return str(error)
-
-
-def _least(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.min(known)) if len(known) else 0.0

@@ -145,9 +145,8 @@ class Block(Frozen):
     @property
     def gyration_squared(self) -> float:
         """Moment of inertia about the centre of mass per unit mass, m^2."""
-        if self.moment_of_inertia is None:
-            return self.half_diagonal**2 / 3.0
-        return self.moment_of_inertia / (1.0 if self.mass is None else self.mass)
+        moment, mass = self.moment_of_inertia, 1.0 if self.mass is None else self.mass
+        return self.half_diagonal**2 / 3.0 if moment is None else moment / mass
 
     def pivot(self, side: Literal["left", "right"]) -> Pivot:
         """The lower corner on that side.
@@ -176,8 +175,7 @@ class Block(Frozen):
     @property
     def slope(self) -> float:
         """Base acceleration over g at which rocking begins: tan alpha of the weaker pivot."""
-        pivot = self.weaker_pivot
-        return pivot.arm / pivot.height
+        return self.weaker_pivot.arm / self.weaker_pivot.height
 
     @property
     def radius(self) -> float:

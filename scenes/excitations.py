@@ -164,11 +164,10 @@ class Record(Motion):
     @classmethod
     def _read_file(cls, data: Any) -> Any:
         if isinstance(data, dict) and "file" in data:
-            extra = {"unscaled", "source", "notes"} & data.keys()
             if {"pga", "scale"} <= data.keys():
                 raise InputError("cannot be given together with scale", "pga")
-            if extra:
-                raise InputError("cannot be given together with file", sorted(extra)[0])
+            if extra := {"unscaled", "source", "notes"} & data.keys():
+                raise InputError("cannot be given together with file", min(extra))
             data = dict(data)
             path = data.pop("file")
             if not isinstance(path, str | Path):

@@ -260,8 +260,7 @@ def uncertain_scene(
     names = list(spreads)
     matrix = np.eye(len(names))
     for key, value in correlations.items():
-        pair = [part.strip() for part in key.split(",")]
-        where = f"{CORRELATION}.{key}"
+        pair, where = [part.strip() for part in key.split(",")], f"{CORRELATION}.{key}"
         if len(pair) != 2 or pair[0] == pair[1]:
             raise InputError(
                 "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where

@@ -157,11 +157,9 @@ class History(Shown):
         """
         if not self.outcome.startswith("overturned"):
             return None
-        event = next((one.t for one in self.event_list if one.kind == self.outcome), None)
-        if event is not None:
-            return event
-        down = np.flatnonzero(np.abs(self.channels["theta"]) >= LYING)
-        return float(self.channels["t"][down[0] if down.size else -1])
+        down = [*np.flatnonzero(np.abs(self.channels["theta"]) >= LYING), -1]
+        lies = float(self.channels["t"][down[0]])
+        return next((one.t for one in self.event_list if one.kind == self.outcome), lies)
 
     @property
     def fate(self) -> str:

@@ -12,6 +12,7 @@ import re
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -134,13 +135,8 @@ def _cells(values: Sequence[object]) -> Sequence[object]:
     Numbers are checked one by one only if there is a NaN, the one value that does not equal itself.
     """
     if len(values) and isinstance(values[0], str):
-        shown = {value: _cell(value, None) for value in set(values)}
-        return [shown[value] for value in values]
-    return (
-        [_cell(value, None) for value in values]
-        if any(map(operator.ne, values, values))
-        else values
-    )
+        return list(map(cache(_cell), values))
+    return [_cell(value) for value in values] if any(map(operator.ne, values, values)) else values
 
 
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
@@ -157,7 +153,7 @@ def _text(text: str) -> str:
     return f"'{text}" if _FORMULA.match(text) else text
 
 
-def _cell(value: object, digits: int | None) -> object:
+def _cell(value: object, digits: int | None = None) -> object:
     if isinstance(value, str):
         return _text(value)
     if value is None or (isinstance(value, float) and math.isnan(value)):
@@ -180,6 +176,12 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def script_text(place: str, value: Any) -> str:
+    """A value as a script that assigns it to `place`; a page may hold it."""
+    text = json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return f"{place} = {text};\n"
 
 
 def json_text(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -14,9 +15,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Event, History
+from rockcheck.commands.cli import main
+from rockcheck.scenes import Block, Event, History
 from rockcheck.scenes.errors import NotInstalled
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import not_installed
+
+# What tests of several folders share beside fixtures.
+sys.path.insert(0, str(Path(__file__).parent / "ebm"))
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -89,7 +95,6 @@ def pytest_runtest_call() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Iterator[None]:
-    """What became of a test."""
     report = yield
     _judged(report)
     return report
@@ -97,16 +102,51 @@ def pytest_runtest_makereport() -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report() -> Iterator[None]:
-    """What became of a file that was read for tests."""
     report = yield
     _judged(report)
     return report
+
+
+@pytest.fixture(scope="session")
+def block() -> Block:
+    """The paper's block, alpha = 0.25."""
+    return PAPER_BLOCK
 
 
 @pytest.fixture
 def but_progress() -> Callable[[str], list[str]]:
     """The lines on stderr that do not say how far a long work is: on a slow machine any is long."""
     return lambda err: [line for line in err.splitlines() if not HOW_FAR.search(line)]
+
+
+@pytest.fixture
+def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
+    """What a command says on stdout and stderr, once its exit code is as expected."""
+
+    def say(*words: str, code: int = 0) -> tuple[str, str]:
+        capsys.readouterr()
+        assert main(list(words)) == code
+        return capsys.readouterr()
+
+    return say
+
+
+@pytest.fixture
+def told(typed: Callable[..., tuple[str, str]]) -> Callable[..., Any]:
+    """What a command says as JSON."""
+    return lambda *words, code=0: json.loads(typed(*words, "--json", code=code)[0])
+
+
+@pytest.fixture
+def refused(typed: Callable[..., tuple[str, str]]) -> Callable[..., str]:
+    """The one line on stderr of a command that refuses what it is given."""
+
+    def say(*words: str) -> str:
+        (line,) = typed(*words, code=2)[1].splitlines()
+        assert line.startswith("rockcheck: ")
+        return line
+
+    return say
 
 
 @pytest.fixture(scope="module")
@@ -207,11 +247,15 @@ def made() -> Callable[..., History]:
 
 
 @pytest.fixture
-def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The working folder is an empty one, but for the models of `faulty.py`, imported afresh."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(
-        Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path / "faulty.py"
-    )
-    monkeypatch.syspath_prepend(tmp_path)
+def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The models of `faulty.py` lie in `tmp_path`, and are imported afresh."""
+    shutil.copy(Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))  # a suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
+
+
+@pytest.fixture
+def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, faulty: None) -> None:
+    """The working folder is an empty one, but for the models of `faulty.py`."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)

@@ -6,8 +6,6 @@ infers them) has rows of its own: numba runs it unseen, and only the runs with N
 count for it. A share is of lines and branches together, as coverage.py has it.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -10,8 +10,6 @@ Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), a
 pytest is given, too.
 """
 
-from __future__ import annotations
-
 import argparse
 import ast
 import copy

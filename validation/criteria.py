@@ -207,11 +207,7 @@ class Criterion:
 
 
 def _sliding(estimate: Callable[[Scene, Base], float]) -> Callable[..., tuple[bool, float | None]]:
-    def says(scene: Scene, base: Base) -> tuple[bool, float | None]:
-        slip = estimate(scene, base)
-        return slip > 0.0, slip
-
-    return says
+    return lambda scene, base: ((slip := estimate(scene, base)) > 0.0, slip)
 
 
 def _rocking(scene: Scene, base: Base) -> tuple[bool, float | None]:

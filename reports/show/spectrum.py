@@ -12,7 +12,7 @@ import numpy as np
 from rockcheck.ebm.spectrum import LEFT, Spectrum
 from rockcheck.reports.style import LOOKS, PAGE, figure_style
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes.writing import script_text, write_whole
 from rockcheck.validation.finding import Plot
 
 if TYPE_CHECKING:
@@ -202,9 +202,8 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
     ]
     played = [panel["motions"] for panel in panels]
     for what, content in (("Nodes", data), ("Histories", played)):
-        text = json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
         place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
-        write_whole(folder / f"{plot.name}.{what.lower()}.js", f"{place} = {text};\n")
+        write_whole(folder / f"{plot.name}.{what.lower()}.js", script_text(place, content))
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]
 
 

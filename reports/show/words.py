@@ -69,7 +69,7 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     """(label, text) of a scene's block, floor, walls, excitation and duration."""
-    block = scene.block
+    block, tilt = scene.block, scene.initial_rotation
     mu, mu_s, e = scene.floor.friction, scene.floor.mu_s, scene.floor.restitution
     floor = f"μ {number(mu)}{f' (static {number(mu_s)})' if mu_s != mu else ''}"
     floor += f", restitution {number(e)}" if e else ""
@@ -88,16 +88,14 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         ("floor", floor),
         ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
         ("base", excitation_words(scene.excitation)),
+        ("vertical", excitation_words(scene.vertical) if scene.vertical.kind != "rest" else ""),
         (
             "duration",
             f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms",
         ),
+        ("starts at", f"θ = {number(tilt / block.alpha)} α" if tilt else ""),
     ]
-    if scene.vertical.kind != "rest":
-        facts.insert(5, ("vertical", excitation_words(scene.vertical)))
-    if scene.initial_rotation:
-        facts.append(("starts at", f"θ = {number(scene.initial_rotation / block.alpha)} α"))
-    return facts
+    return [fact for fact in facts if fact[1]]
 
 
 def mass_facts(block: Block) -> list[tuple[str, str]]:

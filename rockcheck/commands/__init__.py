@@ -30,7 +30,7 @@ from rich.progress import (
 )
 
 from rockcheck.reports.style import ENDINGS, kind_of, save_as
-from rockcheck.scenes import History, InputError, named_scenes
+from rockcheck.scenes import InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.recordings.sets import Odd
@@ -46,12 +46,10 @@ OUT = Path("rockcheck-report")
 Choice = TypeVar("Choice", bound=str)
 
 
-def out_option(page: str = "index.html") -> Any:
-    """--out, of a command that writes this page."""
-    return typer.Option("--out", help=f"Folder to write; the page to open is {page} in it.")
-
-
-OutOption = Annotated[Path, out_option()]
+OutOption = Annotated[
+    Path,
+    typer.Option("--out", help="Folder to write; the page to open is index.html in it."),
+]
 JobsOption = Annotated[
     int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")
 ]
@@ -132,12 +130,6 @@ def tell_missing() -> None:
     for name in FAMILIES:
         if missing := not_installed(name):
             console().print(f"left out: {name}, {missing}", style="yellow", soft_wrap=True)
-
-
-def tell_notes(history: History, of: str = "") -> None:
-    """Print the notes of a history, a line each; `of` names the history."""
-    for note in history.notes:
-        console().print(f"note{f' on {of}' if of else ''}: {note}", style="yellow", soft_wrap=True)
 
 
 def tell_left_out(names: Sequence[str], hint: str = "") -> None:

@@ -64,7 +64,7 @@ def run(
     """
     if plot is not None:
         check_file(plot, "--plot")
-    reading = reading_of(read)
+    reading = Reading(**dict(setting_of(word, "--read") for word in read or ()))
     found: list[tuple[Path, Recording]] = []
     faults: list[Odd] = []
     asked = files_of(files)
@@ -87,11 +87,6 @@ def run(
         tell_left_out(faults[1:])
         more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
-
-
-def reading_of(words: Sequence[str] | None) -> Reading:
-    """The options of a reader from `--read`. Raises `InputError`."""
-    return Reading(**dict(setting_of(word, "--read") for word in words or ()))
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:

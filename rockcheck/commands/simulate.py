@@ -21,7 +21,6 @@ from rockcheck.commands import (
     save_figure,
     scene_names,
     setting_of,
-    tell_notes,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
@@ -90,7 +89,8 @@ def run(
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
     moved = ", ".join([history.fate, *motion.words(), took])
     console().print(f"{what.name}, {model}: {moved}")
-    tell_notes(history)
+    for note in history.notes:
+        console().print(f"note: {note}", style="yellow", soft_wrap=True)
     for path in histories:
         console().print(f"history: {path}", soft_wrap=True)
     for path in figures:

@@ -29,17 +29,15 @@ from rockcheck.scenes.errors import NotInstalled, printable, unknown_name
 #: Nothing begins later than this; what was left out begins with the next run.
 MINUTES = 25.0
 
-BenchmarkArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="[WHAT]",
-        help="all, ebm (batches), models (work and precision), skipping, or convergence.",
-    ),
-]
-
 
 def benchmark(
-    what: BenchmarkArgument = "all",
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="[WHAT]",
+            help="all, ebm (batches), models (work and precision), skipping, or convergence.",
+        ),
+    ] = "all",
     out: OutOption = OUT / "benchmark",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings.")] = False,
     jobs: JobsOption = None,
@@ -55,16 +53,13 @@ def benchmark(
     studied(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)
 
 
-StressArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break)."
-    ),
-]
-
-
 def stress(
-    what: StressArgument = "all",
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="[WHAT]", help="all, runs (random scenes) or maps (where engines break)."
+        ),
+    ] = "all",
     played: Played = Played(OUT / "stress"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Some thousand runs, below a minute.")

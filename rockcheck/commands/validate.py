@@ -41,22 +41,6 @@ from rockcheck.validation.suite.tables import finding_of, summary
 #: The folder of the trend's page.
 TREND = "trend"
 Strictness = Literal["worse", "both"]
-SuiteArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[SUITE]",
-        help="A named suite or a .toml file (default: paper).",
-        autocompletion=suite_names,
-    ),
-]
-WhatArgument = Annotated[
-    str | None,
-    typer.Argument(
-        metavar="[SUITE or SCENE]",
-        help="Named, or a .toml file (default: suite paper).",
-        autocompletion=suite_names,
-    ),
-]
 
 
 @dataclass(frozen=True)
@@ -90,7 +74,14 @@ class OfScene:
 
 
 def run(
-    what: WhatArgument = None,
+    what: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SUITE or SCENE]",
+            help="Named, or a .toml file (default: suite paper).",
+            autocompletion=suite_names,
+        ),
+    ] = None,
     of_scene: OfScene = OfScene(),
     played: Played = Played(),
     force: Annotated[
@@ -188,7 +179,7 @@ def run(
 
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    models = [(one.family_name, one.settings) for one in suite.models.values()]
+    models = [(one.family, one.settings) for one in suite.models.values()]
     said = ", may compile first" if any(compiles(*one) for one in models) else ""
     with progress(f"{suite.name}{said}") as told:
         how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
@@ -213,7 +204,14 @@ def tell_faults(finished: Run, folder: Path) -> None:
 
 
 def accept(
-    suite: SuiteArgument = None,
+    suite: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SUITE]",
+            help="A named suite or a .toml file (default: paper).",
+            autocompletion=suite_names,
+        ),
+    ] = None,
     reason: Annotated[
         str | None,
         typer.Option(

@@ -308,8 +308,7 @@ def _recording(
     unit = settled_unit(path, about.unit, reading)
     values: list[float] = []
     for n, line in enumerate(lines[index : index + about.height], index + 1):
-        here = min(about.across, count - len(values))
-        ends = range(0, here * about.width, about.width)
+        ends = range(0, min(about.across, count - len(values)) * about.width, about.width)
         words = [line[end : end + about.width].strip() for end in ends]
         if "" in words:
             break

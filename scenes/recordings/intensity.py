@@ -37,10 +37,8 @@ def peak_velocity(record: Recording) -> float:
 def arias(record: Recording) -> float:
     """Arias intensity pi/(2 g) int a^2 dt in m/s, exact for straight lines between samples."""
     before, after = record.samples[:-1], record.samples[1:]
-    squares = (
-        float(np.sum(before * before + before * after + after * after)) / 3.0 * record.time_step
-    )
-    return math.pi / (2.0 * GRAVITY_OF_RECORDS) * squares
+    squares = float(np.sum(before * before + before * after + after * after)) / 3.0
+    return math.pi / (2.0 * GRAVITY_OF_RECORDS) * (squares * record.time_step)
 
 
 def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:

@@ -42,18 +42,13 @@ def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, b
     found: dict[Path, bool] = {}
     for word in words:
         path = record_path(str(word), folder)
-        if path.is_dir():
-            inside = _files(path.iterdir())
-        elif path.exists() or not any(sign in path.name for sign in "*?["):
+        if not path.is_dir() and (path.exists() or not any(sign in path.name for sign in "*?[")):
             found[path] = True
             continue
-        else:
-            inside = _files(path.parent.glob(path.name))
+        inside = _files(path.iterdir() if path.is_dir() else path.parent.glob(path.name))
         if not inside:
-            raise InputError(
-                f"{printable(path)}:"
-                f" {'a folder without files' if path.is_dir() else 'no such files'}"
-            )
+            what = "a folder without files" if path.is_dir() else "no such files"
+            raise InputError(f"{printable(path)}: {what}")
         found = dict.fromkeys(inside, False) | found
     return found
 
@@ -124,8 +119,7 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
     horizontal: dict[Path, list[str]] = {}
     upward: dict[Path, list[Recording]] = {}
     for path, components in _read(paths, reading)[0].items():
-        up = [one for one in components if is_vertical(path, one)]
-        if up:
+        if up := [one for one in components if is_vertical(path, one)]:
             upward[path] = up
         if len(up) < len(components) or reading.component is not None or reading.column is not None:
             horizontal[path] = [name for name, _ in motions_of([path], reading)[0]]

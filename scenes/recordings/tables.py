@@ -78,11 +78,10 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
     """
     if reading.component is not None:
         raise fault(path, "a table has columns; give the option column in place of component")
-    skipped = reading.header_lines or 0
     rows: NumberedLines = [
         (n, line)
         for n, line in enumerate(lines, 1)
-        if n > skipped and line.strip() and line[0] not in "#%"
+        if n > (reading.header_lines or 0) and line.strip() and line[0] not in "#%"
     ]
     if not rows:
         raise fault(path, "empty")
@@ -300,10 +299,9 @@ def _step_of(
     slack = digit * (1.0 + 1e-6) if tells or reading.time_step else 0.0
     rounding = 1e-9 * max(1.0, float(np.max(np.abs(time))))
     printed = float(f"{round(mean / digit) * digit:.12g}") if digit > 1e-12 else mean
-    rate = 1.0 / max(round(1.0 / mean), 1)
     candidates = [
         (printed, min(rounding, 0.01 * mean)),
-        (rate, slack),
+        (1.0 / max(round(1.0 / mean), 1), slack),
         (mean, max(0.01 * mean, slack) + 1e-9),
     ]
     if reading.time_step is not None:

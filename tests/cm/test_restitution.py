@@ -68,30 +68,15 @@ WALL = {
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
-@pytest.mark.parametrize("case", FLOOR)
-def test_floor_has_the_restitution_asked_for(case, e):
-    assert measured_restitution(ContinuousModel(), scene(floor=e, **FLOOR[case])) == pytest.approx(
-        e, abs=1e-3
-    )
-
-
-@pytest.mark.parametrize("e", RESTITUTIONS)
-@pytest.mark.parametrize("case", WALL)
-def test_wall_has_the_restitution_asked_for(case, e):
-    assert measured_restitution(ContinuousModel(), scene(wall=e, **WALL[case])) == pytest.approx(
-        e, abs=1e-3
-    )
-
-
-@pytest.mark.parametrize("e", RESTITUTIONS)
-def test_restitution_of_a_soft_contact_is_within_a_hundredth(e):
-    model = ContinuousModel(penetration=1e-6)
-    assert measured_restitution(model, scene(floor=e, **FLOOR["rocking block"])) == pytest.approx(
-        e, abs=0.01
-    )
-    assert measured_restitution(model, scene(wall=e, **WALL["top corner"])) == pytest.approx(
-        e, abs=0.01
-    )
+@pytest.mark.parametrize(
+    ("struck", "case"), [("floor", case) for case in FLOOR] + [("wall", case) for case in WALL]
+)
+def test_floor_and_wall_have_the_restitution_asked_for(struck, case, e):
+    strike = scene(**{struck: e} | (FLOOR | WALL)[case])
+    assert measured_restitution(ContinuousModel(), strike) == pytest.approx(e, abs=1e-3)
+    if case in ("rocking block", "top corner"):
+        soft = ContinuousModel(penetration=1e-6)
+        assert measured_restitution(soft, strike) == pytest.approx(e, abs=0.01)
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)

@@ -1,9 +1,6 @@
 """What changed: `rockcheck compare` between two finished runs, and `validate --history` over
 many."""
 
-from __future__ import annotations
-
-import json
 import subprocess
 from pathlib import Path
 
@@ -45,30 +42,26 @@ def ran(out: str, offset: float, *words: str, model: str = "Still", code: int = 
 
 
 @pytest.fixture
-def diff(capsys):
-    """The exit code and the changes between two folders."""
+def diff(told):
+    """The changes between two folders, of which the command ends with that code."""
 
-    def asked(a: str, b: str) -> tuple[int, list[dict]]:
-        capsys.readouterr()
-        code = main(["compare", a, b, "--json"])
-        told = json.loads(capsys.readouterr().out)
-        assert told["exit_code"] == code
-        return code, told["changes"]
+    def asked(a: str, b: str, code: int) -> list[dict]:
+        found = told("compare", a, b, code=code)
+        assert found["exit_code"] == code
+        return found["changes"]
 
     return asked
 
 
-def test_the_same_run_has_no_change(diff, capsys):
+def test_the_same_run_has_no_change(diff, typed):
     ran("b", 0.001)
-    assert diff("a", "b") == (0, [])
-    assert main(["compare", "a", "b"]) == 0
-    assert capsys.readouterr().out == "mine: nothing changed\n"
+    assert diff("a", "b", 0) == []
+    assert typed("compare", "a", "b")[0] == "mine: nothing changed\n"
 
 
 def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     ran("b", 0.00102)
-    code, changes = diff("a", "b")
-    assert code == 0
+    changes = diff("a", "b", 0)
     assert {change["what"] for change in changes} == {"figure"}
     moved = {
         change["name"]: (change["before"], change["after"])
@@ -79,10 +72,9 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     assert after / before == pytest.approx(1.02, rel=1e-6)
 
 
-def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, capsys):
+def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
     ran("b", 0.002, code=1)
-    code, changes = diff("a", "b")
-    assert code == 1
+    changes = diff("a", "b", 1)
     verdicts = [
         (c["scene"], c["model"], c["name"], c["before"], c["after"])
         for c in changes
@@ -94,33 +86,30 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, capsys):
         ("short", "near", "theta_peak against still", "pass", "fail"),
     ]
     assert [change["what"] for change in changes[:3]] == ["verdict"] * 3
-    assert main(["compare", "a", "b"]) == 1
-    out = capsys.readouterr().out
+    out = typed("compare", "a", "b", code=1)[0]
     assert "mine: 3 verdicts, " in out
     assert max(map(len, out.splitlines())) <= 80
-    code, back = diff("b", "a")
-    assert (code, back[0]["before"], back[0]["after"]) == (1, "fail", "pass")
+    back = diff("b", "a", 1)[0]
+    assert (back["before"], back["after"]) == ("fail", "pass")
 
 
 def test_a_cell_that_is_gone_is_a_change(diff):
     run = Run.load("a")
     Path("b").mkdir()
     run.model_copy(update={"cells": run.cells[:1]}).save(Path("b"))
-    code, changes = diff("a", "b")
-    assert code == 1
+    changes = diff("a", "b", 1)
     assert [(c["model"], c["before"], c["after"]) for c in changes if c["what"] == "cell"] == [
         ("near", "there", None)
     ]
 
 
-def test_runs_of_two_suites_are_not_compared(capsys):
+def test_runs_of_two_suites_are_not_compared(refused):
     run = Run.load("a")
     Path("b").mkdir()
     run.model_copy(update={"suite": "other"}).save(Path("b"))
-    assert main(["compare", "a", "b"]) == 2
-    assert capsys.readouterr().err == "rockcheck: the runs are of two suites, mine and other\n"
-    assert main(["compare", "a", "none"]) == 2
-    assert "no finished run here" in capsys.readouterr().err
+    line = "rockcheck: the runs are of two suites, mine and other"
+    assert refused("compare", "a", "b") == line
+    assert "no finished run here" in refused("compare", "a", "none")
 
 
 def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
@@ -146,7 +135,7 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes():
 
 
 @pytest.mark.needs("git")
-def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
+def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     for words in (
         ["init", "-q"],
         ["add", "mine.toml"],
@@ -155,9 +144,10 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys):
         subprocess.run(["git", *words], check=True)
     ran("a", 0.001, "--history", "runs.jsonl")
     ran("a", 0.00105, "--history", "runs.jsonl")
-    capsys.readouterr()
-    assert main(["validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"]) == 0
-    assert "3 runs, 0 figures moved since " in capsys.readouterr().out
+    assert (
+        "3 runs, 0 figures moved since "
+        in typed("validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl")[0]
+    )
     moments = read_history(Path("runs.jsonl"))
     head = subprocess.run(
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True

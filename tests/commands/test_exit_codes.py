@@ -1,7 +1,5 @@
 """Exit codes mean one thing each: whoever reads what is said, and whatever goes wrong inside."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -12,13 +10,13 @@ import pytest
 from filelock import FileLock
 
 from rockcheck.commands import cli, report
-from rockcheck.commands.cli import EXIT_CODES, main
+from rockcheck.commands.cli import EXIT_CODES
 from rockcheck.validation.suite.results import Run
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 
 
-def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
+def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, typed):
     """70, one line, and the traceback in a file that only the user can read."""
 
     def broken(*_: object) -> None:
@@ -27,8 +25,7 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(cli, "app", lambda **_: broken())
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
-    assert main(["scenes"]) == 70
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = typed("scenes", code=70)[1].splitlines()
     assert line.startswith(
         "rockcheck: a fault of rockcheck itself, ZeroDivisionError: please report it with "
     )
@@ -40,7 +37,7 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, capsys):
         assert told.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
+def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, typed):
     def broken(**_: object) -> None:
         raise RecursionError("too deep")
 
@@ -49,17 +46,15 @@ def test_a_fault_that_cannot_be_written_down_is_told(monkeypatch, capsys):
 
     monkeypatch.setattr(cli, "app", broken)
     monkeypatch.setattr("tempfile.mkstemp", full)
-    assert main(["scenes"]) == 70
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = typed("scenes", code=70)[1].splitlines()
     assert line == (
         "rockcheck: a fault of rockcheck itself, RecursionError:"
         " please report it with this: too deep"
     )
 
 
-def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(capsys):
-    assert main(["--help"]) == 0
-    said = capsys.readouterr().out
+def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
+    said = typed("--help")[0]
     page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text(encoding="utf-8")
     for code, meaning in EXIT_CODES.items():
         assert re.search(rf"^ +{code} +{re.escape(meaning)}$", said, re.MULTILINE), code

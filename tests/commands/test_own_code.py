@@ -1,18 +1,14 @@
 """Nothing that is read is run: a model of the user's own is imported only where the command line
 allows it, and only by a worker."""
 
-from __future__ import annotations
-
 import ast
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.models import build, build_own, check_allowed
 from rockcheck.validation.suite.suites import load_suite
@@ -52,13 +48,10 @@ class Told:
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path, monkeypatch):
+def folder(tmp_path, monkeypatch, faulty):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SCENE)
     (tmp_path / "spy.py").write_text(SPY)
-    shutil.copy(
-        Path(__file__).parents[1] / "validation" / "models" / "faulty.py", tmp_path / "faulty.py"
-    )
     return tmp_path
 
 
@@ -82,7 +75,7 @@ def traces(folder: Path) -> list[str]:
     ],
 )
 @pytest.mark.parametrize("command", ["validate", "accept", "simulate", "spectrum", "conformance"])
-def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
+def test_a_suite_or_a_name_alone_runs_nothing(folder, model, command, refused):
     """One line that names the option; exit 2; nothing is imported."""
     before = set(sys.modules)
     (folder / "mine.toml").write_text(SUITE.replace("{model}", model) + SCENE)
@@ -91,8 +84,7 @@ def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
         "spectrum": ["spectrum", "scene.toml", "--size", "3", "--model", model],
         "conformance": ["conformance", "--engine", model],
     }
-    assert main(words.get(command, [command, "mine.toml"])) == 2
-    (line,) = capsys.readouterr().err.splitlines()
+    line = refused(*words.get(command, [command, "mine.toml"]))
     assert model in line
     assert (
         f"--allow-code {model}" in line or "standard library" in line or "one of your own" in line
@@ -103,11 +95,10 @@ def test_a_suite_or_a_name_alone_runs_nothing(folder, capsys, model, command):
     assert "spy" not in set(sys.modules) - before
 
 
-def test_included_suites_run_nothing_either(folder, capsys):
+def test_included_suites_run_nothing_either(folder, refused):
     (folder / "inner.toml").write_text(SUITE.replace("{model}", "spy:Told") + SCENE)
     (folder / "outer.toml").write_text('reference = "ebm"\ninclude = ["inner.toml"]\n')
-    assert main(["validate", "outer.toml"]) == 2
-    assert "--allow-code spy:Told" in capsys.readouterr().err
+    assert "--allow-code spy:Told" in refused("validate", "outer.toml")
     assert traces(folder) == []
 
 
@@ -124,24 +115,17 @@ def test_included_suites_run_nothing_either(folder, capsys):
         ("no_such_module:Class", "not available in this installation"),
     ],
 )
-def test_what_is_allowed_must_be_a_model(capsys, model, said):
-    assert (
-        main(
-            [
-                "simulate",
-                "scene.toml",
-                "--model",
-                model,
-                "--allow-code",
-                model,
-                "--set",
-                "command=touch ran",
-            ]
-        )
-        == 2
+def test_what_is_allowed_must_be_a_model(model, said, refused):
+    assert said in refused(
+        "simulate",
+        "scene.toml",
+        "--model",
+        model,
+        "--allow-code",
+        model,
+        "--set",
+        "command=touch ran",
     )
-    (line,) = capsys.readouterr().err.splitlines()
-    assert said in line
     assert not Path("ran").exists()
 
 

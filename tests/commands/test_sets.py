@@ -1,10 +1,11 @@
 """Sets of records: one scene by all models under each of them, however the files are named; nothing
 is judged."""
 
-from __future__ import annotations
-
-import json
+import csv
+import importlib.util
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ amplitude = 1.0
 period = 0.5
 """
 CODE = [word for name in ("Still", "Falls", "Bug") for word in ("--allow-code", f"faulty:{name}")]
-STILL = ("--models", "faulty:Still", *CODE, "--jobs", "1", "--no-report", "--json")
+STILL = ("--models", "faulty:Still", *CODE, "--jobs", "1", "--no-report")
 
 
 def motion(gain: float) -> np.ndarray:
@@ -51,15 +52,6 @@ def files(in_an_empty_folder):
     at2("records/RSN1_H1.AT2", 0.1, "180")
     at2("records/RSN1_H2.AT2", 0.2, "270")
     at2("records/RSN1_V.AT2", 0.3, "UP")
-
-
-@pytest.fixture
-def told(capsys):
-    def typed(*words: str, code: int = 0) -> dict:
-        assert main(list(words)) == code
-        return json.loads(capsys.readouterr().out)
-
-    return typed
 
 
 @pytest.mark.parametrize(
@@ -131,7 +123,7 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told):
     assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
 
 
-def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
+def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
     at2("records/RSN2_H1.AT2", 0.15, "180")
     at2("records/RSN2_V.AT2", 0.05, "UP")
     found = told("validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL)
@@ -147,25 +139,17 @@ def test_the_vertical_component_may_be_a_file_of_its_own(told, capsys):
     ]
     assert peaks == pytest.approx([0.3, 0.3, 0.05], rel=1e-2)
     Path("records/RSN2_H1.AT2").unlink()
-    assert (
-        main(["validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL])
-        == 2
-    )
-    assert (
-        "RSN2_V.AT2: a vertical component, and no horizontal one is named alike"
-        in capsys.readouterr().err
+    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in refused(
+        "validate", "rack.toml", "--records", "records", "--read", "vertical=true", *STILL
     )
 
 
-def test_a_scene_that_there_is_not_is_the_only_line(capsys, monkeypatch):
+def test_a_scene_that_there_is_not_is_the_only_line(refused, monkeypatch):
     monkeypatch.setattr(
         "rockcheck.validation.execute.models.not_installed",
         lambda name: "not installed" if name == "drake" else "",
     )
-    assert main(["validate", "nothere"]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
+    assert refused("validate", "nothere")
 
 
 def test_all_models_are_those_that_are_installed(told):
@@ -177,7 +161,6 @@ def test_all_models_are_those_that_are_installed(told):
         "--set",
         "mujoco.time_step=1e-3",
         "--no-report",
-        "--json",
     )
     models = [cell["model"] for cell in found["cells"]]
     assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
@@ -188,24 +171,18 @@ def test_all_models_are_those_that_are_installed(told):
         assert cell["model"] == "ebm-unilateral" or cell["apart_alpha"] < 0.01
 
 
-def test_what_falls_is_told_with_its_time_and_without_a_peak(capsys):
-    assert (
-        main(
-            [
-                "validate",
-                "rack.toml",
-                "--records",
-                "records/RSN1_H1.AT2",
-                "--models",
-                "faulty:Falls,faulty:Still",
-                *CODE,
-                "--jobs",
-                "1",
-            ]
-        )
-        == 0
-    )
-    out = capsys.readouterr().out
+def test_what_falls_is_told_with_its_time_and_without_a_peak(typed):
+    out = typed(
+        "validate",
+        "rack.toml",
+        "--records",
+        "records/RSN1_H1.AT2",
+        "--models",
+        "faulty:Falls,faulty:Still",
+        *CODE,
+        "--jobs",
+        "1",
+    )[0]
     (line,) = (line for line in out.splitlines() if "Falls" in line)
     assert line.split() == [
         "faulty:Falls",
@@ -240,13 +217,12 @@ def test_a_model_that_fails_is_exit_3(told):
         "faulty:Bug,faulty:Still",
         *CODE,
         "--no-report",
-        "--json",
         code=3,
     )
     assert [cell["status"] for cell in found["cells"]] == ["failed", "done"]
 
 
-def test_validate_plays_a_scene_and_says_so(monkeypatch, capsys):
+def test_validate_plays_a_scene_and_says_so(monkeypatch):
     for name in FAMILIES.keys() - {"ebm", "ebm-unilateral", "measured"}:
         monkeypatch.delitem(FAMILIES, name)
     assert main(["validate", "rack.toml", "--no-report"]) == 0
@@ -315,14 +291,11 @@ def test_a_suite_has_tables_of_records():
         (("validate", "wrong.toml"), "records.scenes: unknown scene 'rakk'; did you mean 'rack'"),
     ],
 )
-def test_slips_are_named(capsys, words, said):
+def test_slips_are_named(words, said, refused):
     Path("wrong.toml").write_text(
         SUITE.replace(', "other.toml"', "").replace('["rack"]', '["rakk"]'), encoding="utf-8"
     )
-    assert main([*words, *(CODE if words[0] == "validate" else ())]) == 2
-    err = capsys.readouterr().err
-    assert said in err
-    assert err.count("\n") == 1
+    assert said in refused(*words, *(CODE if words[0] == "validate" else ()))
 
 
 @pytest.mark.parametrize(
@@ -333,7 +306,7 @@ def test_slips_are_named(capsys, words, said):
     ],
 )
 def test_a_population_takes_the_same_sets(told, words):
-    found = told("assess", "rack.toml", "--levels", "1:2:2", *words, "--json")
+    found = told("assess", "rack.toml", "--levels", "1:2:2", *words)
     assert [one["motion"] for one in found["tables"]["motions"]] == ["RSN1_H1", "RSN1_H2"]
     assert found["left_out"] == list(words[2:3] and ["RSN1_V.AT2"])
 
@@ -341,7 +314,7 @@ def test_a_population_takes_the_same_sets(told, words):
 @pytest.mark.parametrize("command", ["validate", "assess"])
 def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, command):
     Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
-    rest = STILL if command == "validate" else ("--levels", "0.1:1:2", "--json")
+    rest = STILL if command == "validate" else ("--levels", "0.1:1:2")
     words = ("--records", "records") if command == "validate" else ("records",)
     left_out = told(command, "rack.toml", *words, *rest)["left_out"]
     assert left_out[0] == "RSN1_V.AT2"
@@ -351,3 +324,74 @@ def test_a_file_of_a_folder_that_is_no_record_is_named_and_left_out(told, comman
 def test_a_shipped_record_shakes_a_scene_by_its_name(told):
     found = told("validate", "rack.toml", "--records", "elcentro_1940_ns.csv", *STILL)
     assert [cell["scene"] for cell in found["cells"]] == ["rack, elcentro_1940_ns"]
+
+
+def makers() -> ModuleType:
+    """What makes files of records: that of the readers' tests."""
+    spec = importlib.util.spec_from_file_location(
+        "made_records", Path(__file__).parents[1] / "scenes" / "test_recordings.py"
+    )
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["made_records"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def type_(typed, but_progress):
+    """Types a command, which must end well; what it said on stdout."""
+
+    def line(words: str) -> str:
+        out, err = typed(*words.split())
+        assert but_progress(err) == []
+        return out
+
+    return line
+
+
+@pytest.mark.long
+def test_from_a_v2_record_to_a_report_and_a_curve_in_four_commands(type_):
+    Path("station.V2").write_bytes(makers().cosmos_three())
+    Path("rack.toml").unlink()
+    type_("new rack.toml")
+    text = Path("rack.toml").read_text(encoding="utf-8")
+    Path("rack.toml").write_text(
+        text.replace("half_width = 0.20", "half_width = 0.25").replace("gap = 0.03", "gap = 0.05"),
+        encoding="utf-8",
+    )
+    scene = load_scene("rack.toml")
+    assert (scene.block.half_width, scene.walls[0].gap) == (0.25, 0.05)
+
+    understood = type_("record station.V2")
+    assert [f"PGA         {peak} g" in understood for peak in (0.31, 0.27, 0.15)] == [True] * 3
+
+    told = type_(
+        "validate rack.toml --records station.V2 --models ebm,ebm-unilateral,cm,mujoco"
+        " --set mujoco.time_step=1e-3"
+    )
+    assert "left out: station.V2 up (vertical" in told
+    assert "report: rockcheck-report/index.html\n" in told
+    run = Run.load("rockcheck-report")
+    assert tuple(run.by_scene()) == ("rack, station 360 deg", "rack, station 90 deg")
+    assert [cell.status for cell in run.cells] == ["done"] * 8
+    assert [run.load_scene(name).excitation.peak for name in run.by_scene()] == pytest.approx(
+        [0.31, 0.27], abs=1e-7
+    )
+    for place in run.by_scene():
+        assert (
+            Path("rockcheck-report")
+            / "pages"
+            / f"{place.replace(', ', '-').replace(' ', '-')}.html"
+        ).exists()
+
+    told = type_("assess rack.toml station.V2 --levels 0.05:2:8")
+    assert "report: rockcheck-report/assess/index.html\n" in told
+    rows = list(
+        csv.DictReader(
+            Path("rockcheck-report/assess/ida.csv").read_text(encoding="utf-8").splitlines()
+        )
+    )
+    assert len(rows) == 2 * 2 * 8  # components, directions, intensities
+    assert {row["record"] for row in rows} == {"station 360 deg", "station 90 deg"}

@@ -11,8 +11,6 @@ Pages of studies hold commands of many minutes; these are run with `@pytest.mark
 in their `--quick` form.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

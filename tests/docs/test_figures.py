@@ -1,8 +1,6 @@
 """The figures that pages state, computed again; tables between markers are those of the kept runs;
 pages keep to their budget of words."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

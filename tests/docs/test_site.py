@@ -1,8 +1,6 @@
 """The documentation as a site: builds strictly, and a real browser opens every page from the file
 system."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,20 +1,15 @@
 """What the tests of the event-based models share."""
 
-from __future__ import annotations
-
-import math
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
+from cases import ricker
+from stepping import play
 
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
-
-# For `stepping`, which the tests below share.
-sys.path.insert(0, str(Path(__file__).parent))
+from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core.state import workspace
+from rockcheck.scenes import Block, Floor, Scene, Wall
 
 
 @dataclass(frozen=True)
@@ -45,20 +40,9 @@ Runner = Callable[..., Run]
 
 
 @pytest.fixture(scope="session")
-def block() -> Block:
-    """The paper's block, alpha = 0.25."""
-    return PAPER_BLOCK
-
-
-@pytest.fixture(scope="session")
 def run_to_end() -> Runner:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls
     it."""
-    from stepping import play
-
-    from rockcheck.ebm import EventBasedModel, natural
-    from rockcheck.ebm.core.state import workspace
-
     work = workspace()
 
     def run(
@@ -93,17 +77,13 @@ def pulse_scene(block: Block) -> Callable[..., Scene]:
         **more: object,
     ) -> Scene:
         walls = [Wall(side=wall[0], gap=wall[1], restitution=wall[2])] if wall else []
-        pulse = Ricker(
-            amplitude=amplitude * 9.81 * math.tan(block.alpha),
-            period=2.0 * math.pi / (frequency * block.frequency_parameter),
-        )
         return Scene(
             **{
                 "name": "pulse",
                 "block": block,
                 "floor": Floor(friction=mu),
                 "walls": walls,
-                "excitation": pulse,
+                "excitation": ricker(frequency, amplitude, block),
                 "duration": 5.0,
             }
             | more

@@ -1,7 +1,5 @@
 """Blocks that are not homogeneous, and scenes of them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
@@ -31,7 +29,6 @@ def scene_of(block: Block = RACK, mu: float = 0.6, duration: float = 4.0, **more
 
 
 def random_scene(rng: np.random.Generator) -> Scene:
-    """A loaded block beside walls or not, under a pulse."""
     b, h = rng.uniform(0.1, 0.5), rng.uniform(0.4, 1.5)
     place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
     block = Block(

@@ -310,7 +310,6 @@ class PaperModel:
         return self
 
     def after(self, mode: Mode, kind: str, t: float, y: State) -> tuple[Mode | None, State]:
-        """The mode after an event, and the state in it."""
         if kind == "floor impact":
             if mode.Sw:  # every contact plastic: flush rest
                 return None, np.array([y[0], 0.0, 0.0, 0.0])
@@ -365,8 +364,6 @@ class PaperModel:
         return self.scene.duration, y, "end"
 
     def step(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
-        """Integrates one mode to its end."""
-
         def rates(t: float, y: State) -> list[float]:
             x2, turn, _, _, _ = self.motion(m, t, y)
             return [y[2], y[3], x2, turn]

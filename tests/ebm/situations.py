@@ -4,8 +4,6 @@
 and nowhere else.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import NamedTuple

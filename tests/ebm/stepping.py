@@ -1,19 +1,17 @@
 """Runs of the event core, as its parts take them, for tests that call these one by one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
 from rockcheck.ebm.packed import pack, state_for
-from rockcheck.scenes import Block, Scene
+from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
 def nothing() -> Records:
@@ -49,7 +47,6 @@ def put(motion: Any, values: Sequence[float]) -> None:
 
 
 def six(motion: Any) -> np.ndarray:
-    """x, y, theta and their rates."""
     return np.array(motion.tolist())
 
 
@@ -62,9 +59,33 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     return states[0]
 
 
+def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) -> None:
+    """Finite rows, and no corner by more than `reach` m in the floor or in a wall."""
+    x, y, theta = (history.channels[name] for name in ("x", "y", "theta"))
+    assert np.all(np.isfinite([x, y, theta]))
+    assert np.min(kinematics.pivot_height(scene.block, y, theta)) > -reach
+    for wall in scene.walls:
+        assert np.min(kinematics.wall_gap(scene, wall.side, x, theta)) > -reach
+
+
 TILTED = {"family": Family.TILT, "pull": 1}
 ROCKS = TILTED | {"pivot": Pivot.STICK}
 
 
 def block_of(alpha: float, radius: float = 1.0) -> Block:
     return Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
+
+
+def setting_of(
+    block: float | Block,
+    friction: float = 0.5,
+    restitution: float = 0.0,
+    walls: Sequence[Wall] = (),
+    **how: Any,
+) -> Any:
+    """A block, or one of R = 1 m and this alpha, as the compiled code has it: free to hop."""
+    shape = block if isinstance(block, Block) else block_of(block)
+    floor = Floor(friction=friction, restitution=restitution)
+    scene = Scene(name="block", block=shape, floor=floor, walls=walls, duration=1.0)
+    free = {"unilateral": True, "no_slip": False, "energy_cap": False}
+    return natural.setting_of(scene, **free | how)

@@ -1,14 +1,11 @@
 """Motions and impacts whose answer is known on paper."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from situations import shentons
 from stepping import block_of
 
 from rockcheck.ebm import EventBasedModel
@@ -187,42 +184,3 @@ def test_bounce_heights(restitution, block):
         np.testing.assert_allclose(arc, restitution ** (2 * n) * drop, rtol=1e-11)
         t = following
     assert not motion["theta"].any()
-
-
-# --- Shenton (1996): how a block at rest starts to move
-
-
-@pytest.mark.parametrize("pivot", PIVOTS)
-@pytest.mark.parametrize("friction", ["equal", "static above kinetic"])
-def test_shentons_map(friction, pivot):
-    """1,000 random frictions, slendernesses and accelerations, both ways, for each pivot and kind
-    of friction.
-
-    Static above kinetic friction: a block that starts under an acceleration at which it can stick
-    and rock does not slide.
-    """
-    rng = np.random.default_rng(1996)
-    model = EventBasedModel(pivot=pivot)
-    seen = set()
-    for _ in range(1000):
-        mu_s, alpha, a = (
-            rng.uniform(0.0, 1.33),
-            rng.uniform(0.02, 1.2),
-            10.0 ** rng.uniform(-1.5, 0.5),
-        )
-        mu_k = mu_s if friction == "equal" else mu_s * rng.uniform(0.3, 1.0)
-        side = rng.choice([-1.0, 1.0])
-        scene = scene_of(
-            block_of(alpha),
-            mu_k,
-            0.02,
-            excitation=Record.from_samples([side * a * GRAVITY] * 2, time_step=1.0),
-        )
-        history = model.simulate(scene.replace(floor=Floor(friction=mu_k, static_friction=mu_s)))
-        found = history.channels["mode"][1]
-        expected = shentons(mu_s, mu_k, math.tan(alpha), a)
-        assert found == expected, (mu_s, mu_k, alpha, a)
-        if "rock" in expected:
-            assert np.sign(history.channels["theta"][-1]) == side
-        seen.add(expected)
-    assert seen == {"rest", "slide", "rock", "slide-rock"}

@@ -1,25 +1,17 @@
 """Impacts of random blocks, homogeneous or loaded, against the balances of momentum and the laws of
 restitution and friction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from stepping import block_of, changed, run_at
+from stepping import block_of, changed, run_at, setting_of
 
-from rockcheck.scenes import Block, Floor, Scene
+from rockcheck.ebm.core.laws import contact_impacts as ci, impacts
+from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Landing
+from rockcheck.scenes import Block
 
 # --- impacts (physics in units of R, g and the block's mass)
-
-
-def setting_with(block: Block, **floor: float):
-    """A block as the compiled code has it, free to hop."""
-    from rockcheck.ebm import natural
-
-    scene = Scene(name="block", block=block, floor=Floor(**{"friction": 0.5} | floor), duration=1.0)
-    return natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
 
 
 def loaded(rng: np.random.Generator, block: Block) -> Block:
@@ -41,7 +33,7 @@ def random_floor_impacts(count: int, least: float, most: float, lopsided: bool):
         alpha, w1 = rng.uniform(least, most), -rng.uniform(0.01, 1.0)
         block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
         block = loaded(rng, block) if lopsided else block
-        b = setting_with(block)
+        b = setting_of(block)
         S1 = int(rng.choice([-1, 1]))
         mu_k = rng.uniform(0.0, 0.95 * block.least_painleve_friction if lopsided else 1.3)
         mu_s = mu_k + rng.uniform(0.0, 0.3) * rng.integers(0, 2)
@@ -57,9 +49,6 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
     Squat blocks: where sticking asks for more friction than there is, and slipping cannot turn the
     block, it lands flat.
     """
-    from rockcheck.ebm.core.laws import impacts
-    from rockcheck.ebm.core.names import Landing
-
     forms = set()
     for b, S1, w1, v1, mu_s, mu_k in random_floor_impacts(2000, least, most, lopsided):
         form, w2, v2, p = impacts.floor_impact(b, S1, w1, v1, mu_s, mu_k)
@@ -90,10 +79,7 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
 @pytest.mark.parametrize("alpha", [0.1, 0.25, 0.5])
 def test_floor_impact_sticks_above_its_friction(alpha):
     """Without slip before, the impact sticks from mu = 3 t/(4 + t^2) on, t = tan(alpha)."""
-    from rockcheck.ebm.core.laws import impacts
-    from rockcheck.ebm.core.names import Landing
-
-    t, b = math.tan(alpha), setting_with(block_of(alpha))
+    t, b = math.tan(alpha), setting_of(alpha)
     limit = 3.0 * t / (4.0 + t * t)
     assert (
         impacts.floor_impact(b, 1, -0.5, 0.0, limit + 1e-12, limit + 1e-12)[0] == Landing.HELD_FAST
@@ -105,9 +91,6 @@ def test_floor_impact_sticks_above_its_friction(alpha):
 def test_wall_impact_balances_momentum(lopsided):
     """The cascade of Fig. 3 at 4,000 random blocks and approaches: momentum, restitution, Coulomb's
     law, no pull of the wall."""
-    from rockcheck.ebm.core.laws import impacts
-    from rockcheck.ebm.core.names import Branch
-
     rng = np.random.default_rng(4)
     branches = set()
     for _ in range(4000):
@@ -131,7 +114,7 @@ def test_wall_impact_balances_momentum(lopsided):
             w1, xdot1 = -w1, -xdot1
         e, mu_k = rng.choice([0.0, 1.0, rng.uniform()]), rng.uniform(0.0, 1.2)
         corner = impacts.Corner(S, Sw, s, c, C, share, spin)
-        floor = changed(setting_with(block_of(alpha)), mu_s=mu_k, mu_k=mu_k)
+        floor = changed(setting_of(alpha), mu_s=mu_k, mu_k=mu_k)
         branch, w2, xdot2, n, p, v2 = impacts.wall_impact(floor, corner, e, w1, xdot1)
         branches.add(branch)
         assert n >= 0.0
@@ -162,14 +145,11 @@ def test_wall_impact_balances_momentum(lopsided):
 def test_contact_impact_leaves_no_approach(e, lopsided):
     """Unilateral impacts at 1,000 random states: no touched contact still closes, and without
     restitution no energy is gained."""
-    from rockcheck.ebm.core.laws import contact_impacts as ci
-    from rockcheck.ebm.core.names import CONTACTS, Contact
-
     rng = np.random.default_rng(5)
     for _ in range(1000):
         alpha = rng.uniform(0.05, 0.9)
         block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
-        b = setting_with(
+        b = setting_of(
             block,
             friction=rng.uniform(0.0, min(1.2, 0.95 * block.least_painleve_friction)),
             restitution=e,

@@ -1,11 +1,10 @@
 """Symmetry, similarity and limits: answers that follow from another run without any formula."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
+from stepping import assert_contacts_hold
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
@@ -71,6 +70,19 @@ SCENES = {
         initial_angular_velocity=0.1,
         initial_velocity=0.05,
     ),
+    # Found by `rockcheck stress`: its mirror image differed in the last bit.
+    "sliding between walls": scene_of(
+        block=Block(half_width=0.45239232010061675, half_height=0.891819033612751),
+        floor=Floor(friction=0.0772),
+        walls=[
+            Wall(side="left", gap=0.0, restitution=0.42153884661618235),
+            Wall(side="right", gap=0.00013319196436825637, restitution=0.7813616),
+        ],
+        excitation=Rest(),
+        initial_velocity=1.0375582304532138,
+        duration=0.08,
+        output_step=1e-3,
+    ),
     "squat": scene_of(
         block=Block(half_width=2.0, half_height=1.0),
         floor=Floor(friction=1.2),
@@ -95,7 +107,6 @@ def assert_mirror_images(a: History, b: History) -> None:
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_mirror_image_to_the_bit(pivot, name):
-    """The mirrored scene gives the mirrored history, to the bit."""
     model, scene = EventBasedModel(pivot=pivot), SCENES[name]
     assert_mirror_images(model.simulate(scene), model.simulate(scene.mirrored()))
     assert scene.mirrored().mirrored() == scene
@@ -131,7 +142,6 @@ def test_dynamic_similarity(pivot, scale):
 
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_constant_vertical_acceleration_is_gravity(pivot):
-    """A floor that accelerates up with a is a gravity of g + a."""
     duration, a = 4.0, 3.0
     vertical = Record.from_samples([a, a], time_step=duration + 1.0)
     scene = scene_of(walls=walls(left=0.053, e=0.5), duration=duration)
@@ -226,11 +236,9 @@ def test_walls_and_floor_are_not_entered(pivot, e):
     )
     history = EventBasedModel(pivot=pivot).simulate(scene)
     motion = history.channels
-    for side in ("left", "right"):
-        assert np.min(kinematics.wall_gap(scene, side, motion["x"], motion["theta"])) > -1e-9
+    assert_contacts_hold(scene, history)
     assert {e.kind for e in history.event_list} >= {"uplift", "floor impact", "wall impact"}
     lift = kinematics.pivot_height(PAPER_BLOCK, motion["y"], motion["theta"])
-    assert np.min(lift) > -1e-9
     assert (np.max(lift) > 1e-4) == (pivot == "unilateral")
 
 

@@ -1,7 +1,5 @@
 """The series of loaded blocks against Newton and Euler."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,6 +8,8 @@ from loaded import G, random_scene, scene_of
 from stepping import TILTED, run_at
 
 from rockcheck.ebm import natural
+from rockcheck.ebm.core import bouc_wen, motion
+from rockcheck.ebm.core.names import Pivot, Row
 from rockcheck.scenes import Block, Record, Wall
 
 
@@ -52,9 +52,6 @@ def newton_euler(
 def test_series_begin_with_newton_and_euler(mode, case):
     """Accelerations and forces of the models' series in every mode at 200 random loaded blocks and
     states, to 1e-10."""
-    from rockcheck.ebm.core import motion
-    from rockcheck.ebm.core.names import Pivot, Row
-
     rng = np.random.default_rng(11)
     for _ in range(200):
         b, h = rng.uniform(0.1, 0.5), rng.uniform(0.5, 1.5)
@@ -139,9 +136,6 @@ def test_series_begin_with_newton_and_euler(mode, case):
 def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
     """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that
     turn along a wall."""
-    from rockcheck.ebm.core import bouc_wen
-    from rockcheck.ebm.core.names import Pivot, Row
-
     rng, order = np.random.default_rng(14), 8
     for _ in range(100):
         scene = random_scene(rng).replace(

@@ -1,29 +1,12 @@
 """The models against 960 runs of independent programs (tests/data/README.md says what the columns
 mean)."""
 
-from __future__ import annotations
-
-import csv
-import math
-from pathlib import Path
-
 import numpy as np
 import pytest
+from cases import BILATERAL, UNILATERAL, Row, scene_of
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall, kinematics
-
-DATA = Path(__file__).parents[1] / "data"
-Row = dict[str, str]
-
-
-def rows_of(name: str) -> list[Row]:
-    with (DATA / name).open(newline="") as table:
-        return list(csv.DictReader(table))
-
-
-BILATERAL = rows_of("ebm_ricker_cases.csv")
-UNILATERAL = rows_of("unilateral_ricker_cases.csv")
+from rockcheck.scenes import Scene, kinematics
 
 #: Right wall, gap 3 mm, e = 1, mu = 0.3, omega_p = 3 p, a_p = 6 g tan(alpha). The table has four
 #: wall contacts; there are five: before the last one the block grazes the wall (closing speed below
@@ -46,25 +29,6 @@ def numbered(rows: list[Row]) -> list[object]:
     return [pytest.param(line, row, id=f"line {line}") for line, row in enumerate(rows, 2)]
 
 
-def scene_of(row: Row, block: Block, gravity: float = 9.81) -> Scene:
-    period = 2.0 * math.pi / (float(row["wp_over_p"]) * block.frequency_parameter)
-    wall = (
-        [Wall(side=row["side"], gap=float(row["gap"]), restitution=float(row["e_w"]))]
-        if row["gap"]
-        else []
-    )
-    return Scene(
-        name="reference",
-        block=block,
-        floor=Floor(friction=float(row["mu"])),
-        walls=wall,
-        excitation=Ricker(
-            amplitude=float(row["ap_ratio"]) * gravity * math.tan(block.alpha), period=period
-        ),
-        duration=4.0 * period + 20.0,
-    )
-
-
 def overturning_time(scene: Scene, t: float) -> float:
     return t - scene.excitation.centre
 
@@ -77,7 +41,7 @@ def test_the_tables_are_whole():
 
 
 @pytest.mark.parametrize(("line", "row"), numbered(BILATERAL))
-def test_bilateral_row(line, row, block, run_to_end):
+def test_bilateral_row(line, row, run_to_end):
     """Outcome, final place and time of overturning within 1e-6.
 
     The table's peak was sampled, so that it may lie below the true one, by up to 3.2e-5 alpha, and
@@ -85,7 +49,7 @@ def test_bilateral_row(line, row, block, run_to_end):
     and not for the time at which they overturn: by then a perturbation has been multiplied at every
     contact.
     """
-    scene = scene_of(row, block)
+    scene = scene_of(row)
     run = run_to_end(scene)
     assert run.outcome == row["outcome"]
     rattles = row["e_w"] == "1" and int(row["n_wall"]) > 20
@@ -106,7 +70,7 @@ def test_bilateral_row(line, row, block, run_to_end):
 def test_unilateral_row(line, row, block, run_to_end):
     """Outcome; peak, final place and (plastic walls) time of overturning within 1e-5; the hop,
     which both programs sample, within 5 %."""
-    scene = scene_of(row, block)
+    scene = scene_of(row)
     impacts = "floor-first" if row["depends_on_rule"] == "1" or line == FLUSH_ROW else "moreau"
     run = run_to_end(scene, pivot="unilateral", impacts=impacts)
     assert run.outcome == row["outcome"]
@@ -124,7 +88,7 @@ def test_unilateral_row(line, row, block, run_to_end):
         assert overturning_time(scene, run.t) == pytest.approx(float(row["t_overturn"]), abs=1e-5)
 
 
-def test_pivots_agree_where_nothing_leaves_the_floor(block, run_to_end):
+def test_pivots_agree_where_nothing_leaves_the_floor(run_to_end):
     """The bilateral peak of safe runs that touch no wall is the unilateral table's, where that run
     never hopped."""
     flights = {key_of(row): row for row in UNILATERAL}
@@ -133,7 +97,7 @@ def test_pivots_agree_where_nothing_leaves_the_floor(block, run_to_end):
         other = flights[key_of(row)]
         if row["n_wall"] != "0" or row["outcome"] != "safe" or float(other["max_hop_m"]) > 1e-9:
             continue
-        assert run_to_end(scene_of(row, block)).peak == pytest.approx(
+        assert run_to_end(scene_of(row)).peak == pytest.approx(
             float(other["peak_theta_over_alpha"]), abs=1e-6
         )
         compared += 1

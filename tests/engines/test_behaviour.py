@@ -1,7 +1,5 @@
 """Settings, events, notes, failures and everything else that a user of an engine relies on."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys
@@ -10,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rockcheck import engines
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import Drake, MuJoCo, PyBullet
 from rockcheck.engines.engine import Engine
@@ -36,13 +33,6 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
     )
-
-
-def test_import_loads_no_engine():
-    modules = {engine.module for engine in map(engines.__dict__.get, engines.__all__)}
-    heavy = (modules | {"mujoco", "scipy", "pandas", "numba"}) - {""}
-    code = f"import sys, rockcheck.engines; print(sorted({heavy} & set(sys.modules)))"
-    assert run(code).stdout.strip() == "[]"
 
 
 def test_a_missing_package_is_named(varying_engine, monkeypatch):
@@ -164,7 +154,6 @@ def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
     history = model.simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     found = numerical_uncertainty(model, scene, history)
-    assert found is not None
     assert found.converged
     assert compare(reference, history)["theta_rms"] < found.u_num("theta_rms") < 1e-3
 
@@ -354,8 +343,6 @@ def test_blow_up_is_a_failure(varying_engine, step, block, tmp_path, monkeypatch
 
 
 class Scripted(Engine):
-    """An engine that answers what it is told to."""
-
     name = "scripted"
     answers: dict[str, object]
 

@@ -1,7 +1,5 @@
 """What others use of the repository: the action, the pre-commit hook, the types, the citation."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,8 +1,6 @@
 """A finished run made up without any model: closed-form motions, checks of every verdict, a failed
 cell, hostile names."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path

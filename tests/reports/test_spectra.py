@@ -1,7 +1,5 @@
 """Figures of the spectra."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,8 +1,6 @@
 """The pages of spectra, fragility and incremental dynamic analysis in a real browser: hover, click,
 keys, accessibility."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -60,7 +58,6 @@ def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[flo
     canvas = page.locator(".panel canvas").nth(panel)
     canvas.scroll_into_view_if_needed()
     box = canvas.bounding_box()
-    assert box is not None
     wide, high = box["width"] - 48.0, box["height"] - 30.0
     return box["x"] + 42.0 + (column + 0.5) / SIZE * wide, box["y"] + 4.0 + (
         1.0 - (row + 0.5) / SIZE

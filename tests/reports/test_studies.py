@@ -1,7 +1,5 @@
 """The pages of the studies, made of made-up figures, in a real browser."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

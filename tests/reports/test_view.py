@@ -1,7 +1,5 @@
 """What is shown of a scene: its data, its figures, and what is read off them."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math
@@ -16,7 +14,7 @@ from scipy.integrate import trapezoid
 
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.scene_data import packed, packed_lines, write_scene_file
+from rockcheck.reports.scene_data import packed_lines, write_scene_file
 from rockcheck.reports.show.words import number, ratio, readable
 from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
@@ -26,7 +24,6 @@ from rockcheck.scenes import Block, Floor, InputError, Record, Scene, Sine, Wall
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure, Pair
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite.results import Cell, Check, Run
 
 
@@ -86,7 +83,6 @@ def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
         )
         run = finished.model_copy(update={"cells": cells})
         found = entry(run, run.by_scene()["Free"], "ebm")
-        assert found is not None
         assert (found.outcome, found.apart) == (outcome, apart)
 
 
@@ -192,10 +188,7 @@ def test_the_hop_is_the_trusted_model_s(site: Path) -> None:
     run = Run.load(site)
     views = {view.name: view for view in scene_views(run, site)}
     hop = views["beside a wall"].hop
-    assert hop is not None
     assert (hop["height"], hop["model"]) == (0.004, "ebm-unilateral")
-    text = re.sub(r"\s+", " ", (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8"))
-    assert "here 4 mm high" in text
 
 
 def test_numbers_in_sentences_do_not_break() -> None:
@@ -346,7 +339,7 @@ def test_numbers_for_people() -> None:
         "5.3·10³",
     ]
     assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
-    assert base64.b64decode(packed([1.0])) == b"\x00\x00\x80\x3f"
+    assert zlib.decompress(base64.b64decode(packed_lines([[1.0]]))) == b"\x00\x00\x80\x3f"
 
 
 def test_lines_of_values_are_packed_and_unpacked() -> None:
@@ -385,12 +378,3 @@ def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
 def test_a_folder_without_run_is_bad_input(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no finished run here"):
         write_site(tmp_path)
-
-
-def test_index_says_what_the_models_are(site: Path) -> None:
-    index = re.sub(r"\s+", " ", (site / "index.html").read_text(encoding="utf-8"))
-    assert f"{FAMILIES['ebm-unilateral'].summary}. <strong>The reference</strong>" in index
-    assert (
-        f"{FAMILIES['ebm'].summary}. What separates it from the reference is <strong>model"
-        " form</strong>" in index
-    )

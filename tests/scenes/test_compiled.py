@@ -1,8 +1,6 @@
 """The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own,
 and whole."""
 
-from __future__ import annotations
-
 import gc
 import json
 import os
@@ -20,7 +18,6 @@ import numpy as np
 import pytest
 
 from rockcheck import ebm
-from rockcheck.commands.cli import main
 from rockcheck.commands.warm import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
@@ -262,10 +259,6 @@ def test_no_folder_that_could_be_foreseen(tmp_path, replay):
     assert "no private folder" in replay("0 read, 2 compiled", cache_dir="", user_wide="/dev/null")
 
 
-def test_without_the_compiler(play):
-    assert play("interpreted", NUMBA_DISABLE_JIT="1") == ""
-
-
 def test_everything_can_be_imported_without_the_compiler():
     """NUMBA_DISABLE_JIT=1, as for a debugger."""
     imports = (
@@ -300,7 +293,6 @@ def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path):
             [sys.executable, str(script), how], stdout=subprocess.PIPE, text=True, env=environment
         ) as running:
             try:
-                assert running.stdout is not None
                 assert running.stdout.readline() == "begins\n"
                 time.sleep(1.0)
                 running.send_signal(signal.SIGINT)
@@ -372,12 +364,10 @@ def test_a_long_compilation_is_announced_once_a_package(monkeypatch):
 
 
 @pytest.mark.long
-def test_what_is_compiled_ahead_is_not_compiled_again(capsys):
+def test_what_is_compiled_ahead_is_not_compiled_again(typed):
     """`rockcheck warm` covers what commands need; a second time all of it is there."""
-    assert main(["warm"]) == 0
-    assert "the continuous model" in capsys.readouterr().out
-    assert main(["warm", "--json", "--jobs", "1"]) == 0
-    said = capsys.readouterr()
+    assert "the continuous model" in typed("warm")[0]
+    said = typed("warm", "--json", "--jobs", "1")
     assert list(json.loads(said.out)["seconds"]) == list(PARTS)
     assert said.err == ""
     code = (

@@ -1,7 +1,5 @@
 """Excitations: the paper's pulse, sines and records, and how they begin and end."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Scene files (TOML), and the scenes that come with the package."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

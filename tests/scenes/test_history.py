@@ -1,7 +1,5 @@
 """Histories: tables, saving and loading, and files that are not histories."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
@@ -51,7 +49,6 @@ def history() -> History:
 
 
 def test_save_and_load_round_trip(history, tmp_path):
-    """Every number comes back to the bit."""
     path = tmp_path / "run.csv"
     history.save(path)
     again = History.load(path)

@@ -1,14 +1,12 @@
 """Numbers that are not known exactly: how they are distributed, what is refused, where they stand
 in a scene."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
-from rockcheck.scenes import InputError
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.files import Spread, split, uncertain_scene, with_numbers
 
 
@@ -64,8 +62,6 @@ TABLES = {
 
 
 def made():
-    from rockcheck.scenes import Scene
-
     plain, spreads, _ = split(TABLES)
     return Scene(name="made", floor={"friction": 0.3}, **plain), spreads
 

@@ -1,7 +1,5 @@
 """How strong a recorded motion is, against closed forms."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a notebook shows: escaped tables, and figures made without pyplot."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from html.parser import HTMLParser

@@ -1,8 +1,6 @@
 """Threads that run kernels: what a call gives, and what Ctrl-C leaves of it; and what workers
 announce."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading
@@ -12,12 +10,6 @@ import pytest
 
 from rockcheck.scenes.progress import announce, announcing, interruptible
 from rockcheck.validation.execute.pool import Call, Pool
-
-
-def test_an_interruptible_call_is_the_call_itself():
-    assert interruptible(lambda: 3) == 3
-    with pytest.raises(ZeroDivisionError):
-        interruptible(lambda: 1 // 0)
 
 
 def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():

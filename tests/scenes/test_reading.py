@@ -1,8 +1,6 @@
 """Reading is bounded: whatever a file holds, and whatever it is, it is read or refused within
 seconds and with little memory."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

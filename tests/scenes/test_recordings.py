@@ -1,8 +1,6 @@
 """Records as they come: one motion of three components, whose peaks are known, in every format that
 is read."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -209,10 +207,9 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path):
         assert any("it is 0 here" in note for note in record.notes) == (form.start != 0.0), name
 
 
-def test_the_command_reads_that_folder(tmp_path, capsys):
+def test_the_command_reads_that_folder(tmp_path, told):
     made = folder_of_records(tmp_path)
-    assert main(["record", str(tmp_path), "--json"]) == 0
-    records = json.loads(capsys.readouterr().out)["records"]
+    records = told("record", str(tmp_path))["records"]
     assert [Path(one["file"]).name for one in records] == sorted(made)
     for one in records:
         form, component = made[Path(one["file"]).name]
@@ -225,7 +222,7 @@ def test_the_command_reads_that_folder(tmp_path, capsys):
     ("write", "names"),
     [(cosmos_three, ["360 deg", "90 deg", "up"]), (csmip_three, ["360 Deg", "90 Deg", "Up"])],
 )
-def test_several_components_in_one_file(write, names, tmp_path, capsys):
+def test_several_components_in_one_file(write, names, tmp_path, told):
     path = tmp_path / "three.V2"
     path.write_bytes(write())
     found = read_components(path)
@@ -240,8 +237,7 @@ def test_several_components_in_one_file(write, names, tmp_path, capsys):
         Record.from_file(path)
     assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
     assert Record.from_file(path, component=names[2]).peak == pytest.approx(0.15, abs=1e-7)
-    assert main(["record", str(path), "--read", f"component={names[1]}", "--json"]) == 0
-    said = json.loads(capsys.readouterr().out)
+    said = told("record", str(path), "--read", f"component={names[1]}")
     assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
     assert said["duration_s"] == pytest.approx(4.0)
     with pytest.raises(InputError, match="no single component 4; there are 1 "):
@@ -288,11 +284,10 @@ def test_options_do_not_overrule_a_header(option, tmp_path):
         read_record(path, Reading(**option))
 
 
-def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
+def test_the_command_shows_and_draws(tmp_path, monkeypatch, typed, refused):
     monkeypatch.chdir(tmp_path)
     Path("a.AT2").write_bytes(at2("N-S"))
-    assert main(["record", "a.AT2", "--plot", "a.png"]) == 0
-    said = capsys.readouterr().out
+    said = typed("record", "a.AT2", "--plot", "a.png")[0]
     for part in (
         "PEER AT2, unit g",
         "401 every 0.01 s, 4 s",
@@ -304,17 +299,15 @@ def test_the_command_shows_and_draws(tmp_path, capsys, monkeypatch):
     ):
         assert part in said, part
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["record", "a.AT2", "--plot", "a.jpg"]) == 2
-    assert ".svg, .png, .pdf" in capsys.readouterr().err
+    assert ".svg, .png, .pdf" in refused("record", "a.AT2", "--plot", "a.jpg")
 
 
-def test_one_bad_file_does_not_hide_the_others(tmp_path, capsys):
+def test_one_bad_file_does_not_hide_the_others(tmp_path, typed):
     (tmp_path / "a.AT2").write_bytes(at2("N-S"))
     (tmp_path / "b.txt").write_text("1 2 3\n")
-    assert main(["record", str(tmp_path), "--json"]) == 2
-    captured = capsys.readouterr()
-    assert json.loads(captured.out)["samples"] == 401
-    assert "b.txt, line 1: 3 columns" in captured.err
+    out, err = typed("record", str(tmp_path), "--json", code=2)
+    assert json.loads(out)["samples"] == 401
+    assert "b.txt, line 1: 3 columns" in err
 
 
 def test_a_folder_of_mixed_files_is_read_and_the_odd_one_named(tmp_path):
@@ -335,11 +328,9 @@ def test_a_folder_of_mixed_files_is_read_and_the_odd_one_named(tmp_path):
         motions_of(files_of([tmp_path]), Reading())
 
 
-def test_a_shipped_record_is_found_by_name_as_in_a_scene(capsys, tmp_path, monkeypatch):
+def test_a_shipped_record_is_found_by_name_as_in_a_scene(tmp_path, monkeypatch, told):
     monkeypatch.chdir(tmp_path)
-    assert main(["record", "elcentro_1940_ns.csv", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["format"] == "CSV"
+    assert told("record", "elcentro_1940_ns.csv")["format"] == "CSV"
     (tmp_path / "elcentro_1940_ns.csv").write_text("time_s,acceleration_g\n0,1\n0.01,2\n")
-    assert main(["record", "elcentro_1940_ns.csv", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["samples"] == 2
+    assert told("record", "elcentro_1940_ns.csv")["samples"] == 2
     assert main(["record", "nowhere/elcentro_1940_ns.csv"]) == 2

@@ -1,14 +1,14 @@
 """Readers of recorded ground motions: what they read, and how they name what is wrong."""
 
-from __future__ import annotations
-
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from rockcheck.scenes import InputError, Record
+from rockcheck.scenes.recordings import read_record
 
 G = 9.80665
 NAMED = (
@@ -82,9 +82,12 @@ def test_at2_scaled(tmp_path):
             NAMED.format(npts=2, dt=0.01).replace(" IN UNITS OF G", "") + "0.1 0.2",
             "no header line that states UNITS OF G",
         ),
-        (
-            NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", "UNITS OF CM/S") + "0.1 0.2",
-            "no header line that states UNITS OF G",
+        *(
+            (
+                NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", f"UNITS OF {word}") + "0.1 0.2",
+                "no header line that states UNITS OF G",
+            )
+            for word in ("CM/S", "CM", "INCHES")
         ),
         ("0.1 0.2\n0.3\n", "no header line with NPTS and DT within the first 20 lines"),
         ("", "no header line with NPTS and DT"),
@@ -191,3 +194,71 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_control_characters_do_not_reach_the_terminal(tmp_path):
     said = fault_of(written(tmp_path, NAMED.format(npts=1, dt=0.1) + "\x1b[31mred"))
     assert said.isprintable()
+
+
+def run_together(
+    across: int, count: int, width: int, form: str, unit: str = "G"
+) -> tuple[str, NDArray[np.float64]]:
+    """A PEER file in Fortran's columns without a blank between them, and its numbers as they are
+    printed."""
+    values = (
+        np.random.default_rng(3).uniform(1.0, 9.0, count)
+        * np.where(np.arange(count) % 3, 1.0, -1.0)
+        * 1e-2
+    )
+    words = [format(value, form)[-width:].rjust(width) for value in values]
+    lines = ["".join(words[k : k + across]) for k in range(0, count, across)]
+    head = (
+        f"PEER\nA, 1/1/2000, B, 180\nACCELERATION TIME SERIES IN UNITS OF {unit}\n"
+        f"NPTS= {count}, DT= .01 SEC\n"
+    )
+    return head + "\n".join(lines) + "\n", np.array([float(word) for word in words])
+
+
+@pytest.mark.parametrize("count", [1, 4, 5, 6, 23, 25])
+@pytest.mark.parametrize(
+    ("across", "width", "form"), [(5, 11, ".5E"), (5, 12, ".5E"), (8, 8, ".5f"), (1, 11, ".5E")]
+)
+def test_columns_of_fortran_may_run_together(tmp_path, across, width, form, count):
+    """E-011.19 is the end of one number and the beginning of the next."""
+    text, values = run_together(across, count, width, form)
+    (tmp_path / "a.AT2").write_text(text)
+    np.testing.assert_array_equal(read_record(tmp_path / "a.AT2").samples, values * G)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda text: text[:-3] + "\n",
+        lambda text: text.replace("E-0", "E0", 1),
+        lambda text: text + " 1.0\n",
+    ],
+)
+def test_columns_that_are_not_as_the_header_says_are_a_fault(tmp_path, change):
+    (tmp_path / "a.AT2").write_text(change(run_together(5, 23, 11, ".5E")[0]))
+    with pytest.raises(InputError, match="not a finite number"):
+        read_record(tmp_path / "a.AT2")
+
+
+SPELT = {
+    "cm/s2": ["CM/S/S", "CM/SEC/SEC", "CM/S^2", "cm/sec2", "(CM/S**2)", "CM / S / S"],
+    "ft/s2": ["FT/S/S", "ft/s2", "FT/SEC**2"],
+    "m/s2": ["M/S/S", "M/SEC/SEC"],
+    "g": ["G", "g", "G'S", "(G)"],
+    "gal": ["GAL", "gals"],
+}
+
+
+@pytest.mark.parametrize(
+    ("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words]
+)
+def test_the_header_states_the_unit(tmp_path, unit, word):
+    (tmp_path / "a.AT2").write_text(
+        f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
+    )
+    found = read_record(tmp_path / "a.AT2")
+    assert found.unit == unit
+    np.testing.assert_allclose(
+        found.samples,
+        np.array([1.0, 2.0]) * {"g": G, "cm/s2": 0.01, "gal": 0.01, "ft/s2": 0.3048}.get(unit, 1.0),
+    )

@@ -1,8 +1,6 @@
 """What is written goes through one door, which follows no link; text in a table is no formula and
 steers nothing."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Callable

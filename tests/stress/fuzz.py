@@ -7,8 +7,6 @@ memory ends the run with an error and is written to the working directory; optio
 reader's name are libFuzzer's.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from pathlib import Path

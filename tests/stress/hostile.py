@@ -5,8 +5,6 @@ Each ends within 60 s with an exit code that it may have, at most one line on st
 and no file where none belongs. `test_hostile.py` beside this file tries a tenth of them.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """What is fed to readers: valid files of each kind, and what is nasty in them."""
 
-from __future__ import annotations
-
 AT2 = """PEER NGA STRONG MOTION DATABASE RECORD
 Imperial Valley-02, 5/19/1940, El Centro Array #9, 180
 ACCELERATION TIME SERIES IN UNITS OF G

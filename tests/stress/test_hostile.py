@@ -1,7 +1,5 @@
 """A tenth of the hostile cases of `hostile.py`; `make nightly` tries all."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

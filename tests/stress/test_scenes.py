@@ -1,10 +1,13 @@
 """The scenes of the stress study: what a seed gives, and what occurs among them."""
 
-from __future__ import annotations
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import load_scene
+from rockcheck.scenes.files import read_toml
 from rockcheck.validation.studies.stress.generator import (
     ALPHA,
     FRICTION,
@@ -12,6 +15,7 @@ from rockcheck.validation.studies.stress.generator import (
     exact_scene,
     random_scene,
 )
+from rockcheck.validation.studies.stress.invariants import check_run
 
 #: What must occur among random scenes: that of a scene, or of one of its walls.
 OCCURS = {
@@ -99,3 +103,23 @@ def test_exact_scenes_hold_what_they_are_for():
     digits = [len(repr(one)) for s in scenes for one in (s.block.half_width, s.gravity)]
     assert max(digits) < 8
     assert [name for name, has in EXACT.items() if not any(map(has, scenes))] == []
+
+
+FOLDER = Path(__file__).parents[1] / "data" / "found_faults"
+INDEX = read_toml(FOLDER / "index.toml")
+
+
+def test_every_pinned_scene_is_listed():
+    assert {path.stem for path in FOLDER.glob("*.toml")} == {"index", *INDEX["faults"]}
+
+
+@pytest.mark.parametrize("slug", INDEX["faults"])
+def test_a_fault_that_was_found(slug: str):
+    entry = INDEX["faults"][slug]
+    model = EventBasedModel(**INDEX["limits"] | entry["model"])
+    played = check_run(
+        model, load_scene(FOLDER / f"{slug}.toml"), seed=entry["seed"], audit=entry["audited"]
+    )
+    assert played.broken == [], (entry["fault"], played)
+    assert ("energy" in played.figures) == entry["audited"]
+    assert played.unjudged == ()

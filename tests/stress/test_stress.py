@@ -1,10 +1,7 @@
 """The stress study: its work, what its runs add up to, failures with their smallest scenes,
 maps."""
 
-from __future__ import annotations
-
 import csv
-import json
 from collections import Counter
 
 import numpy as np
@@ -225,11 +222,9 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
         )
 
 
-def test_the_command(tmp_path, capsys):
-    """All that a run has is in its files."""
+def test_the_command(tmp_path, told):
     words = ["--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--seed", "4"]
-    assert main(["stress", "runs", "--model", "ebm", *words, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = told("stress", "runs", "--model", "ebm", *words)
     assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
     assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
     assert "| ebm | " in (tmp_path / "summary.md").read_text()
@@ -237,7 +232,6 @@ def test_the_command(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_quick_run(tmp_path):
-    """All models: no event-based one breaks an invariant."""
     found = run(Stress("runs", quick=True, seed=11), tmp_path)
     assert found.complete
     assert found.exit_code == 0

@@ -1,7 +1,5 @@
 """Hand methods against the reference, each in its range."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

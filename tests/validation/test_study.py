@@ -1,8 +1,6 @@
 """The shape of every study: what the one runner does for a made-up one, and that the real ones have
 the shape."""
 
-from __future__ import annotations
-
 import json
 import os
 from dataclasses import replace
@@ -11,7 +9,6 @@ from typing import Any
 
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.reports.document import block_markdown, csv, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.progress import announcing
@@ -164,12 +161,12 @@ def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
     "words", ["validate smoke", "assess fig5a", "spectrum", "conformance", "stress", "accept smoke"]
 )
 def test_every_study_says_so_in_one_line(
-    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main([*words.split(), "--scheduler", "local:0", "--quiet"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("rockcheck: --scheduler: 'local:0'")
+    assert refused(*words.split(), "--scheduler", "local:0", "--quiet").startswith(
+        "rockcheck: --scheduler: 'local:0'"
+    )
 
 
 def test_a_folder_that_cannot_be_used_is_bad_input(log: Path) -> None:

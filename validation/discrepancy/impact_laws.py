@@ -89,10 +89,11 @@ class Landing(Stored):
         ]
         if not others or _rms((own - motions[nearest])[:first]) > NEAR * min(others):
             return None
-        known = (
-            law for law in (*FLUSH_LAWS, *FLAT_LAWS) if law in apart
-        )  # a store does not keep their order
-        alike = [law for law in known if np.max(np.abs(apart[law])) <= TELLS]
+        alike = [  # in this order: a store does not keep it
+            law
+            for law in (*FLUSH_LAWS, *FLAT_LAWS)
+            if law in apart and np.max(np.abs(apart[law])) <= TELLS
+        ]
         law = " or ".join(alike) if errors[nearest] < NEAR * min(others) else "none"
         return LawFollowed(t=self.t, law=law, errors=errors, spread=min(others))
 

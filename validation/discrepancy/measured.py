@@ -165,19 +165,18 @@ def time_shift(reference: History, candidate: History) -> float:
     """
     from scipy.signal import correlate, correlation_lags
 
-    a, b = (
-        (history.channels["t"], history.channels["theta"]) for history in (reference, candidate)
-    )
-    for history, (_, theta) in zip((reference, candidate), (a, b), strict=True):
-        if len(theta) < 3 or not np.any(theta):
+    both = [history.channels for history in (reference, candidate)]
+    for history in (reference, candidate):
+        if len(history.channels["t"]) < 3 or not np.any(history.channels["theta"]):
             raise InputError(f"{history.name}: no rotation by which it could be aligned", "align")
-    step = min(float(t[-1] - t[0]) / (len(t) - 1) for t, _ in (a, b))
-    grids = [np.arange(t[0], t[-1] + 0.5 * step, step) for t, _ in (a, b)]
-    rotations = [np.interp(grid, t, theta) for grid, (t, theta) in zip(grids, (a, b), strict=True)]
+    step = min(float(one["t"][-1] - one["t"][0]) / (len(one["t"]) - 1) for one in both)
+    grids = [np.arange(one["t"][0], one["t"][-1] + 0.5 * step, step) for one in both]
+    rotations = [
+        np.interp(grid, one["t"], one["theta"]) for grid, one in zip(grids, both, strict=True)
+    ]
     product = correlate(rotations[0], rotations[1])
     lags = correlation_lags(len(rotations[0]), len(rotations[1]))
-    top = int(np.argmax(product))
-    between = 0.0
+    top, between = int(np.argmax(product)), 0.0
     if 0 < top < len(product) - 1:
         left, middle, right = product[top - 1 : top + 2]
         bend = left - 2.0 * middle + right

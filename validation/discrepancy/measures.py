@@ -37,8 +37,8 @@ def _peak(columns: tuple[Array, Array]) -> float:
 
 
 def _peak_ratio(pair: Pair) -> float:
-    reference, candidate = (float(np.max(np.abs(column))) for column in pair.rocking)
-    return candidate / reference
+    reference, candidate = np.max(np.abs(pair.rocking), axis=1).tolist()
+    return float(candidate / reference)
 
 
 def _hausdorff(pair: Pair) -> float:
@@ -78,9 +78,9 @@ def _agree_until(pair: Pair) -> tuple[float, str]:
 
 
 def _unmatched(pair: Pair) -> tuple[float, str]:
-    matched = pair.impacts
-    alone = len(matched.only_reference) + len(matched.only_candidate)
-    return float(alone), f"{len(matched.pairs)} impacts matched"
+    found = pair.impacts
+    alone = len(found.only_reference) + len(found.only_candidate)
+    return float(alone), f"{len(found.pairs)} impacts matched"
 
 
 def _impact_time(pair: Pair) -> tuple[float, str]:

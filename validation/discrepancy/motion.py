@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,36 +10,31 @@ from numpy.typing import NDArray
 
 from rockcheck.scenes import History, Scene, kinematics
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.finding import Column
 
 Floats = NDArray[np.float64]
 #: A slip below this share of the block's half height is rounding.
 ROUNDING = 1e-14
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """One of the figures: its name, what readers call it, and its unit."""
-
-    name: str
-    label: str
-    unit: str
-    help: str
-
-
+#: The figures: name, what readers call it, unit and meaning.
 QUANTITIES = (
-    Quantity("peak_rotation", "peak rotation", "alpha", "largest |θ|, over the slenderness angle"),
-    Quantity("slip", "slip", "m", "largest |slip| of the pivot corner along the floor"),
-    Quantity(
+    Column(
+        "peak_rotation", "peak rotation", "alpha", help="largest |θ|, over the slenderness angle"
+    ),
+    Column("slip", "slip", "m", help="largest |slip| of the pivot corner along the floor"),
+    Column(
         "top_displacement",
         "top displacement",
         "m",
-        "largest horizontal distance of a top corner from where it began, relative to the floor",
+        help="largest horizontal distance of a top corner from where it began, relative to the"
+        " floor",
     ),
-    Quantity(
+    Column(
         "wall_speed",
         "speed at the wall",
         "m/s",
-        "largest speed with which the block strikes a wall",
+        help="largest speed with which the block strikes a wall",
     ),
 )
 
@@ -69,20 +63,17 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
     block, channels = scene.block if scene else history.block, history.channels
     theta = np.asarray(channels["theta"], dtype=float)
     stands = not history.outcome.startswith("overturned")
-    peak = slip = top = None
+    peak = top = None
     if stands and block is not None:
         peak = history.peak_rotation / block.alpha
         if "x" in channels:
             places = kinematics.top_corners(block, np.asarray(channels["x"], dtype=float), theta)
             top = float(np.max(np.abs(places - places[:, :1])))
-    if "slip" in channels:
-        slip = largest_slip(history)
-    speeds = wall_speeds(history, scene) if scene is not None else []
     return Motion(
         peak_rotation=peak,
-        slip=slip if stands else None,
+        slip=largest_slip(history) if stands and "slip" in channels else None,
         top_displacement=top,
-        wall_speed=max(speeds, default=None),
+        wall_speed=max(wall_speeds(history, scene), default=None) if scene else None,
     )
 
 
@@ -118,8 +109,7 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
             scene.block, wall.side, theta[rows], x_dot[rows], theta_dot[rows]
         )
         speed = rates[-1]
-        between = (times > t[rows][0]) & (times < event.t - 1e-9)
-        if len(rates) == 2 and not between.any():
+        if len(rates) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
             speed += (rates[1] - rates[0]) * (event.t - t[row]) / (t[row] - t[row - 1])
         found.append(max(float(speed), 0.0))
     return found

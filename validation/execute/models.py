@@ -133,10 +133,8 @@ def engine_names() -> tuple[str, ...]:
 
 def not_installed(name: str) -> str:
     """How to install the engine of that model; empty if it is installed, or none is needed."""
-    if family(name).module != ENGINES:
-        return ""
-    engine = _class_of(name)
-    return "" if engine.installed() else str(engine.hint())
+    needed = family(name).module == ENGINES and not _class_of(name).installed()
+    return str(_class_of(name).hint()) if needed else ""
 
 
 def has_wheel(name: str) -> bool:

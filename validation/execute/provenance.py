@@ -21,8 +21,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.reading import read_text
+from rockcheck.scenes import Scene
+from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute.models import FAMILIES, family, home
 
@@ -103,10 +103,7 @@ def _kept(module: str) -> Path:
 
 def _text_of(path: Path) -> str:
     """A cached digest, empty where there is none."""
-    try:
-        found = read_text(path).strip()
-    except InputError:
-        return ""
+    found = head_of(path, 100).strip()
     return found if re.fullmatch(r"[0-9a-f]{16}", found) else ""
 
 

@@ -132,15 +132,12 @@ def _not_finite(history: History) -> str:
         if column.dtype.kind == "f" and not np.all(np.abs(column) <= MOST):  # NaN, too
             row = int(np.flatnonzero(~(np.abs(column) <= MOST))[0])
             return f"{name} is {column[row]} at t = {history.channels['t'][row]:g} s"
-    if len(history.channels["t"]) == 0:
-        return "the history is empty"
-    return ""
+    return "" if len(history.channels["t"]) else "the history is empty"
 
 
 def _plain(settings: Any) -> dict[str, Any]:
     """Settings as plain JSON values, sorted as the store returns them."""
-    plain = {
+    return {
         str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
-        for key, value in settings.items()
+        for key, value in sorted(settings.items(), key=lambda item: str(item[0]))
     }
-    return dict(sorted(plain.items()))

@@ -254,7 +254,7 @@ def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
     gains = (areas - alone[None, :, None, None])[AXES["side"].index(side)]
     rows = []
     for axis in axes:
-        two = list(combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2))
+        two = combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2)
         both = [np.stack(pair) for pair in two]
         turn = sum(int(((one.min(0) < -SMALL) & (one.max(0) > SMALL)).sum()) for one in both)
         value = (
@@ -284,13 +284,8 @@ def restitution_rules(paper: Paper) -> Measured:
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
         by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
         value = f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-        rows.append(
-            Row(
-                f"{side} wall, μ 0.6",
-                f"{value} at up to {share(by_e)} between e",
-                bool(by_gap < by_e),
-            )
-        )
+        value += f" at up to {share(by_e)} between e"
+        rows.append(Row(f"{side} wall, μ 0.6", value, bool(by_gap < by_e)))
         most.append((by_gap, by_e))
     gaps, e = map(share, np.max(most, axis=0))
     return rows, {"gaps": gaps, "e": e}
@@ -301,8 +296,7 @@ def likelier_side(paper: Paper) -> Measured:
 
     Up to an amplitude, up to a frequency, and in all.
     """
-    rows, ends, whole = [], [], []
-    a = paper.amplitudes
+    rows, ends, whole, a = [], [], [], paper.amplitudes
     for mu, outcomes in zip(AXES["friction"], paper.alone, strict=True):
         left, right = (np.mean(outcomes == side, axis=1) for side in (LEFT, RIGHT))
         gain = np.cumsum(right - left) > 0.0  # over amplitudes from the lowest up to each
@@ -369,8 +363,8 @@ class Shown:
 
 
 def _figure(side: int, mu: int) -> int:
-    what = AXES["side"][side], AXES["friction"][mu]
-    return next(number for number, shows in FIGURES.items() if shows == what)
+    shown = {what: number for number, what in FIGURES.items()}
+    return shown[AXES["side"][side], AXES["friction"][mu]]
 
 
 def _case(place: Place) -> str:

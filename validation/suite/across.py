@@ -20,7 +20,7 @@ import os
 import re
 import shutil
 import subprocess
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -224,19 +224,17 @@ def commit_of(folder: Path) -> str:
     """
     git = shutil.which("git")
     if git:
-        words = [
-            git,
-            "-C",
-            str(folder),
-            "describe",
-            "--always",
-            "--dirty",
-            "--abbrev=12",
-            "--exclude",
-            "*",
-        ]
         found = subprocess.run(
-            words, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
+            [
+                git,
+                "-C",
+                str(folder),
+                *["describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"],
+            ],
+            capture_output=True,
+            text=True,
+            check=False,
+            stdin=subprocess.DEVNULL,
         )
         if found.returncode == 0:
             return printable(found.stdout.strip())
@@ -363,30 +361,33 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     Both must be finite and larger than `LEAST`. Blocks that fall have no peak: they are left out,
     as are cells of the reference itself.
     """
-    found: dict[str, list[tuple[float, float]]] = {}
+    found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
-        for model, peaks, ends in _peaks(run):
-            known = [peak for peak in peaks if peak is not None and peak > LEAST]
-            if len(known) == 2 and not any(end.startswith("overturned") for end in ends):
-                found.setdefault(model, []).append((known[0], known[1]))
+        peaks = _peaks(run)
+        reference = peaks.pop(run.reference, {})
+        for model, own in peaks.items():
+            found[model] += [(reference[place], own[place]) for place in own if place in reference]
+    return {model: pairs for model, pairs in found.items() if pairs}
+
+
+def _peaks(run: Run) -> dict[str, dict[tuple[str, int], float]]:
+    """The peak rotations that allow a ratio, by model, and by scene and number in its ensemble."""
+    every = [
+        (cell.model, (cell.scene, 0), cell.outcome, value_of(cell.figures, "peak_rotation"))
+        for cell in run.cells
+        if cell.status == "done"
+    ]
+    every += [
+        (model, (drawn.name, n), drawn.outcomes[model][n], peak)
+        for drawn in run.ensembles
+        for model, peaks in drawn.peaks.items()
+        for n, peak in enumerate(peaks)
+    ]
+    found: defaultdict[str, dict[tuple[str, int], float]] = defaultdict(dict)
+    for model, place, outcome, peak in every:
+        if peak is not None and peak > LEAST and not outcome.startswith("overturned"):
+            found[model][place] = peak
     return found
-
-
-def _peaks(run: Run) -> Iterator[tuple[str, Sequence[float | None], Sequence[str]]]:
-    """For each model and scene: peak rotations and outcomes of the reference and the model."""
-    cells = {(cell.scene, cell.model): cell for cell in run.cells if cell.status == "done"}
-    for (scene, model), cell in cells.items():
-        if (scene, run.reference) in cells and model != run.reference:
-            pair = cells[scene, run.reference], cell
-            peaks = [value_of(one.figures, "peak_rotation") for one in pair]
-            yield model, peaks, [one.outcome for one in pair]
-    for drawn in run.ensembles:
-        for model in drawn.peaks:
-            if run.reference in drawn.peaks and model != run.reference:
-                of = run.reference, model
-                each = zip(*(drawn.peaks[one] for one in of), strict=True)
-                ends = zip(*(drawn.outcomes[one] for one in of), strict=True)
-                yield from ((model, *both) for both in zip(each, ends, strict=True))
 
 
 def experience_of(runs: Sequence[Run]) -> Experience:
@@ -400,12 +401,11 @@ def experience_of(runs: Sequence[Run]) -> Experience:
             bias, scatter = bias_and_scatter(found)
             one = Trust(bias=bias, scatter=scatter, count=len(found))
             trust[model] = {"peak_rotation": one}
-    values: dict[str, list[float]] = {}
-    for run in runs:
-        for name in run.scenes:
-            for axis, numbers in axes_of(run.load_scene(name)).items():
-                values.setdefault(axis, []).extend(numbers)
-    domain = {axis: Range(low=min(numbers), high=max(numbers)) for axis, numbers in values.items()}
+    scenes = [axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
+    domain = {}
+    for axis in dict.fromkeys(axis for one in scenes for axis in one):
+        numbers = [number for one in scenes for number in one.get(axis, ())]
+        domain[axis] = Range(low=min(numbers), high=max(numbers))
     return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain)
 
 

@@ -30,7 +30,6 @@ from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import CostRecord, value_of
-from rockcheck.validation.suite.suites import ModelVariant
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
@@ -49,7 +48,7 @@ class Planned(Task):
     """
 
     scene: Scene = field(compare=False)
-    variant: ModelVariant = field(compare=False)
+    variant: workers.Work = field(compare=False)
     model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
@@ -73,19 +72,13 @@ class Planned(Task):
         part = f", from {self.numbers.start}" if self.ensemble else ""
         return f"{self.place}, {self.variant.label}{part}"
 
-    @property
-    def work(self) -> workers.Task | workers.BatchTask:
-        """The work for a worker."""
-        model: dict[str, Any] = {
-            "label": self.variant.label,
-            "family": self.variant.family_name,
-            "settings": dict(self.variant.settings),
-            "search_path": self.variant.search_path,
-        }
+    def play(self) -> workers.Played:
+        """The history, or the peaks of a batch."""
+        model, scene = vars(self.variant), self.scene
         if self.ensemble is None:
-            return workers.Task(scene=self.scene, uncertainty=self.uncertainty, **model)
-        scenes = tuple(self.ensemble.drawn(self.scene, n) for n in self.numbers)
-        return workers.BatchTask(scenes=scenes, **model)
+            return workers.play(workers.Task(**model, scene=scene, uncertainty=self.uncertainty))
+        scenes = tuple(self.ensemble.drawn(scene, n) for n in self.numbers)
+        return workers.play(workers.BatchTask(**model, scenes=scenes))
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
@@ -175,12 +168,12 @@ def horizon_of(store: Store, scene: Scene) -> float:
     return float(kept(store, name, float, lambda: predictability_horizon(scene)))
 
 
-def under_other_laws(scene: Scene, variant: ModelVariant) -> dict[str, History]:
+def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
     """A reference's histories under the other laws of impacts, by law.
 
     Laws under which it fails are left out. Empty for a model without a choice of law.
     """
-    model = None if is_own(variant.family_name) else build(variant.family_name, variant.settings)
+    model = None if is_own(variant.family) else build(variant.family, variant.settings)
     found: dict[str, History] = {}
     if isinstance(model, EventBasedModel):
         for law in other_laws(model, walls=bool(scene.walls), flat=True):

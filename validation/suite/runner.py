@@ -35,7 +35,7 @@ from rockcheck.validation.suite.comparing import (
 )
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run, Strict
-from rockcheck.validation.suite.suites import ModelVariant, Suite
+from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import (
     MEASURES,
     OWN_FIGURES,
@@ -101,11 +101,13 @@ class SuiteStudy(Study):
 
     def __init__(self, suite: Suite, folder: Path) -> None:
         self.suite, self.store = suite, Store(folder)
-        limits = [suite.suite_of(name).limits for name in (*suite.scenes, *suite.ensembles)]
+        limits = [suite.suite_of(name).given.limits for name in (*suite.scenes, *suite.ensembles)]
         self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
         asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
         self.cells = [
-            self._planned(scene, variant, asked if suite.suite_of(scene.name).uncertainty else {})
+            self._planned(
+                scene, variant, asked if suite.suite_of(scene.name).given.uncertainty else {}
+            )
             for scene, variant in suite.cells()
         ]
         self.batches = [
@@ -118,32 +120,30 @@ class SuiteStudy(Study):
         self.read_back: set[Planned] = set()
         self.records: dict[Planned, Any] = {}  # `CellRecord`, `BatchRecord`
         self.failures = {
-            item: missing
-            for item in self.items
-            if (missing := not_installed(item.variant.family_name))
+            item: missing for item in self.items if (missing := not_installed(item.variant.family))
         }
         self.traces: set[Planned] = set()
         self.compared: dict[str, list[Cell]] = {}
 
     def _planned(
-        self, scene: Scene, variant: ModelVariant, depends: Mapping[str, Any], **of: Any
+        self, scene: Scene, variant: workers.Work, depends: Mapping[str, Any], **of: Any
     ) -> Planned:
         own, settings = self.suite.suite_of(scene.name), {**variant.settings, **depends}
         if "ensemble" in of:
             own = self.suite.suite_of(of["ensemble"].name)
-        kind = variant.family_name
+        kind = variant.family
         return Planned(
             scene,
             variant,
             variant.label,
             provenance.cell_key(scene, kind, settings, variant.search_path),
-            own.uncertainty,
+            own.given.uncertainty,
             **of,
-            seconds=own.limits.seconds,
+            seconds=own.given.limits.seconds,
             compiles=compiles(kind, variant.settings),
         )
 
-    def _batches(self, ensemble: Ensemble, base: Scene, variant: ModelVariant) -> Iterator[Planned]:
+    def _batches(self, ensemble: Ensemble, base: Scene, variant: workers.Work) -> Iterator[Planned]:
         """An ensemble in batches.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
@@ -161,11 +161,6 @@ class SuiteStudy(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""
         return in_order([item for item in self.items if item in done or item not in self.failures])
-
-    @staticmethod
-    def play(task: Planned) -> workers.Played:
-        """The history, or the peaks of a batch."""
-        return workers.play(task.work)
 
     def file(self, task: Any) -> str:
         """Name of the cell's files."""
@@ -231,7 +226,7 @@ class SuiteStudy(Study):
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
-            description=suite.description,
+            description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
             reference=suite.reference,
             model_form=suite.model_form,
@@ -240,7 +235,9 @@ class SuiteStudy(Study):
             cells=tuple(cells),
             ensembles=tuple(ensembles),
             inputs=inputs,
-            printed=tuple(name for name in suite.scenes if suite.suite_of(name).print_figures),
+            printed=tuple(
+                name for name in suite.scenes if suite.suite_of(name).given.print_figures
+            ),
             faults=tuple(
                 f"tolerance [{place}] has no cell in the suite"
                 for place in suite.tolerances
@@ -267,8 +264,8 @@ class SuiteStudy(Study):
         """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
         place, variant = parts[0].place, parts[0].variant
         status = "failed" if reason else "done"
-        if missing := not_installed(variant.family_name):
-            status = "absent" if has_wheel(variant.family_name) else "unavailable"
+        if missing := not_installed(variant.family):
+            status = "absent" if has_wheel(variant.family) else "unavailable"
         traced = [f"{FAULTS}/{part.name}.txt" for part in parts if part in self.traces]
         return {
             "scene": place,
@@ -280,7 +277,7 @@ class SuiteStudy(Study):
             "read_back": all(part in self.read_back for part in parts),
             "traceback": traced[0] if traced else "",
             # in a user's own model an exception is that model's fault, not rockcheck's
-            "unexpected": bool(traced) and not is_own(variant.family_name),
+            "unexpected": bool(traced) and not is_own(variant.family),
         }
 
     def _cell(self, planned: Planned, reference: Cell | None) -> Cell:
@@ -390,44 +387,45 @@ class SuiteStudy(Study):
             label: list(found)
             for label, found in groupby(batches, key=lambda batch: batch.variant.label)
         }
-        played = {label: [self._batch(part) for part in found] for label, found in by_model.items()}
-        peaks = {
-            label: tuple(peak for one in found for peak in one.peaks)
-            for label, found in played.items()
-        }
-        outcomes = {
-            label: tuple(outcome for one in found for outcome in one.outcomes)
-            for label, found in played.items()
-        }
+        played = {label: self._together(parts) for label, parts in by_model.items()}
         samples = {
-            label: Sample(np.array(peaks[label], dtype=float), outcomes[label]) for label in peaks
+            label: Sample(np.array(one.peaks, dtype=float), one.outcomes)
+            for label, one in played.items()
         }
         whole = EnsembleRecord(
             name=ensemble.name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
-            peaks=peaks,
-            outcomes=outcomes,
+            peaks={label: one.peaks for label, one in played.items()},
+            outcomes={label: one.outcomes for label, one in played.items()},
         )
         cells = [
-            self._ensemble_cell(parts, samples, [one.cost for one in played[label]])
+            self._ensemble_cell(parts, samples, played[label].cost)
             for label, parts in by_model.items()
         ]
         return whole, cells
 
-    def _batch(self, batch: Planned) -> BatchRecord:
-        """The record of a batch; of one that failed, the reason for each of its scenes."""
-        count, reason = len(batch.numbers), self.failures.get(batch, "")
-        found: BatchRecord = self.records.get(batch) or BatchRecord(
-            peaks=(None,) * count, outcomes=(reason,) * count, cost=CostRecord()
+    def _together(self, batches: Sequence[Planned]) -> BatchRecord:
+        """Batches as one; each scene of a batch that failed has its reason."""
+        found: list[BatchRecord] = [
+            self.records.get(batch)
+            or BatchRecord(
+                peaks=(None,) * len(batch.numbers),
+                outcomes=(self.failures.get(batch, ""),) * len(batch.numbers),
+                cost=CostRecord(),
+            )
+            for batch in batches
+        ]
+        return BatchRecord(
+            peaks=tuple(peak for one in found for peak in one.peaks),
+            outcomes=tuple(outcome for one in found for outcome in one.outcomes),
+            cost=CostRecord(
+                **{name: sum(getattr(one.cost, name) for one in found) for name in ADDED}
+            ),
         )
-        return found
 
     def _ensemble_cell(
-        self,
-        batches: Sequence[Planned],
-        samples: Mapping[str, Sample],
-        costs: Sequence[CostRecord],
+        self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
     ) -> Cell:
         place, label = batches[0].place, batches[0].variant.label
         own, origin, reason = samples[label], self.suite.suite_of(place), ""
@@ -436,7 +434,7 @@ class SuiteStudy(Study):
             reason = f"{own.failures} of {len(own.peaks)} scenes failed; the first: {first}"
         key = provenance.digest("".join(batch.key for batch in batches))
         about = self._about(batches, key, reason)
-        about["cost"] = CostRecord(**{name: sum(getattr(c, name) for c in costs) for name in ADDED})
+        about["cost"] = cost
         if about["status"] != "done":
             return Cell(**about)
         required = self.suite.required(place, label)

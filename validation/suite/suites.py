@@ -49,7 +49,9 @@ table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. 
 
 from __future__ import annotations
 
+import functools
 import itertools
+from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -74,6 +76,7 @@ from rockcheck.scenes.files import (
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
 from rockcheck.validation.execute.models import build, check_allowed, family, is_own
+from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
@@ -139,19 +142,10 @@ class SuiteFile(Frozen):
     limits: Limits = Limits()
     ensemble: tuple[Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
+    #: Whether the numerical error of each cell is estimated (three coarser runs a cell).
     uncertainty: bool = False
+    #: Whether each scene's figure for a paper is drawn.
     print_figures: bool = False
-
-
-@dataclass(frozen=True)
-class ModelVariant:
-    """A model of a suite: label, name of its family, and settings."""
-
-    label: str
-    family_name: str
-    settings: Mapping[str, Any]
-    #: Folders in which a user-defined model may lie: the suite's.
-    search_path: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -160,13 +154,12 @@ class Suite:
 
     name: str
     path: Path
-    description: str
+    #: The keys of its file, such as the limits, and what it requires.
+    given: SuiteFile = field(repr=False)
     reference: str
     model_form: str
     scenes: Mapping[str, Scene]
-    models: Mapping[str, ModelVariant]
-    require: Require
-    limits: Limits
+    models: Mapping[str, Work]
     tolerances: Tolerances = field(repr=False)
     #: Where `rockcheck accept` writes: the tolerance file, or the suite file where it holds a table
     #: `[tolerances]`.
@@ -175,15 +168,11 @@ class Suite:
     ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
-    #: Whether the numerical error of each cell is estimated (three coarser runs a cell), and scenes
-    #: with uncertain numbers, by name.
-    uncertainty: bool = False
+    #: Scenes with uncertain numbers, by name.
     uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.
     left_out: tuple[str, ...] = ()
     judged: bool = True
-    #: Whether each scene's figure for a paper is drawn.
-    print_figures: bool = False
 
     @cached_property
     def _judged(self) -> dict[tuple[str, str], list[Place]]:
@@ -205,7 +194,7 @@ class Suite:
             self,
         )
 
-    def cells(self) -> Iterator[tuple[Scene, ModelVariant]]:
+    def cells(self) -> Iterator[tuple[Scene, Work]]:
         """All cells, scene by scene."""
         return (
             (suite.scenes[scene], suite.models[model])
@@ -213,7 +202,7 @@ class Suite:
             for scene, model in _played(suite.scenes, suite.models)
         )
 
-    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, ModelVariant]]:
+    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
         """All ensembles with the scene that they are drawn from, model by model."""
         return (
             (ensemble, base, model)
@@ -246,7 +235,7 @@ class Suite:
     def required(self, scene: str, model: str) -> dict[Place, Kind]:
         """The checks of a cell, with their kinds: those required or given a tolerance."""
         own = self.suite_of(scene)
-        require = own.require
+        require = own.given.require
         if scene in own.ensembles:
             require = Require(difference=require.ensemble)
         places = [
@@ -269,7 +258,7 @@ class Suite:
         """
         if place.against == OWN_FIGURES:
             return "exact" if place.what.definition.exact else "absolute"
-        families = [self.models[label].family_name for label in (place.model, place.against)]
+        families = [self.models[label].family for label in (place.model, place.against)]
         if "measured" in families:
             return "measured"
         scene = (
@@ -340,18 +329,14 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     return Suite(
         name=path.stem,
         path=path,
-        description=given.description,
+        given=given,
         reference=given.reference,
         model_form=given.model_form,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
-        require=given.require,
-        limits=given.limits,
         tolerances=_tolerances(tolerances_path, tables, scenes, models),
         tolerances_path=tolerances_path,
-        uncertainty=given.uncertainty,
-        print_figures=given.print_figures,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
         left_out=tuple(left_out),
     )
@@ -430,7 +415,7 @@ def _check_names(
 
 
 def _tolerances(
-    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, ModelVariant]
+    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, Work]
 ) -> Tolerances:
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
@@ -446,7 +431,7 @@ def _tolerances(
     return tolerances
 
 
-def _played(scenes: Iterable[str], models: Mapping[str, ModelVariant]) -> Iterator[tuple[str, str]]:
+def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
     for scene in scenes:
         yield from (
@@ -462,41 +447,34 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
         for name in given.include
     ]
-    scenes: dict[str, Scene] = {}
-    ensembles: dict[str, tuple[Ensemble, Scene]] = {}
-    models: dict[str, ModelVariant] = {}
+    names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
+    for name in (name for name, count in names.items() if count > 1):
+        raise InputError(f"scene {name!r} is in two of the suites", "include")
     for suite in included:
-        for name in {*suite.scenes, *suite.ensembles} & {*scenes, *ensembles}:
-            raise InputError(f"scene {name!r} is in two of the suites", "include")
         if suite.reference != included[0].reference:
             raise InputError(
                 f"{suite.name} and {included[0].name} have different references", "include"
             )
-        scenes |= suite.scenes
-        ensembles |= suite.ensembles
-        models |= suite.models
+    whole: dict[str, Any] = {
+        what: {key: one for suite in included for key, one in getattr(suite, what).items()}
+        for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
+    }
     return Suite(
         name=path.stem,
         path=path,
-        description=given.description,
+        given=given,
         reference=included[0].reference,
         model_form=next((suite.model_form for suite in included if suite.model_form), ""),
-        scenes=scenes,
-        ensembles=ensembles,
-        models=models,
-        require=Require(),
-        limits=given.limits,
-        tolerances={place: line for suite in included for place, line in suite.tolerances.items()},
         tolerances_path=path,
-        uncertain={name: scene for suite in included for name, scene in suite.uncertain.items()},
         left_out=tuple(name for suite in included for name in suite.left_out),
         included=tuple(included),
+        **whole,
     )
 
 
 def _variant(
     label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]
-) -> ModelVariant:
+) -> Work:
     settings = dict(settings)
     name = str(settings.pop("model", label))
     if name == "measured" and isinstance(settings.get("files"), dict):
@@ -511,9 +489,11 @@ def _variant(
             check_allowed(name, allow_code)
         except InputError as error:
             raise InputError(error.reason, f"models.{printable(label)}") from None
-        return ModelVariant(label, name, settings, (str(folder.absolute()),))
+        return Work(
+            label=label, family=name, settings=settings, search_path=(str(folder.absolute()),)
+        )
     build(name, settings)
-    return ModelVariant(label, name, settings)
+    return Work(label=label, family=name, settings=settings)
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
@@ -544,18 +524,12 @@ def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
 
 def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
     for choice in itertools.product(*grid.axes):
-        table: Any = {key: value for key, value in grid.scene.items() if key != "name"}
-        names = [grid.scene["name"]] if "name" in grid.scene else []
         for alternative in choice:
             if not isinstance(alternative.get("name"), str):
                 raise InputError("each alternative needs a name", "grid.axes")
-            names.append(alternative["name"])
-            table = _merged(
-                table, {key: value for key, value in alternative.items() if key != "name"}
-            )
-        yield scene_from(
-            {**table, "name": "-".join(map(str, names))}, folder=folder, default_name="scene"
-        )
+        names = [str(part["name"]) for part in (grid.scene, *choice) if "name" in part]
+        table = functools.reduce(_merged, choice, grid.scene)
+        yield scene_from({**table, "name": "-".join(names)}, folder=folder, default_name="scene")
 
 
 def _merged(base: Any, change: Any) -> Any:

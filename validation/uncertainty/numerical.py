@@ -206,11 +206,15 @@ def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quant
     if _side(given) != _side(finer):
         return (_outcome(given, "the outcome changes with the tolerance"),)
     rms = _changes(scene, given, finer)["theta_rms"]
-    found = [_quantity("theta_rms", "alpha", rms, SAFETY * rms)]
-    better = [value for _, _, value in _scalars(scene, finer)]
-    for (name, unit, value), other in zip(_scalars(scene, given), better, strict=True):
-        found.append(_quantity(name, unit, value, SAFETY * abs(other - value)))
-    return (*found, _outcome(given))
+    figures = zip(_scalars(scene, given), _scalars(scene, finer), strict=True)
+    return (
+        _quantity("theta_rms", "alpha", rms, SAFETY * rms),
+        *(
+            _quantity(name, unit, value, SAFETY * abs(better - value))
+            for (name, unit, value), (_, _, better) in figures
+        ),
+        _outcome(given),
+    )
 
 
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:

@@ -1,7 +1,5 @@
 """The guards of a mode and the series that they follow, against Newton and Euler."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -21,7 +19,7 @@ from situations import (
     standing,
     value,
 )
-from stepping import ROCKS, run_at
+from stepping import ROCKS, run_at, setting_of
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import (
@@ -193,9 +191,7 @@ def test_a_spin_of_rounding_is_taken_from_a_block_that_leans_on_a_wall(side):
     alpha, phi, gap = 0.3, 0.1, 0.2
     sign = 1.0 if side == "left" else -1.0
     walls = [Wall(side=side, gap=gap, restitution=0.0)]
-    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-    scene = Scene(name="leans", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
-    setting = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    setting = setting_of(alpha, walls=walls)
     touches = math.sin(alpha + phi) - math.sin(alpha) - gap  # where the top corner meets the wall
     for away, spin in ((0.0, 0.0), (0.05, 0.1 * contacts_of_the_core.SLOW)):
         turns = 0.1 * contacts_of_the_core.SLOW

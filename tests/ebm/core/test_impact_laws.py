@@ -1,19 +1,15 @@
 """What the impact laws decide: the branches of the wall cascade, the energy cap, and when a block
 lies still."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 
 import numpy as np
 import pytest
-from stepping import changed, run_at
+from stepping import changed, run_at, setting_of
 
-from rockcheck.ebm import natural
 from rockcheck.ebm.core.laws import contact_impacts as ci, impacts
 from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Found
-from rockcheck.scenes import Block, Floor, Scene
 
 
 def random_strikes(count: int, parting: bool):
@@ -107,13 +103,6 @@ def test_each_branch_of_the_wall_cascade(parting):
     assert all(seen[branch] > count for branch, count in least.items()), seen
 
 
-def setting_of(alpha: float, mu: float, e: float, cap: bool = False):
-    """A block of R = 1 m as the compiled code has it."""
-    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-    scene = Scene(name="cap", block=block, floor=Floor(friction=mu, restitution=e), duration=1.0)
-    return natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=cap)
-
-
 def work() -> np.ndarray:
     """Scratch for an impact; nothing in it is read before it is written."""
     return np.full((ci.WORK, 6), np.nan)
@@ -135,7 +124,7 @@ def landing(
     touching[Contact.FOOT] = True
     after, state = np.array(v), run_at().state
     impact = ci.Impact(1.0, phi, touching, 0.0, 0.0, 1e-9, after)
-    assert ci.contact_impact(setting_of(alpha, mu, e, cap), impact, state, work())
+    assert ci.contact_impact(setting_of(alpha, mu, e, energy_cap=cap), impact, state, work())
     return after, float(state.largest_gain)
 
 
@@ -163,7 +152,7 @@ def test_an_impact_reads_no_scratch_that_it_has_not_written():
         can = range(CONTACTS) if phi == 0.0 else (Contact.FOOT, Contact.TIP_TOP, Contact.FAR_BOTTOM)
         touching = np.isin(np.arange(CONTACTS), can) & (rng.integers(0, 2, CONTACTS) == 1)
         v = rng.normal(0.0, 0.5, 3) * 10.0 ** rng.uniform(-9.0, 0.0, 3)
-        setting = setting_of(alpha, mu, e, cap=bool(rng.integers(0, 2)))
+        setting = setting_of(alpha, mu, e, energy_cap=bool(rng.integers(0, 2)))
         found = []
         for scratch in (0.0, np.nan, 1e9):
             after, state = v.copy(), run_at().state
@@ -241,7 +230,7 @@ def test_the_energy_cap_leaves_an_elastic_impact_as_it_is():
         plain, held = v.copy(), v.copy()
         for after, cap in ((plain, False), (held, True)):
             impact = ci.Impact(1.0, 0.0, touching, 1.0, 0.0, 1e-9, after)
-            block = setting_of(alpha, mu, 0.9, cap)
+            block = setting_of(alpha, mu, 0.9, energy_cap=cap)
             assert ci.contact_impact(block, impact, run_at().state, work())
         np.testing.assert_array_equal(held, plain)
         assert plain == pytest.approx(-v, rel=1e-12)
@@ -259,13 +248,7 @@ def test_floor_first_is_a_trajectory_beside_a_wall_that_stands_farther_off(wall)
     both = 0
     for _ in range(400):
         alpha, floor_e, wall_e = rng.uniform(0.1, 1.2), rng.uniform(0.3, 0.9), rng.uniform(0.3, 0.9)
-        block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-        scene = Scene(
-            name="flush", block=block, floor=Floor(friction=0.0, restitution=floor_e), duration=1.0
-        )
-        setting = natural.setting_of(
-            scene, unilateral=True, no_slip=False, energy_cap=False, impacts="floor-first"
-        )
+        setting = setting_of(alpha, 0.0, floor_e, impacts="floor-first")
         rows, v, mass = rows_of(setting, 1, 0.0), rng.normal(0.0, 0.5, 3), np.array([1.0, 1.0, 3.0])
         v[0] = math.copysign(v[0], -rows[wall[0], 0])  # toward the wall
         away, struck, after = (

@@ -1,8 +1,6 @@
 """Lanes: the compiled code does what the plain functions say, to the bit; polynomials in two
 halves."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 
@@ -106,7 +104,6 @@ def row_of(terms: list[float]) -> np.ndarray:
 @settings(deadline=None, max_examples=300)
 @given(coefficients, st.floats(0.0, 2.0))
 def test_values_and_slopes(terms, tau):
-    """Against exact arithmetic."""
     n, t = len(terms) - 1, Fraction(tau)
     exact = sum(Fraction(c) * t**k for k, c in enumerate(terms))
     rate = sum(k * Fraction(c) * t ** (k - 1) for k, c in enumerate(terms) if k)

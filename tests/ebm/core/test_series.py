@@ -1,7 +1,5 @@
 """Polynomials in time: their first roots, the signs with which they leave zero, and bounds."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,20 +1,18 @@
 """What an impact does to a block: onto its contact, landings, rebounds from walls, and the Zeno
 rule."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-from stepping import ROCKS, run_at, six
+from stepping import ROCKS, run_at, setting_of, six
 
-from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import contacts, settle
 from rockcheck.ebm.core.laws import strike
 from rockcheck.ebm.core.names import Family, Guard, Pivot
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.scenes import Block, Floor, Scene, Wall
+from rockcheck.scenes import Floor, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 
@@ -53,9 +51,7 @@ def test_a_block_is_put_onto_the_contact_that_closes(side):
     way keeps its place."""
     alpha, gap, off = 0.4, 0.05, 1e-7
     walls = (Wall(side="left", gap=gap), Wall(side="right", gap=2.0 * gap))
-    block = Block(half_width=math.sin(alpha), half_height=math.cos(alpha))
-    scene = Scene(name="touch", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
-    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    b = setting_of(alpha, walls=walls)
     for tilt in (0.0, 0.15):
         family, tip = (Family.TILT, side) if tilt else (Family.FLAT, 1)
         for which, floor, wall in (
@@ -93,9 +89,7 @@ def test_a_flush_landing_rebounds_as_the_wall_does_that_it_meets(side):
         Wall(side="left", gap=0.0, restitution=0.3),
         Wall(side="right", gap=0.0, restitution=0.7),
     )
-    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
-    scene = Scene(name="flush", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
-    b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    b = setting_of(0.4, walls=walls, unilateral=False)
     e, w = (0.7 if side > 0 else 0.3), -0.2 * side
     start = [0.0, math.cos(0.4), 0.0, -math.cos(0.4) * w, 0.0, w]
     state = run_at(start, **ROCKS, sense=side).state
@@ -116,9 +110,7 @@ def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
         Wall(side="left", gap=0.5, restitution=0.3),
         Wall(side="right", gap=0.5, restitution=0.7),
     )
-    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
-    scene = Scene(name="corner", block=block, floor=Floor(friction=0.5), walls=walls, duration=1.0)
-    b = natural.setting_of(scene, unilateral=False, no_slip=True, energy_cap=False)
+    b = setting_of(0.4, walls=walls, unilateral=False, no_slip=True)
     w = 0.3 * side
     start = [0.0, math.cos(0.25), 0.15 * side, -math.cos(0.25) * w, math.sin(0.25) * abs(w), w]
     state = run_at(start, **ROCKS, sense=side).state
@@ -134,9 +126,7 @@ def test_a_corner_rebounds_as_the_wall_does_that_it_strikes(side):
 def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept):
     """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a
     faster bounce, are not."""
-    block = Block(half_width=math.sin(0.4), half_height=math.cos(0.4))
-    scene = Scene(name="lands", block=block, floor=Floor(friction=0.5), duration=1.0)
-    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    b = setting_of(0.4)
     for bounce, stays in ((0.1, False), (4e-8, True)):
         state = run_at([0.2, math.cos(0.4), 0.0, slip, bounce, 3e-8]).state
         v, z = contacts.slip_velocity(b, state.motion), state.motion

@@ -1,7 +1,5 @@
 """Stress studies whose workers fail: some runs kill their process, or never end."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections import Counter

@@ -1,14 +1,12 @@
 """Measured histories: units by column, an offset in time, judged like a model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rockcheck.commands.cli import main
+from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import InputError, load_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.discrepancy.measured import (
@@ -102,12 +100,10 @@ def test_faults_are_named(tmp_path, head, fault):
         )
 
 
-def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
+def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")
     scene = load_suite(path).scenes["tilt"]
-    from rockcheck.ebm import EventBasedModel
-
     truth = EventBasedModel().simulate(scene)
     rows = truth.channels["t"] <= 1.6
     write(
@@ -134,18 +130,11 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, capsys):
     )
     truth.save(tmp_path / "truth.csv")
     assert (
-        main(
-            [
-                "compare",
-                str(tmp_path / "truth.csv"),
-                str(tmp_path / "table.csv"),
-                "--align",
-                "-0.4",
-            ]
-        )
-        == 0
+        "measured against ebm, 0 to 0.5 s"
+        in typed(
+            "compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"
+        )[0]
     )
-    assert "measured against ebm, 0 to 0.5 s" in capsys.readouterr().out
 
 
 def test_a_scene_without_a_file_is_bad_input(tmp_path):

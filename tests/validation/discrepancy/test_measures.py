@@ -1,19 +1,19 @@
 """Each measure against a case that can be worked out by hand."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 
 import numpy as np
 import pytest
 
+from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Event, Floor, InputError, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation import compare
 from rockcheck.validation.discrepancy.compare import describe
 from rockcheck.validation.discrepancy.figures import Pair, match_impacts
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
+from rockcheck.validation.suite.suites import load_suite
 
 T = np.linspace(0.0, 10.0, 4001)
 WAVE = 0.3 * np.sin(2 * np.pi * T)
@@ -305,3 +305,32 @@ def test_iso_18571_rates_on_one_bounded_grid(made):
     assert flat.value is None
     assert "constant" in flat.note
     assert "iso_18571" not in {figure.measure for figure in compare(reference, reference).figures}
+
+
+FORMS = {
+    "sliding": ("sliding_distance_error",),
+    "rebound": ("wall_rebound_error",),
+    "drop": ("bounce_height_error",),
+    "rocking": ("quarter_period_error", "impact_ratio_error"),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_the_event_based_model_meets_them(name):
+    scene = load_suite("engines").scenes[name]
+    history = EventBasedModel(pivot="unilateral").simulate(scene)
+    every = [form for forms in FORMS.values() for form in forms]
+    found = {figure.measure: figure for figure in describe(history, scene=scene, measures=every)}
+    for form in every:
+        if form in FORMS[name]:
+            assert abs(found[form].value) < 5e-7, form
+        else:
+            assert found[form].value is None, f"{form} has no meaning for {name}"
+            assert "needed" in found[form].note
+
+
+def test_a_wrong_history_is_seen():
+    scene = load_suite("engines").scenes["rocking"]
+    heavier = EventBasedModel(pivot="unilateral").simulate(scene.replace(gravity=9.8))
+    (figure,) = describe(heavier, scene=scene, measures=["quarter_period_error"])
+    assert figure.value == pytest.approx(0.5 * 0.01 / 9.81 * 0.733, rel=0.01)

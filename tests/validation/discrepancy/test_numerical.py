@@ -1,7 +1,5 @@
 """u_num on problems with a known answer."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 
@@ -45,7 +43,6 @@ class Made:
 
 
 def judged(model):
-    """What is said of each quantity of the made model, by name."""
     return {q.name: q for q in numerical_uncertainty(model, BOOKCASE).quantities}
 
 

@@ -1,8 +1,6 @@
 """What a spread of the inputs makes of the figures, on a scene with a closed form: the peak of free
 rocking is its first tilt."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

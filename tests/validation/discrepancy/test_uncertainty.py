@@ -1,8 +1,5 @@
 """How sure a figure is: draws of inputs, repeats, verdicts."""
 
-from __future__ import annotations
-
-import json
 import math
 from pathlib import Path
 
@@ -18,7 +15,6 @@ from rockcheck import (
     Scene,
     Wall,
 )
-from rockcheck.commands.cli import main
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
@@ -276,30 +272,24 @@ def test_the_domain_names_the_axis_that_leaves_it():
 # --- the command
 
 
-def test_the_command_says_converged_and_not(uncertain, capsys, tmp_path):
+def test_the_command_says_converged_and_not(uncertain, tmp_path, told):
     out = ["--out", str(tmp_path / "out"), "--json"]
-    assert main(["assess", str(uncertain), "--samples", "16", *out]) == 0
-    found = json.loads(capsys.readouterr().out)
+    found = told("assess", str(uncertain), "--samples", "16", *out)
     assert found["converged"] is True
     assert {"name", "value", "u_num", "order", "verdict"} <= found["quantities"][0].keys()
     assert found["inputs"]["samples"] == 16
-    assert (
-        main(
-            [
-                "assess",
-                str(uncertain),
-                "--models",
-                "mujoco",
-                "--set",
-                "time_step=4e-3",
-                "--samples",
-                "2",
-                *out,
-            ]
-        )
-        == 1
+    found = told(
+        "assess",
+        str(uncertain),
+        "--models",
+        "mujoco",
+        "--set",
+        "time_step=4e-3",
+        "--samples",
+        "2",
+        *out,
+        code=1,
     )
-    found = json.loads(capsys.readouterr().out)
     assert found["converged"] is False
     assert any(q["reason"] for q in found["quantities"])
 
@@ -369,10 +359,9 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
     assert found.verdict == numerical.INPUTS
 
 
-def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(capsys, tmp_path):
+def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(tmp_path, told):
     """It lands flat while it slides: no step tells which corner is first."""
     scene = Path(__file__).parents[2] / "data" / "modelling_choices" / "flat-landing.toml"
-    assert main(["assess", str(scene), "--out", str(tmp_path), "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
+    found = told("assess", str(scene), "--out", str(tmp_path), code=1)
     assert not found["converged"]
     assert 0.0 < found["depends_on_law_from_s"] < 3.0

@@ -1,8 +1,6 @@
 """Models that go wrong in every way that a worker must survive, and one that is exact. Copied
 beside a test's suite."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

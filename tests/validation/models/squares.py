@@ -1,7 +1,5 @@
 """A made-up study that workers can import: it squares numbers, and fails at some."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 """What the paper says of its 28 spectra, judged by spectra that are made up; and what it does not
 say."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json

@@ -1,12 +1,9 @@
 """The same spectra by the other models."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
 
-from rockcheck.commands.cli import main
 from rockcheck.ebm import Spectrum
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import agreement
@@ -135,17 +132,13 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(monkeypa
     assert nodes == [80, 80, 16, 8]
 
 
-def test_the_command_compares_models(tmp_path, monkeypatch, capsys):
+def test_the_command_compares_models(tmp_path, monkeypatch, told):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral",))
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)
-    assert (
-        main(["spectrum", "fig8", "--size", "12", "--out", "out", "--agreement", "6", "--json"])
-        == 0
-    )
-    told = json.loads(capsys.readouterr().out)
-    (row,) = told["tables"]["agreement"]
+    said = told("spectrum", "fig8", "--size", "12", "--out", "out", "--agreement", "6")
+    (row,) = said["tables"]["agreement"]
     assert row["model"] == "ebm-unilateral"
     assert row["nodes"] == 7 * 6
-    assert [one["model"] for one in told["agreement"]["maps"]] == ["ebm", "ebm-unilateral"]
+    assert [one["model"] for one in said["agreement"]["maps"]] == ["ebm", "ebm-unilateral"]
     assert (tmp_path / "out" / "figures" / "models.svg").exists()

@@ -1,7 +1,5 @@
 """An assessment against a loop of one's own, and what it says."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -187,7 +185,7 @@ def test_contributions_are_shares_and_the_largest_comes_first(assess):
 
 
 def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(
-    assess, folder, tmp_path, capsys
+    assess, folder, tmp_path, told
 ):
     words = "uncertain.toml records --samples 4 --gaps 0.05,0.2"
     first = assess(words)
@@ -199,9 +197,7 @@ def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(
         n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0"
     ) as cluster:
         out = ["--out", str(tmp_path / "dask"), "--scheduler", cluster.scheduler_address]
-        assert main(["assess", *words.split(), *out, "--json"]) == 0
-    there = json.loads(capsys.readouterr().out)
-    assert there["gaps"] == first["gaps"]
+        assert told("assess", *words.split(), *out)["gaps"] == first["gaps"]
 
 
 def test_one_run_says_how_sure_it_is(assess):
@@ -258,12 +254,9 @@ def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
 @pytest.mark.parametrize(
     "more", ["pga = 0.5\nscale = 2.0", "pga = -1.0", "pga = 1e9", 'pga = "0.5 g"']
 )
-def test_a_peak_acceleration_that_cannot_be_is_named(folder, more, capsys):
+def test_a_peak_acceleration_that_cannot_be_is_named(folder, more, refused):
     path = write(folder, f'file = "{folder / "records" / "R01.csv"}"\n{more}')
-    assert main(["assess", str(path)]) == 2
-    err = capsys.readouterr().err
-    assert "excitation.pga" in err
-    assert err.count("\n") == 1
+    assert "excitation.pga" in refused("assess", str(path))
 
 
 def write(folder, excitation):

@@ -1,8 +1,6 @@
 """The harness as a whole, on copies of the project: faults put in on purpose, and runs that are
 killed. Minutes, not seconds."""
 
-from __future__ import annotations
-
 import os
 import random
 import re

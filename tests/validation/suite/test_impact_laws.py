@@ -1,8 +1,6 @@
 """The law of impacts in a suite: named where a landing tells, never judged; outcomes and peaks by
 the nearest law."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +10,11 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute.store import COMPARISONS, Store
+from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
-from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import ModelVariant, load_suite
+from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import markdown, summary
 
 # Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no
@@ -101,12 +100,6 @@ def test_what_is_read_back_is_in_the_same_order(run: Run, suite_file: Path) -> N
     assert [cell.figures for cell in again.cells] == [cell.figures for cell in run.cells]
 
 
-def cell_of(run: Run, scene: str, model: str) -> Cell:
-    found = run.cell(scene, model)
-    assert found is not None
-    return found
-
-
 def test_the_law_that_each_model_followed_is_in_its_cell(run: Run) -> None:
     laws = {cell.model: cell.impact_law for cell in run.of_scene("of the law")}
     assert {model: law.law for model, law in laws.items() if law} == {
@@ -122,8 +115,8 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run: Run) -> None:
 def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run) -> None:
     """The two laws end differently, and yet both are right; the histories are held against each
     other only up to where they part."""
-    cell = cell_of(run, "of the law", "floor-first")
-    assert cell_of(run, "of the law", "ebm-unilateral").outcome != cell.outcome
+    cell = run.cell("of the law", "floor-first")
+    assert run.cell("of the law", "ebm-unilateral").outcome != cell.outcome
     assert {str(check.figure.measure): check.verdict for check in cell.checks} == dict.fromkeys(
         ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
     )
@@ -131,20 +124,18 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run) -> None:
     assert notes["outcome_agrees"].endswith('impacts = "floor-first"')
     assert notes["peak_ratio"] == 'impacts = "floor-first"'
     assert "impacts = " not in notes["theta_rms"]
-    assert cell.impact_law is not None
     horizon = next(
         check.figure.until for check in cell.checks if check.figure.measure == "theta_rms"
     )
-    assert horizon is not None
     assert abs(horizon - cell.impact_law.t) < 0.05
 
 
 def test_a_block_that_lands_flat_is_judged_by_the_nearest_law(run: Run) -> None:
     """The third variant overturns, the reference does not: both are right, and the table says which
     law each followed."""
-    cell = cell_of(run, "flat", "trailing-first")
+    cell = run.cell("flat", "trailing-first")
     assert cell.outcome == "overturned left"
-    assert cell_of(run, "flat", "ebm-unilateral").outcome == "moving"
+    assert run.cell("flat", "ebm-unilateral").outcome == "moving"
     assert {check.figure.measure: check.verdict for check in cell.checks} == dict.fromkeys(
         ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
     )
@@ -156,13 +147,9 @@ def test_a_block_that_lands_flat_is_judged_by_the_nearest_law(run: Run) -> None:
     horizon = next(
         check.figure.until for check in cell.checks if check.figure.measure == "theta_rms"
     )
-    laws = {
-        model: law.law for model in run.models if (law := cell_of(run, "flat", model).impact_law)
-    }
+    laws = {model: law.law for model in run.models if (law := run.cell("flat", model).impact_law)}
     assert laws["trailing-first"] == "trailing-first"
     assert laws["ebm-unilateral"] == laws["mujoco"] == "moreau or leading-first"
-    assert cell.impact_law is not None
-    assert horizon is not None
     assert abs(horizon - cell.impact_law.t) < 0.02
 
 
@@ -181,8 +168,8 @@ def test_the_summary_names_the_laws_and_nothing_depends_on_them(run: Run, tmp_pa
     assert laws["plastic", "mujoco"] is None
     run.save(tmp_path)
     assert (
-        cell_of(Run.load(tmp_path), "of the law", "mujoco").impact_law
-        == cell_of(run, "of the law", "mujoco").impact_law
+        Run.load(tmp_path).cell("of the law", "mujoco").impact_law
+        == run.cell("of the law", "mujoco").impact_law
     )
     silent = run.model_copy(
         update={"cells": tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)}
@@ -196,7 +183,6 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
 ) -> None:
     scene, store = load_suite(suite_file).scenes["of the law"], Store(tmp_path)
     first = landing_of(store, scene)
-    assert first is not None
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
         patched.setattr("rockcheck.validation.suite.comparing.parting_landing", lambda scene: None)
@@ -215,7 +201,7 @@ def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> 
         "mujoco": [],
     }.items():
         assert list(under_other_laws(scene, suite.models[name])) == laws
-    assert under_other_laws(scene, ModelVariant("paper", "ebm", {})) == {}
+    assert under_other_laws(scene, Work(label="paper", family="ebm", settings={})) == {}
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:

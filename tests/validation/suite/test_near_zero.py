@@ -1,8 +1,6 @@
 """What is judged near zero: errors, quantities and counts, their floors, what is better, and ratios
 to nothing."""
 
-from __future__ import annotations
-
 import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -10,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rockcheck.commands.cli import main
 from rockcheck.scenes import Block, Floor, Rest, Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.figures import Figure
@@ -271,3 +270,52 @@ def test_accept_asks_a_reason_for_what_is_moved_or_loosened(tmp_path: Path, wors
 def test_what_moves_within_its_resolution_is_no_trend(values, moved):
     for name in ("s, m: last_rotation", "s, m: theta_rms@8s against r"):
         assert Trend(name=name, values=values).moved == moved
+
+
+SUITE = """
+reference = "still"
+[models.still]
+model = "faulty:Still"
+[models.leans]
+model = "faulty:Still"
+offset = OFFSET
+[require]
+difference = ["theta_rms", "peak_ratio", "sprague_geers_c"]
+figures = ["peak_rotation", "last_rotation"]
+[[scene]]
+name = "short"
+duration = 0.2
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+"""
+WORDS = ("mine.toml", "--allow-code", "faulty:Still", "--jobs", "1")
+
+
+def lean(offset: str) -> None:
+    Path("mine.toml").write_text(SUITE.replace("OFFSET", offset), encoding="utf-8")
+
+
+@pytest.mark.usefixtures("in_an_empty_folder")
+def test_a_better_step_passes_and_is_accepted_without_a_reason(typed):
+    """The peak falls from 3.1e-4 to 7.7e-5 alpha, nearer to that of a reference that stands: to
+    which no ratio is defined."""
+    lean("8e-5")
+    assert main(["accept", *WORDS]) == 0
+    first = Path("mine.tolerances.toml").read_text()
+    assert "peak_ratio" not in first
+    assert main(["validate", *WORDS, "--no-report", "--strict"]) == 0
+    lean("2e-5")
+    out = typed("validate", *WORDS, "--no-report", "--strict")[0]
+    assert "verdict: pass" in out
+    for better in ("theta_rms against still", "peak_rotation", "last_rotation"):
+        assert f"short, leans: {better}: 7.67" in out
+    assert main(["validate", *WORDS, "--no-report", "--strict", "both"]) == 1
+    assert main(["validate", "--strict", *WORDS, "--no-report"]) == 0, (
+        "the suite is no value of --strict"
+    )
+    out = typed("accept", *WORDS)[0]
+    assert out.count(": tightened: ") == 3
+    assert main(["validate", *WORDS, "--no-report", "--strict", "both"]) == 0
+    lean("8e-5")
+    assert main(["validate", *WORDS, "--no-report"]) == 1, "back where it was is worse"
+    assert "--reason" in typed("accept", *WORDS, code=1)[0]

@@ -1,8 +1,6 @@
 """Suites end to end: cells in workers that crash, hang and eat memory; results kept and read
 back."""
 
-from __future__ import annotations
-
 import gzip
 import json
 import math
@@ -55,7 +53,6 @@ FINE = (
 def write_suite(
     folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0
 ) -> Path:
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", folder / "faulty.py")
     tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
     path.write_text(
@@ -65,10 +62,7 @@ def write_suite(
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "path", list(sys.path))
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-
+def run(tmp_path, faulty):
     def run(path: Path, jobs: int = 0, **options: object) -> Run:
         return run_suite(load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options)
 
@@ -249,7 +243,6 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(tmp_path
     assert [(check.kind, check.verdict) for _, check in done.checks()] == [
         ("model form", "pass")
     ] * 2
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
     falling = re.sub(r"walls = .*", "initial_rotation = -0.3", FORM)
     path.write_text(
         falling.replace("[models.ebm]", '[models.ebm]\nmodel = "faulty:Still"'), encoding="utf-8"
@@ -333,7 +326,9 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
         ("box2d", "", ""),
     ],
 )
-def test_time_to_compile_does_not_count_for_a_cells_limit(tmp_path, model, settings, compiled):
+def test_time_to_compile_does_not_count_for_a_cells_limit(
+    tmp_path, faulty, model, settings, compiled
+):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
     study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
@@ -345,3 +340,42 @@ def test_what_takes_longest_begins_before_the_quick_rest():
     tasks = [Task(compiles=one) for one in compiles]
     begun = [next(n for n, task in enumerate(tasks) if task is one) for one in in_order(tasks)]
     assert begun == [1, 3, 0, 4, 2, 5]
+
+
+MODELS = "\n".join(
+    f'[models.{name}]\nmodel = "faulty:{name}"' for name in ("Segfault", "Hang", "Hog", "Fails")
+)
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("default")
+def test_a_cluster_gives_the_same_run_and_survives_failures(tmp_path, faulty):
+    path = tmp_path / "mine.toml"
+    path.write_text(
+        f"""reference = "Still"
+[limits]
+seconds = 8.0
+memory_mb = 600
+[models.Still]
+model = "faulty:Still"
+{MODELS}
+[[scene]]
+name = "short"
+duration = 0.5
+block = {{ half_width = 0.4, half_height = 1.5 }}
+floor = {{ friction = 0.5 }}
+""",
+        encoding="utf-8",
+    )
+    suite = load_suite(path, allow_code=OWN)
+    run = run_suite(suite, tmp_path / "out", scheduler="local:2")
+    reasons = {cell.model: cell.reason for cell in run.cells}
+    assert reasons == {
+        "Still": "",
+        "Segfault": "crashed: SIGSEGV",
+        "Hang": "did not end within 8 s",
+        "Hog": "out of memory",
+        "Fails": "more than 10 events",
+    }
+    at_home = run_suite(suite, tmp_path / "home", jobs=1)
+    assert at_home.cell("short", "Still").figures == run.cell("short", "Still").figures

@@ -1,12 +1,8 @@
 """What is read back is not trusted: a result that was damaged, edited or exchanged is found, and
 played or compared again."""
 
-from __future__ import annotations
-
 import json
 import os
-import shutil
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +10,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store, _sealed
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -47,10 +43,7 @@ ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch) -> Callable[[], Run]:
-    monkeypatch.setattr(sys, "path", list(sys.path))  # the suite's folder joins it
-    monkeypatch.delitem(sys.modules, "faulty", raising=False)
-    shutil.copy(Path(__file__).parents[1] / "models" / "faulty.py", tmp_path / "faulty.py")
+def run(tmp_path, faulty) -> Callable[[], Run]:
     (tmp_path / "mine.toml").write_text(SUITE)
 
     def run() -> Run:
@@ -81,6 +74,11 @@ def edited(path: Path, change: Callable[[Any], Any]) -> None:
     path.write_text(json.dumps(walk(json.loads(path.read_text()))))
 
 
+def sealed(path, content):
+    """Replace a record by another one with its right hash."""
+    Store(path.parent.parent).put_record(path.parent.name, path.stem, content)
+
+
 DAMAGE: dict[str, Callable[[Path], Any]] = {
     "a figure edited": lambda path: edited(
         path, lambda value: 0.5 * value + 7.0 if isinstance(value, float) else value
@@ -99,10 +97,10 @@ DAMAGE: dict[str, Callable[[Path], Any]] = {
     ),
     "not text": lambda path: path.write_bytes(b"\xff\xfe\x00"),
     "deep": lambda path: path.write_text("[" * 100_000),
-    "another shape, well hashed": lambda path: path.write_text(
-        _sealed(path.stem, {"figures": 7, "peaks": [1], "outcome": 3})
+    "another shape, well hashed": lambda path: sealed(
+        path, {"figures": 7, "peaks": [1], "outcome": 3}
     ),
-    "empty, well hashed": lambda path: path.write_text(_sealed(path.stem, {})),
+    "empty, well hashed": lambda path: sealed(path, {}),
 }
 
 

@@ -1,8 +1,6 @@
 """What CI reads: totals and failures of the JUnit file, limits that hold to the last digit,
 statistics against their definitions."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 
 import pytest

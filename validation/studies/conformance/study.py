@@ -389,6 +389,7 @@ def changes(before: Path, after: Path) -> Finding:
             worse = verdicts[0] == "pass" and verdicts[1] in ("fail", "error", "absent")
             versions = (one["version"] for one in (was, now))
             rows.append([*key, known["name"], *versions, *verdicts, *values, worse])
+    worse = sum(row[-1] for row in rows)
     columns = [
         Column("engine", kind="model"),
         text("settings"),
@@ -402,7 +403,6 @@ def changes(before: Path, after: Path) -> Finding:
         Column("value_after"),
         text("worse", brief=False),
     ]
-    worse = sum(row[-1] for row in rows)
     return Finding(
         "conformance-changes",
         "Conformance: what changed",

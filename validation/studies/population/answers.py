@@ -6,11 +6,11 @@ import csv
 import io
 import itertools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +35,7 @@ from rockcheck.validation.finding import (
 )
 from rockcheck.validation.studies.population.runs import Numbers, Played, Ran, Side, Sure
 from rockcheck.validation.studies.population.study import Population
-from rockcheck.validation.uncertainty.population import inputs_blocks, quantities_of, share_of
+from rockcheck.validation.uncertainty.population import Inputs, share_of
 
 #: The model of runs that are drawn or have another gap.
 SWIFT = "ebm-unilateral"
@@ -51,28 +51,17 @@ METHOD = ("name", "formula", "event", "source", "holds")
 MOVED = 1e-9
 #: Points of a history on the page.
 POINTS = 400
-
-
-class Source(NamedTuple):
-    """A source of uncertainty: what it is, what asks for it, and what of it changes the answer."""
-
-    what: str
-    asks: str
-    changes: str
-
-
+#: Sources of uncertainty: what each is, what asks for it, and what of it changes the answer.
 CONTRIBUTIONS = {
-    "records": Source("scatter between the records", "two records or more", "other records"),
-    "inputs": Source("draws of the scene's uncertain numbers", "--samples", "knowing {} better"),
-    "numerical error": Source(
+    "records": ("scatter between the records", "two records or more", "other records"),
+    "inputs": ("draws of the scene's uncertain numbers", "--samples", "knowing {} better"),
+    "numerical error": (
         "u_num of the model's own step or tolerance",
         "a model with a step",
         "a smaller step or tolerance",
     ),
-    "model form": Source("difference of the other models", "--models", "another model"),
-    LAW: Source(
-        "half the difference between the laws of impacts", "a wall", "another law of impacts"
-    ),
+    "model form": ("difference of the other models", "--models", "another model"),
+    LAW: ("half the difference between the laws of impacts", "a wall", "another law of impacts"),
 }
 #: The questions whose answers lead, as one would write them in a report.
 LEADS = ("Does it fall?", "How far does it move?", "Which gap is safe?")
@@ -210,13 +199,7 @@ def finding_of(found: Found) -> Finding:
         }
         for q in QUANTITIES
     }
-    numerical, certainty = quantities_of(
-        scene.name,
-        study.model,
-        own.numerical if own else None,
-        own.inputs if own else None,
-        own.depends_on_law_from_s if own else None,
-    )
+    numerical = numerical_of(study, own)
     answers = {
         "Does it fall?": [_fall(found, overturning)],
         "How far does it move?": _move(quantities),
@@ -239,8 +222,8 @@ def finding_of(found: Found) -> Finding:
         *(levels.blocks if levels else ()),
         _contributions(contributions),
         *_models(found),
-        *(replace(one, folded=True) if isinstance(one, Table) else one for one in certainty),
-        *(inputs_blocks(own.inputs) if own and own.inputs else ()),
+        *_certainty(own, numerical),
+        *(_inputs(own.inputs) if own and own.inputs else ()),
         Table(
             "methods",
             [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
@@ -363,6 +346,32 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
         {"source": name, "share": value / total, "sd": math.sqrt(value), "unit": "alpha"}
         for name, value in sorted(variance.items(), key=lambda one: -one[1])
     ]
+
+
+def numerical_of(study: Asked, own: Sure | None) -> dict[str, Any]:
+    """The numerical uncertainty of each figure of the scene under its own motion.
+
+    From the time on from which the motion depends on the law of impacts, no step is fine enough to
+    make a figure sure.
+    """
+    numerical, parts = (own.numerical, own.depends_on_law_from_s) if own else (None, None)
+    inputs = own.inputs if own else None
+    converged = numerical is not None and numerical.converged and parts is None
+    said = "a model without step or tolerance; its numerical error is not known"
+    if numerical is not None:
+        said = f"{'converged' if converged else 'not converged'}, by {numerical.method}"
+    return {
+        "scene": study.own.scene.name,
+        "model": study.model,
+        "converged": converged,
+        "depends_on_law_from_s": parts,
+        "method": numerical.method if numerical else "",
+        "quantities": [
+            {**q.model_dump(), "u_input": inputs.u_input(q.name) if inputs else None}
+            for q in (numerical.quantities if numerical else ())
+        ],
+        "said": said,
+    }
 
 
 #: Whether an event of a hand method happens in a run.
@@ -490,7 +499,8 @@ def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[st
     most = max(shares, key=lambda name: shares[name], default="the uncertain numbers")
     if own and own.inputs and own.inputs.sensitivities:
         most = own.inputs.sensitivities[0].name
-    said = CONTRIBUTIONS[contributions[0]["source"]].changes.format(most)
+    *_, changes = CONTRIBUTIONS[contributions[0]["source"]]
+    said = changes.format(most)
     return [f"{said[0].upper()}{said[1:]} would change the answer most."]
 
 
@@ -609,7 +619,7 @@ def _contributions(contributions: Sequence[Mapping[str, Any]]) -> Table:
     """Where the uncertainty of the peak rotation comes from."""
     known_of = {row["source"]: row for row in contributions}
     missing = [
-        f"{name} ({what.asks})" for name, what in CONTRIBUTIONS.items() if name not in known_of
+        f"{name} ({asks})" for name, (_, asks, _) in CONTRIBUTIONS.items() if name not in known_of
     ]
     said = f" Not asked for: {', '.join(missing)}." if missing else ""
     return Table(
@@ -620,10 +630,7 @@ def _contributions(contributions: Sequence[Mapping[str, Any]]) -> Table:
             Column("sd", "standard deviation", "α"),
             text("what", "what it is", brief=False),
         ],
-        [
-            [name, row["share"], row["sd"], CONTRIBUTIONS[name].what]
-            for name, row in known_of.items()
-        ],
+        [[name, row["share"], row["sd"], CONTRIBUTIONS[name][0]] for name, row in known_of.items()],
         "How sure",
         note=f"Of the variance of the peak rotation; a block that falls counts as 1 α.{said}",
     )
@@ -717,6 +724,61 @@ def _runs(found: Found) -> Table:
         on="page",
         note="Each name leads to the run's history as CSV.",
     )
+
+
+def _certainty(own: Sure | None, numerical: Mapping[str, Any]) -> Iterator[Block]:
+    if own and own.numerical:
+        columns = [
+            text("name", "quantity"),
+            *(Column(name, name, digits=4) for name in ("value", "u_num", "order")),
+            text("unit"),
+            text("verdict"),
+        ]
+        yield Table(
+            "numerical",
+            columns,
+            [[one[column.name] for column in columns] for one in numerical["quantities"]],
+            "Numerical uncertainty under the scene's own motion",
+            f"{numerical['scene']}, {numerical['model']}.",
+            folded=True,
+        )
+        yield Text(items=own.numerical.reasons)
+    if (parts := numerical["depends_on_law_from_s"]) is not None:
+        law = f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)"
+        yield Text(law, verdict="changed")
+
+
+def _inputs(inputs: Inputs) -> list[Block]:
+    """Tables of the figures with their input intervals, and of the sensitivities of the peak."""
+    about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
+    shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
+    return [
+        Table(
+            "inputs",
+            [
+                text("figure"),
+                *(Column(name, digits=4) for name in ("value", "low", "high")),
+                text("unit"),
+            ],
+            [
+                [one.name, one.value, one.low, one.high, one.unit]
+                for one in (*inputs.figures, inputs.overturns)
+            ],
+            "Uncertain inputs",
+            note=f"{about}; 95 % of them between low and high.",
+        ),
+        Table(
+            "sensitivities",
+            [
+                text("input", "what matters most for the peak"),
+                Column("alone", kind="percent", digits=2),
+                Column("with_others", kind="percent", digits=2),
+            ],
+            shares,
+            on="all" if shares else "file",
+        ),
+        Text(inputs.note),
+    ]
 
 
 def _histories(found: Found) -> list[Block]:

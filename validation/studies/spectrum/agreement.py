@@ -210,15 +210,15 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
     versions = ", ".join(f"{name} {found['versions'][name]}" for name in sorted(engines))
     about = f"{found['about']} {origin}. Settings: {settings}. {versions}."
     yield Text(about, "The same spectra by the other models", on="page")
-    model, by = Column("model", kind="model"), "Spectrum by spectrum"
+    model = Column("model", kind="model")
     yield _table("agreement", found["shares"], [model])
-    more = _table("agreement-by-spectrum", found["shares"], [text("spectrum"), model])
-    yield replace(more, title=by, on="page", folded=True)
+    by, how = [text("spectrum"), model], {"on": "page", "folded": True}
+    yield _table("agreement-by-spectrum", found["shares"], by, title="Spectrum by spectrum", **how)
     if found["maps"]:
         yield _drawn(found, panels)
 
 
-def _table(name: str, shares: Sequence[Any], by: Sequence[Column]) -> Table:
+def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
     """The shares of equal outcomes, summed up by some columns."""
     parts = list(itertools.product(REFERENCES, (True, False)))
     columns = [
@@ -242,7 +242,7 @@ def _table(name: str, shares: Sequence[Any], by: Sequence[Column]) -> Table:
         ]
         for at, some in groups.items()
     ]
-    return Table(name, [*by, *columns, Column("nodes"), Column("failed")], rows)
+    return Table(name, [*by, *columns, Column("nodes"), Column("failed")], rows, **more)
 
 
 def _equal(shares: Sequence[Any], reference: str) -> float | None:

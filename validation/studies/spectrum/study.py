@@ -89,10 +89,13 @@ class Spectra(Study):
         )
         if len(self.panels) == len(spectra) == 1:
             answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
-        blocks: list[Block] = [Text(ABOUT, on="page"), *self._figures(found)]
-        blocks.append(self._shares(found.spectra))
-        if any(one.depends_on_law is not None for one in spectra):
-            blocks.append(Text(LAWS, on="page"))
+        laws = any(one.depends_on_law is not None for one in spectra)
+        blocks: list[Block] = [
+            Text(ABOUT, on="page"),
+            *self._figures(found),
+            self._shares(found.spectra, laws),
+            *([Text(LAWS, on="page")] if laws else ()),
+        ]
         if found.paper:
             claims = measures.claims_of(found.paper)
             tally = Counter(claim.verdict for claim in claims)
@@ -180,8 +183,7 @@ class Spectra(Study):
                 one_impact[one.scene.floor.friction] = mask
         return None if book.wanted else measures.Paper(spectra, least, one_impact)
 
-    def _shares(self, spectra: Mapping[Panel, Spectrum]) -> Table:
-        laws = any(one.depends_on_law is not None for one in spectra.values())
+    def _shares(self, spectra: Mapping[Panel, Spectrum], laws: bool) -> Table:
         columns = [
             text("spectrum"),
             text("title", brief=False),

@@ -598,14 +598,13 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
                 ),
                 "excitation": stronger(scene.excitation),
                 "vertical": stronger(scene.vertical),
+                **{
+                    name: by(getattr(scene, name))
+                    for name in ("initial_angular_velocity", "initial_velocity", "initial_height")
+                },
             }
-            change |= {
-                name: by(getattr(scene, name))
-                for name in ("initial_angular_velocity", "initial_velocity", "initial_height")
-            }
-            tilt = by(scene.initial_rotation)
             try:
-                yield scene.replace(**change, initial_rotation=tilt)
+                yield scene.replace(**change, initial_rotation=by(scene.initial_rotation))
             except InputError:  # it would start inside a wall
                 yield scene.replace(
                     **change, initial_rotation=scene.initial_rotation * (1.0 - DISTURBANCE)

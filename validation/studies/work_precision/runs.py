@@ -216,7 +216,6 @@ class DiagramLine:
     #: The values of `--quick`, and those beside a wall, by which convergence is judged.
     quick: tuple[float, ...] = ()
     converge: tuple[float, ...] = ()
-    remark: str = ""
 
     def settings(self, value: float) -> dict[str, Any]:
         """The model's settings at one value."""
@@ -265,7 +264,6 @@ LINES = {
             (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
             quick=(1e-5, 1e-6, 1e-7),
             converge=_PENETRATIONS,
-            remark="step tied to the penetration",
         ),
         *(
             line

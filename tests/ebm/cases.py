@@ -1,0 +1,69 @@
+"""Pulses in the block's own units, and runs of independent programs with the scenes that they
+played (tests/data/README.md says what the columns mean)."""
+
+import csv
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK
+
+DATA = Path(__file__).parents[1] / "data"
+Row = dict[str, str]
+
+
+def rows_of(name: str) -> list[Row]:
+    with (DATA / name).open(newline="", encoding="utf-8") as table:
+        return list(csv.DictReader(table))
+
+
+BILATERAL = rows_of("ebm_ricker_cases.csv")
+UNILATERAL = rows_of("unilateral_ricker_cases.csv")
+#: The unilateral runs in which rigid bodies have one answer.
+UNAMBIGUOUS = [row for row in UNILATERAL if row["depends_on_rule"] == "0"]
+
+
+def ricker(frequency: float, amplitude: float, block: Block = PAPER_BLOCK) -> Ricker:
+    """A pulse of omega_p = `frequency` p and a_p = `amplitude` g tan(alpha)."""
+    return Ricker(
+        amplitude=amplitude * 9.81 * math.tan(block.alpha),
+        period=2.0 * math.pi / (frequency * block.frequency_parameter),
+    )
+
+
+def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
+    """The scene of a run, up to a time after its pulse."""
+    pulse = ricker(float(row["wp_over_p"]), float(row["ap_ratio"]))
+    return Scene(
+        name="reference",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=float(row["mu"])),
+        walls=[
+            Wall(side=row["side"], gap=float(gap), restitution=float(row["e_w"]))
+            for gap in filter(None, [row["gap"]])
+        ],
+        excitation=pulse,
+        duration=4.0 * pulse.period + rest,
+        **more,
+    )
+
+
+def peak_errors(
+    model: Any, rows: list[Row], rest: float, output_step: float
+) -> tuple[NDArray[np.float64], list[Row]]:
+    """Errors of the peak of |theta|, in alpha, where the block stays, and the rows whose outcome is
+    another. Peaks at a wall are sharp: rows must be close."""
+    errors, missed = [], []
+    for row in rows:
+        history = model.simulate(scene_of(row, rest, output_step=output_step))
+        names = {"overturned left": "ccw", "overturned right": "cw"}
+        if names.get(history.outcome, "safe") != row["outcome"]:
+            missed.append(row)
+        elif row["outcome"] == "safe":
+            peak = history.peak_rotation / PAPER_BLOCK.alpha
+            errors.append(abs(peak - float(row["peak_theta_over_alpha"])))
+    return np.array(errors), missed
