@@ -64,30 +64,22 @@ STUDIES = (
 View = SceneView | EnsembleView
 
 
-def write_figure(folder: Path, name: str, path: Path, against: str | None = None) -> Path:
+def write_figure(folder: Path, name: str, path: Path) -> Path:
     """Draw a finished run's scene or ensemble into the file `path`; returns it.
 
-    The file name ends in one of `style.FORMATS`.
-
-    `against`: the model whose differences a scene's figure shows, by default its first reference.
-    Raises `InputError` for what the run does not have.
+    The file name ends in one of `style.FORMATS`. A scene's figure shows differences from its first
+    reference. Raises `InputError` for what the run does not have.
     """
     kind_of(path)
     pages = _Pages(folder, (name,))
     view = pages.views[name]
     if isinstance(view, EnsembleView):
-        if against is not None:
-            raise InputError(
-                "an ensemble's figure shows differences from its reference", "--against"
-            )
         return save_as(figure_of(view.distributions()), path)
-    if against is not None and against not in view.histories:
-        raise unknown_name("model with a history of this scene", against, view.histories)
     if not view.histories:
         raise InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
-    return save_as(histories_figure(view, against), path)
+    return save_as(histories_figure(view), path)
 
 
 def write_site(

@@ -68,7 +68,7 @@ GONE = {
     "compare --all": "--json has all that moved",
     "simulate --plot": "-o FILE.png, beside -o FILE.csv",
     "spectrum --force": "give another --out",
-    "assess --paper": "PNG and PDF are always written",
+    "report --against": "rockcheck compare A.csv B.csv --plot FILE",
     "benchmark --minutes": "it ends after 25 minutes, and goes on when called again",
 }
 #: Commands that are not listed.

@@ -43,13 +43,6 @@ def run(
             "-o", "--output", help="Draw one scene or ensemble, and stop: .svg, .png or .pdf."
         ),
     ] = None,
-    against: Annotated[
-        str | None,
-        typer.Option(
-            "--against",
-            help="With -o: the model whose differences are shown (default: the first reference).",
-        ),
-    ] = None,
 ) -> None:
     """Render the pages of a finished run again.
 
@@ -64,12 +57,10 @@ def run(
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
         check_file(output, "--output")
-        written = write_figure(folder, scene[0], output, against)
+        written = write_figure(folder, scene[0], output)
         console().print(f"figure: {written}", soft_wrap=True)
         answer({"figure": written})
         return
-    if against is not None:
-        raise InputError("needs -o FILE", "--against")
     with progress("pages") as on_progress:
         index = publish(folder, afresh=not scene, wanted=scene or (), on_progress=on_progress)
     console().print(f"report: {index}", soft_wrap=True)

@@ -52,7 +52,7 @@ def write(name, text):
         (["compare", "a", "b", "--all"], "--all: is gone: --json"),
         (["simulate", "fig5a", "--plot=a.png"], "--plot: is gone: -o FILE.png"),
         (["spectrum", "fig8", "--force"], "--force: is gone: "),
-        (["assess", "fig5a", "--paper"], "--paper: is gone: "),
+        (["report", "out", "--against=ebm"], "--against: is gone: "),
         (["benchmark", "--minutes", "5"], "--minutes: is gone: "),
         (["report", "."], "no finished run here"),
         ([], "Missing command"),
