@@ -214,13 +214,13 @@ def exported(tmp_path):
 
 def test_the_scenes_are_exported_as_plain_columns(exported):
     # What another program needs is there without a reader of scene files, and is what the scene is.
-    rows = pd.read_csv(exported / "scenes.csv").set_index("scene")
+    rows = pd.read_csv(exported / "scenes.csv", dtype=str).set_index("scene")
     assert list(rows.index) == list(SCENES)
     for name, scene in SCENES.items():
         row = rows.loc[name]
         np.testing.assert_allclose(row[list(study.STATE)].astype(float), scene.initial_state)
-        assert row["half_width_m"] == scene.block.half_width
-        assert np.isnan(row["left_wall_gap_m"]) == (not scene.walls)
+        assert float(row["half_width_m"]) == scene.block.half_width
+        assert np.isnan(float(row["left_wall_gap_m"])) == (not scene.walls)
         assert load_scene(exported / f"{name}.toml").initial_state == scene.initial_state
         path = exported / f"{name}-base.csv"
         assert path.exists() == (scene.excitation.kind != "rest" or scene.vertical.kind != "rest")
