@@ -272,9 +272,16 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
     return found
 
 
+def _fields(path: Path, index: int, across: int, width: int) -> tuple[int, int]:
+    """The numbers on a line and their width; raises `InputError` where there are none."""
+    if across < 1 or width < 1:
+        raise fault(path, "a format without fields", index)
+    return across, width
+
+
 def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
     """Take direction and time step from a block of header values; returns the line after it."""
-    across, width = int(header[4]), int(header[5])
+    across, width = _fields(path, index, int(header[4]), int(header[5]))
     rows = min(int(header[3][:6]), len(lines) - index)
 
     def word(place: int) -> tuple[int, str]:
@@ -300,8 +307,7 @@ def _recording(
     path: Path, lines: list[str], index: int, about: _Block, reading: Reading
 ) -> Recording:
     count = checked_count(path, index, "the count of points", about.count)
-    if about.across < 1 or about.width < 1:
-        raise fault(path, "a format without fields", index)
+    _fields(path, index, about.across, about.width)
     place, stated = about.step
     step = checked_step(path, place, "the time step", f"{stated!r}")
     seconds = settled_step(path, step, reading)

@@ -2,6 +2,7 @@
 is read."""
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -258,6 +259,16 @@ def test_a_v2_file_has_its_own_time_step_not_that_of_the_raw_record(tmp_path):
         read_record(path)
     path.write_text(text.replace(own, f"{-999:13.6f}").replace(raw, f"{-999:13.6f}"))
     with pytest.raises(InputError, match="no real header before this block states the time step"):
+        read_record(path)
+
+
+def test_a_v2_header_whose_format_has_no_fields_is_a_fault_of_its_line(tmp_path):
+    path = tmp_path / "a.V2"
+    text = cosmos("N-S").decode()
+    text, formats = re.subn(r"(header +values +follow.*= *\(?)[0-9]+", r"\g<1>0", text)
+    assert formats
+    path.write_text(text)
+    with pytest.raises(InputError, match=r"a\.V2, line [0-9]+: a format without fields"):
         read_record(path)
 
 
