@@ -46,8 +46,7 @@ from rockcheck.ebm.core.series import (
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
-#: Each guard, in the order of `Guard`: what it is, and the series that it can combine. A rate is
-#: that of its combination.
+#: Each guard: what it is, and the series that it can combine. A rate is that of its combination.
 GUARDS: dict[int, tuple[int, ...]] = {
     Guard.PHI: (Kind.POSITION, Row.PHI),
     Guard.TOPPLE: (Kind.POSITION, Row.PHI),
@@ -64,10 +63,12 @@ GUARDS: dict[int, tuple[int, ...]] = {
     Guard.UPLIFT_MINUS: (Kind.FORCE, Row.P, Row.Q),
     Guard.LOADS: (Kind.POSITION,),
 }
-KIND = np.array([GUARDS[which][0] for which in GUARDS])
-_MOST = 3
+KIND = np.array([GUARDS[which][0] for which in range(len(GUARDS))])
+_MOST = max(map(len, GUARDS.values())) - 1
 # The series that a guard combines. The guard itself fills the empty places: it has no weight.
-_COMBINES = np.array([[*GUARDS[which][1:], *[Row.GUARD] * _MOST][:_MOST] for which in GUARDS])
+_COMBINES = np.array(
+    [[*GUARDS[which][1:], *[Row.GUARD] * _MOST][:_MOST] for which in range(len(GUARDS))]
+)
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the
 # order the guard has (-1: no guard).
 _CONSTANT, _SHORTER = 30, 31
