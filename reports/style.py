@@ -223,7 +223,7 @@ def save(
             content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=undated[kind])
             written.append(write_whole(path, content.getvalue(), named=named))
-            figure.set_layout_engine("none")  # the other formats are laid out alike
+            figure.set_layout_engine(None)  # the other formats are laid out alike
     return written
 
 

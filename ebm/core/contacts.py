@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
 
 #: The zero of position (R) and of velocity (sqrt(g R)): a contact nearer and slower than this is
@@ -43,6 +44,19 @@ def stand(block, motion):
     """Stops the pivot: the velocity is that of a rotation about it."""
     side = lower(block, motion)
     motion.vx = -side.radius * math.cos(side.alpha - abs(motion.theta)) * motion.w
+
+
+@inner_kernel
+def stand_if_slow(block, motion):
+    """Stops a pivot whose slip is zero but for rounding."""
+    if abs(slip_velocity(block, motion)) < slowest(motion.w):
+        stand(block, motion)
+
+
+@inner_kernel
+def slowest(w):
+    """The zero of a corner's velocity: within an INSTANT the block turns by w INSTANT."""
+    return max(SLOW, INSTANT * w * w)
 
 
 @inner_kernel
@@ -82,7 +96,7 @@ def closed_wall(block, motion, side, bottom):
         arm = -faces.radius * math.cos(faces.alpha + abs(phi))
     else:
         arm = faces.top_radius * math.cos(faces.top_alpha + abs(phi))
-    return abs(motion.vx - arm * motion.w) < SLOW
+    return abs(motion.vx - arm * motion.w) < slowest(motion.w)
 
 
 @inner_kernel
@@ -100,7 +114,7 @@ def closed_floor(block, motion):
         lower(block, motion),
     )
     rate = motion.vy - side.radius * math.sin(side.alpha - abs(motion.theta)) * turns
-    return abs(floor_gap(block, motion)) < CLOSED and abs(rate) < SLOW
+    return abs(floor_gap(block, motion)) < CLOSED and abs(rate) < slowest(motion.w)
 
 
 @inner_kernel

@@ -280,8 +280,8 @@ def _clean(block, motion, floor):
     That is a tilt, a slip, or the motion of a block that stands on floor and wall.
     """
     contacts.upright(block, motion)
-    if floor and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW:
-        contacts.stand(block, motion)
+    if floor:
+        contacts.stand_if_slow(block, motion)
     if not floor or not block.walls or (motion.theta == 0.0 and motion.w == 0.0):
         return
     side = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1

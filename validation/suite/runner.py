@@ -20,7 +20,7 @@ from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import compiles, has_wheel, is_own, not_installed
+from rockcheck.validation.execute.models import compiles, family, has_wheel, is_own, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
@@ -472,15 +472,17 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
     """The order in which cells begin.
 
     First one cell for each compiled code, since the others with that code wait for it; then the
-    cells that are not compiled, which take longest; the quick rest fills the processes up to the
-    end.
+    cells that take long, the longest scenes with the most walls first; cells of models that are
+    compiled as a whole are quick, and fill the processes up to the end.
     """
-    first = {item.compiles: n for n, item in reversed(list(enumerate(items)))}
-    turn = [
-        1 if not item.compiles else 0 if first[item.compiles] == n else 2
-        for n, item in enumerate(items)
-    ]
-    return [items[n] for n in sorted(range(len(items)), key=turn.__getitem__)]
+    first = {item.compiles: item for item in reversed(items)}
+
+    def turn(item: Planned) -> tuple[bool, bool, float]:
+        quick, scene = family(item.variant.family).compiled, item.scene
+        waits = not item.compiles or first[item.compiles] is not item
+        return waits, quick, -scene.duration * (1 + len(scene.walls))
+
+    return sorted(items, key=turn)
 
 
 def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:

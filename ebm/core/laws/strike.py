@@ -55,12 +55,8 @@ def strike(block, base, run, resting):
         known = _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
         known = _floor_impact(block, state, resting)
-    if (
-        not known
-        and not block.unilateral
-        and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW
-    ):
-        contacts.stand(block, motion)
+    if not known and not block.unilateral:
+        contacts.stand_if_slow(block, motion)
     if motion.theta == 0.0 and abs(motion.w) < SETTLE:
         _settle_flat(block, state, resting)
         known = False
@@ -213,7 +209,7 @@ def _corner_impact(block, state, sw, e, resting):
     stays = stays or sw * (xdot2 - C * w2) < resting
     if stays:
         xdot2 = C * w2
-    if abs(xdot2 + c * w2) < contacts.SLOW:
+    if abs(xdot2 + c * w2) < contacts.slowest(w2):
         xdot2 = -c * w2
     motion.w, motion.vx, motion.vy = sign * w2, sign * xdot2, s * w2
     # Its side: the other corner follows.
@@ -265,5 +261,5 @@ def _strike_all(block, base, run, resting):
         least = found == Found.LEAST_WRONG
         state.rules[Rule.LEAST_CONTRADICTION if least else Rule.ENDLESS_STAGES] += 1
     motion.vx, motion.vy, motion.w = sign * v[0], v[1], sign * v[2]
-    if floor and abs(contacts.slip_velocity(block, motion)) < contacts.SLOW:
-        contacts.stand(block, motion)
+    if floor:
+        contacts.stand_if_slow(block, motion)

@@ -17,7 +17,6 @@ import pytest
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.study import Task
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -335,11 +334,16 @@ def test_time_to_compile_does_not_count_for_a_cells_limit(
     assert {cell.compiles for cell in study.cells if cell.variant.label == "a"} == {compiled}
 
 
-def test_what_takes_longest_begins_before_the_quick_rest():
-    compiles = ("", "ebm", "ebm", "cm", "", "cm")
-    tasks = [Task(compiles=one) for one in compiles]
-    begun = [next(n for n, task in enumerate(tasks) if task is one) for one in in_order(tasks)]
-    assert begun == [1, 3, 0, 4, 2, 5]
+def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
+    """One cell of each code that is compiled, and the engines before the quick models; walls take
+    longer."""
+    study = SuiteStudy(load_suite("paper"), tmp_path)
+    begun = [(cell.variant.label, cell.place) for cell in in_order(study.cells)]
+    first = ("mujoco", "ebm-unilateral", "ebm", "cm")
+    assert begun[:4] == [(model, "fig4a") for model in first]
+    engines = begun[4:11]
+    assert {model for model, _ in engines} == {"mujoco", "pybullet"}
+    assert [scene[:4] for _, scene in engines] == 4 * ["fig5"] + 3 * ["fig4"]
 
 
 MODELS = "\n".join(
