@@ -5,8 +5,6 @@ contact's effective mass is the share of the block's mass that its corner feels,
 J^T, without unit.
 """
 
-from __future__ import annotations
-
 import math
 
 

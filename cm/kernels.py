@@ -36,8 +36,6 @@ explicit dampers (xi = 7, friction damper 30 sqrt(k/m)):
 Kinks of the forces bring all fixed ones down to first order, so a higher order buys nothing.)
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

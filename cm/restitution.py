@@ -1,7 +1,5 @@
 """The restitution that a contact of the Continuous Model reaches, read off the motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ histories of the rotation on a common grid of times, peaks and last slips. Threa
 rows; the result of a row depends neither on the other rows nor on the number of threads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """How long a comparison of two histories of one scene means anything."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import suppress
 from itertools import chain

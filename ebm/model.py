@@ -1,7 +1,5 @@
 """The event-based models: `ebm`, `ebm-unilateral` and `ebm-bouc-wen`."""
 
-from __future__ import annotations
-
 import time
 from functools import partial
 from typing import Annotated, Any, Literal, Self

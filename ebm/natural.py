@@ -4,8 +4,6 @@ Lengths are in R, accelerations in g, times in sqrt(R/g). Of a block that is not
 that of its weaker pivot, and the compiled code follows its mass's centre, not the box's.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

@@ -8,8 +8,6 @@ so short that nothing else happens in it. Between events the acceleration change
 to step; that change corrects the drift, which is then of third order.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """The base motion as a velocity: its differences are exact mean accelerations over a step."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

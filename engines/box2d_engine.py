@@ -1,7 +1,5 @@
 """Box2D v3 (pyb2d3) as a model of the rocking block."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

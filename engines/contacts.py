@@ -3,8 +3,6 @@
 All functions take scalars or arrays, SI units, relative to the base, counterclockwise positive.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Literal
 

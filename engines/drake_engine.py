@@ -1,7 +1,5 @@
 """Drake as a model of the rocking block."""
 
-from __future__ import annotations
-
 import logging
 import math
 from collections.abc import Mapping

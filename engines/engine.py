@@ -1,7 +1,5 @@
 """The interface of every engine: its settings, its methods and the history it returns."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time

@@ -1,7 +1,5 @@
 """Events of a motion computed with contacts instead of modes, read off the states at step ends."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Jolt (culverin) as a model of the rocking block."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Common parts of every engine's march: unit of length, fixed steps, states at output times."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

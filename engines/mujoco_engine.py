@@ -1,7 +1,5 @@
 """MuJoCo as a model of the rocking block."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 

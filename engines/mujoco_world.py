@@ -1,7 +1,5 @@
 """A scene as MuJoCo holds it: the model's text, and its march."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from rockcheck.engines.contacts import Surface, surfaces_of

@@ -1,7 +1,5 @@
 """PhysX 5 (sapien) as a model of the rocking block."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from typing import Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """PyBullet as a model of the rocking block."""
 
-from __future__ import annotations
-
 import math
 import os
 from functools import cache

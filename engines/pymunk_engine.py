@@ -1,7 +1,5 @@
 """pymunk (Chipmunk, in two dimensions) as a model of the rocking block."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from rockcheck.engines.adaptive import Vector

@@ -5,8 +5,6 @@ corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A
 pieces, their interval and the last velocity.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """How an engine's steps follow each other: all of one length, or as long as the events allow."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

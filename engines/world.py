@@ -1,7 +1,5 @@
 """What an engine gives: one scene as it holds it, to be placed, stepped and looked at."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 import numpy as np

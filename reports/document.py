@@ -4,8 +4,6 @@ Each block is rendered from one description. All pages have one look, made of th
 `data/templates`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace

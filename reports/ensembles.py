@@ -1,7 +1,5 @@
 """Views of an ensemble: peak rotations by model, and agreement of models scene by scene."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -7,8 +7,6 @@ ground, each channel and each running figure. All lines of a page are packed tog
 place holds the number of its line, so that lines on which models agree are kept once.
 """
 
-from __future__ import annotations
-
 import base64
 import re
 import zlib

@@ -4,8 +4,6 @@ First the answer: how far each model lies from the run's reference, scene by sce
 scenes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The view of one scene: histories on one time axis, differences, tolerances and horizon."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Container, Iterable

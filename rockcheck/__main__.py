@@ -1,7 +1,5 @@
 """`python -m rockcheck`, and the command `rockcheck`."""
 
-from __future__ import annotations
-
 import atexit
 import gc
 import os

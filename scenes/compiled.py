@@ -6,8 +6,6 @@ source files of the function's package, such as rockcheck.ebm with all below it.
 code in its cache. Here a file is read only if this user wrote it and it is complete.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import hashlib

@@ -1,7 +1,5 @@
 """Exceptions with messages of one line: unusable input, or a model that cannot finish."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches

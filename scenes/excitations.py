@@ -4,8 +4,6 @@ Every excitation counts time from its own start (t = 0) and gives the accelerati
 m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

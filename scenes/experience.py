@@ -4,8 +4,6 @@ The data, data/experience.json, are written by docs/site_tools/experience.py fro
 (`validation.suite.across`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from functools import cache

@@ -7,8 +7,6 @@ need the centre of mass convert by `of_mass` and `of_box`; the two centres of a 
 are one.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Builds a History from any model's states on the output grid."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypedDict, Unpack

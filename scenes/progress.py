@@ -8,8 +8,6 @@ which reaches the block that is `listening` in the same thread. Without one the 
 Threads run kernels (`scenes.compiled`); Ctrl-C ends the wait for them at once. Needs no compiler.
 """
 
-from __future__ import annotations
-
 import os
 import threading
 from collections.abc import Callable, Iterator

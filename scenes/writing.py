@@ -1,7 +1,5 @@
 """Writing: files that are complete or untouched, tables as CSV, values as JSON."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

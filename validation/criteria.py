@@ -9,8 +9,6 @@ mass's centre, alpha its slenderness angle, p the frequency parameter, mu_s and 
 kinetic friction. SI units, frequencies in Hz.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ runner does the rest: it reads results back and keeps them, plays tasks side by 
 or in this process, reports progress and an estimate, and turns an error in a task into a `Failure`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """The block with its floor and walls, a record that compiled code reads by name: SETTING."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from rockcheck.scenes.compiled import inner_kernel

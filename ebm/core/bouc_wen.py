@@ -19,8 +19,6 @@ slip; they change velocities only, so that z goes on through them. "slip" and "s
 the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that has not (ROCK, LEAN).
 """
 
-from __future__ import annotations
-
 import math
 
 from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes

@@ -4,8 +4,6 @@ Natural units. A contact is closed where its gap and the gap's rate are zero; th
 position, one of velocity.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -19,8 +19,6 @@ then `EventBasedModel` (`friction`, `name`, `check`, `decides`), a family in
 stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's integration.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rockcheck.ebm.core import contacts, guards, modes, series

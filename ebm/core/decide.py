@@ -1,7 +1,5 @@
 """When the outcome and the peak of a run are certain before its end. Only spectra ask for it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

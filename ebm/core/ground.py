@@ -3,8 +3,6 @@
 Natural units throughout: acceleration in g, time in sqrt(R/g).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -21,8 +21,6 @@ is not negative in a mode that may begin. What only tells, as the passing of an 
 `ebm.core.moving.advance` finds the top of a swing so, by a root of its own, and `note` writes it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ and the code that is built in its place.
 all, or keep none.
 """
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Callable
 from typing import Any

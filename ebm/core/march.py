@@ -5,8 +5,6 @@ behind four doors: `expand`, `locate`, `advance` and `after_event` of ebm.core.c
 ebm.core.bouc_wen.
 """
 
-from __future__ import annotations
-
 import math
 from types import ModuleType
 

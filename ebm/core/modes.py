@@ -13,8 +13,6 @@ goes on with a *slack*: the noise that its guards are allowed. Each further such
 instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

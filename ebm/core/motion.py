@@ -25,8 +25,6 @@ speed. While the block is *flat* (theta = 0, both corners down or both walls' co
 only translates.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

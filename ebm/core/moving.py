@@ -1,7 +1,5 @@
 """A step of a moving block: whether there is one, its rows, its end, and what ends no mode."""
 
-from __future__ import annotations
-
 import math
 
 from rockcheck.ebm.core.contacts import CLOSED

@@ -1,7 +1,5 @@
 """The core's names, by theme. Compiled code reads a member as the number that it stands for."""
 
-from __future__ import annotations
-
 import itertools
 from enum import IntEnum
 from typing import Any

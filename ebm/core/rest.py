@@ -1,7 +1,5 @@
 """Rest is not stepped through."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ one home in the code, is counted in every run (`History.cost.rules`), and has a 
 docs/limits.md.
 """
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -10,8 +10,6 @@ one such polynomial a step, so an event is the root of a polynomial and can be l
 with a proof that no earlier one was missed.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

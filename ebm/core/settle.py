@@ -6,8 +6,6 @@ to a bound; after a quiet of that time it falls back. After five hundred times a
 too many at one instant, all impacts are plastic. So impacts are finitely many in any finite time.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rockcheck.ebm.core.rules import Rule

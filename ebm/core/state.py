@@ -4,8 +4,6 @@ Compiled code reads a field of a record at the cost of an array's element. Natur
 R, accelerations in g, time in sqrt(R/g), unit mass.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -3,8 +3,6 @@
 Import this module only to draw: it imports matplotlib, which takes a second.
 """
 
-from __future__ import annotations
-
 import io
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Readable numbers, units and facts, and the escaped HTML tables that notebooks show."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """`rockcheck assess`: does it fall, how far does it move, how sure is that."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from pathlib import Path

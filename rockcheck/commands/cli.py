@@ -3,8 +3,6 @@
 Each command is a module of rockcheck.commands.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib
 import inspect

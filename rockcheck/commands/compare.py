@@ -1,7 +1,5 @@
 """`rockcheck compare`: any two histories, or two finished runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`rockcheck record`: how a file of a recorded ground motion was read."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any

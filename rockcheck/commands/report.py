@@ -4,8 +4,6 @@ Any command writes a finished run into its folder by `keep` (run.json, tables) a
 (pages).
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

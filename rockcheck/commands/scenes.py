@@ -1,7 +1,5 @@
 """`rockcheck scenes`: what there is to run; and `rockcheck new`: a scene file to start from."""
 
-from __future__ import annotations
-
 from importlib import resources
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`rockcheck simulate`: one history."""
 
-from __future__ import annotations
-
 import tempfile
 from collections import deque
 from functools import partial

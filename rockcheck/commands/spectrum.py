@@ -1,7 +1,5 @@
 """`rockcheck spectrum`: overturning spectra, the paper's or the user's own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`rockcheck benchmark`, `rockcheck stress`, `rockcheck conformance`: the models under test."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Annotated, get_args

@@ -1,7 +1,5 @@
 """`rockcheck validate`: the main job; `rockcheck accept`: its figures become the expected ones."""
 
-from __future__ import annotations
-
 import sys
 from contextlib import suppress
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 A user then waits for no compiler.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from collections import deque

@@ -13,8 +13,6 @@ A format is recognised by the file's content; `.AT2` and `.csv` by the name. Eve
 in proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

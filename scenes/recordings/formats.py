@@ -7,8 +7,6 @@ Only the blocks of acceleration are read. Source: COSMOS Strong Motion Data Form
 34 that of the raw record in s, which counts only where 62 is not known.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

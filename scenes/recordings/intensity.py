@@ -1,7 +1,5 @@
 """Intensity measures of recorded ground motions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The compiled response of an oscillator to a recorded motion."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

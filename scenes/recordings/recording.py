@@ -1,7 +1,5 @@
 """A recorded ground motion as read from a file, and the options of its reader."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Sets of recorded motions: their files, and their horizontal and vertical components."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources

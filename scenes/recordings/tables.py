@@ -1,7 +1,5 @@
 """Tables of numbers: CSV with named columns, and plain columns of text."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impa
 instant"). This names the one that a history took, without judging it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ Columns are named as in a history (`scenes.history.COLUMNS`), each with its unit
 Signs are the scene's: theta counterclockwise positive, x the centroid relative to the base.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

@@ -6,8 +6,6 @@ where the histories lack a column or event that they need. In the formulas r is 
 candidate, d = c - r, and <.> the mean over the window, by the trapezoidal rule.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

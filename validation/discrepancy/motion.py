@@ -1,7 +1,5 @@
 """How far a block moves: the four figures of a history that an engineer reads first."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 Distributions of the peaks, agreement on overturning, bias and scatter.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The models by the names that suites and the command line use; their code and libraries."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Container, Mapping

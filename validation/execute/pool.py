@@ -8,8 +8,6 @@ worker is protected in the same way: its child process ends, the worker does not
 for the next call of the same run, since starting one takes as long as many a call.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import multiprocessing

@@ -3,8 +3,6 @@
 A result depends on code, libraries, scene and settings.
 """
 
-from __future__ import annotations
-
 import ast
 import contextlib
 import hashlib

@@ -13,8 +13,6 @@ only ever write the same thing, and a reader never meets a half-written or outda
 record holds the hash of its own name and content: a damaged, edited or exchanged record is ignored.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """How a worker plays a cell or a batch of scenes."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 import time

@@ -1,7 +1,5 @@
 """The paper's 28 overturning spectra: its Figs. 6 to 9."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from importlib import resources

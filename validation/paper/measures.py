@@ -4,8 +4,6 @@ Evaluates `data/paper/sentences.toml`. The measures that it names come first. Ea
 and its arguments, and returns rows of figures and the values for the finding's text.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 The file keeps its comments and order.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping, MutableMapping

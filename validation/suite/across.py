@@ -13,8 +13,6 @@ The reference's own numerical error is far below sigma and left out. A new predi
 expected at M/delta, with a relative standard deviation sigma: `History.expected`.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

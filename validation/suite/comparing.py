@@ -5,8 +5,6 @@ the landing at which laws part, and the effect of a spread of inputs on figures.
 sets a cell's difference from each reference against u_num, u_input and u_D (ASME V&V 20).
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Run a suite: play the cells that are not up to date, compare, judge, return the `Run`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime

@@ -1,7 +1,5 @@
 """Verdicts as blocks of a finding; for machines and job pages as JUnit XML and Markdown."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Container, Iterator

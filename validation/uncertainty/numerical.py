@@ -24,8 +24,6 @@ An event-based model has a tolerance instead of a step: u_num = 1.25 times the c
 of it. All uncertainties here are expanded ones: intervals that are meant to hold 95 % of the cases.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, Literal

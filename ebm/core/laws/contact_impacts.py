@@ -24,8 +24,6 @@ The first two differ where a block lands flush against a bouncing wall, the last
 where it lands flat while it slides. Rigid-body mechanics does not say which law is right there.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -11,8 +11,6 @@ cos(alpha - |theta|) and cos(alpha + |theta|) of a homogeneous block. k = 1/(I +
 on the pivot.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

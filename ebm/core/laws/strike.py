@@ -5,8 +5,6 @@ one every contact that touches takes part (`contact_impacts`). Either way slow r
 Zeno rule (ebm.core.settle). Natural units.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

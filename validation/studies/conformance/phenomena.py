@@ -4,8 +4,6 @@ All figures are read off positions (t, x, y, theta), so that any simulator that 
 judged.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

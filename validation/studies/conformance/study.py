@@ -4,8 +4,6 @@ Each phenomenon has a certain answer; histories may be written elsewhere. `expor
 for an engine elsewhere.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections import Counter

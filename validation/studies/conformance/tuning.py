@@ -3,8 +3,6 @@
 They are found by dropping a block and by sliding it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass

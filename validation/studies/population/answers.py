@@ -1,7 +1,5 @@
 """Answers from the runs of an assessment, led by a sentence for an engineer's report."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

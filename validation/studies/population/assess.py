@@ -5,8 +5,6 @@ scene under its own base motion or under records; each run again with its number
 gaps, by other models.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Runs of an assessment: what one is, what it gives, and how it is played."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args

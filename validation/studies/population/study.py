@@ -4,8 +4,6 @@ A block is played under many motions at many intensities. An intensity is in pro
 of its motion, so the factor of a motion is the wanted intensity over the motion's own.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ At some nodes of each spectrum the outcomes are compared with those of the event
 maps are of one figure.
 """
 
-from __future__ import annotations
-
 import itertools
 import zlib
 from collections.abc import Iterator, Mapping, Sequence

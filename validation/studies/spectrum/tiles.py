@@ -1,7 +1,5 @@
 """A spectrum's request, the tasks that play its nodes, and the spectra that are complete."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

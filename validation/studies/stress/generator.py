@@ -3,8 +3,6 @@
 Each follows from a seed and a number, so any one can be made again.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, Literal

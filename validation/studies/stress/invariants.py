@@ -6,8 +6,6 @@ Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/
 relative to the energy at play.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping

@@ -15,8 +15,6 @@ of its acceleration that the velocities alone give:
     M  delta - xi - s'   (-1, 0, -c')    s' w^2
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The models under stress: settings and scenes of each, and the invariants that it must keep."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

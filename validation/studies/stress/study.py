@@ -6,8 +6,6 @@ that should stand still.
 In these maps lengths are in R, times in sqrt(R/g): a domino and a tower get the same step.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -6,8 +6,6 @@ few per cent in tilt or amplitude, so that their uplifts and impacts fall on oth
 Each is played up to its horizon of predictability and compared up to there.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence

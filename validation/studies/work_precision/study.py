@@ -1,7 +1,5 @@
 """`rockcheck benchmark`: run time against error, batches, savings, convergence, as one study."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

@@ -5,8 +5,6 @@ evaluations. A saving is the cost of one thing that a scene may not need: the sa
 without it.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess
