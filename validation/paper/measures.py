@@ -4,10 +4,11 @@ Evaluates `data/paper/sentences.toml`. The measures that it names come first. Ea
 and its arguments, and returns rows of figures and the values for the finding's text.
 """
 
+import operator
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,8 @@ SAID = ("{} wall", "μ {:g}", "{:g} mm", "e {:g}")
 #: A change of the safe area by less than this share of the nodes is ignored: a band one node wide
 #: along the boundary.
 SMALL = 0.01
+#: The bounds of a safe area that a part of `against_none` may have.
+BOUNDS = {"below": operator.lt, "beyond": operator.gt}
 #: Range of omega_p/p of the paper's example of overturning with one impact.
 ONE_IMPACT = (2.0, 3.0)
 #: The scanned amplitudes, beyond the spectra's own range, and the omega_p/p of the scan; and for
@@ -164,39 +167,60 @@ def against_none(
     area is `below`, or `beyond`, the factor times the area without one plus the share. With
     `examples` some walls must help, and some harm.
     """
-    rows, gains, ratios = [], [], []
     high = paper.frequencies > above
-    for number, part in enumerate(parts):
-        for place in WALLS:
-            values = {name: AXES[name][n] for name, n in zip(AXES, place, strict=True)}
-            if values != values | {name: part[name] for name in AXES if name in part}:
-                continue
-            wall, none = (
-                float(np.mean(safe[:, high]))
-                for safe in (paper.safe[place], paper.safe_alone[place[1]])
-            )
-            holds = None
-            for name, sign in (("below", 1.0), ("beyond", -1.0)):
-                if name in part:
-                    times, more = part[name]
-                    holds = sign * (wall - times * none) < sign * more
-            value = f"safe area {share(wall)} with the wall, {share(none)} without"
-            rows.append(Row(about(place), value, holds))
-            gains.append((wall - none, number))
-            ratios.append(wall / none if none else 1.0)
-    helped, harmed = sum(gain > SMALL for gain, _ in gains), sum(gain < -SMALL for gain, _ in gains)
+    areas, alone = (safe[..., high].mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
+    compared = [
+        (part, place, float(areas[place]), float(alone[place[1]]))
+        for part in parts
+        for place in _walls_of(part)
+    ]
+    rows = [
+        Row(
+            about(place),
+            f"safe area {share(wall)} with the wall, {share(none)} without",
+            _within(part, wall, none),
+        )
+        for part, place, wall, none in compared
+    ]
+    helped, harmed = (
+        [part for part, _, wall, none in compared if sign * (wall - none) > SMALL]
+        for sign in (1.0, -1.0)
+    )
     if examples:
         said = ((f"{examples} may enlarge the safe area", helped), ("it may shrink it", harmed))
-        rows[:0] = [Row(what, f"{n} of {len(gains)} spectra", n > 0) for what, n in said]
+        rows[:0] = [
+            Row(what, f"{len(some)} of {len(compared)} spectra", bool(some)) for what, some in said
+        ]
+    ratios = [wall / none if none else 1.0 for *_, wall, none in compared]
     return rows, {
-        "helped": helped,
-        "harmed": harmed,
-        "harmed_first": sum(gain < -SMALL for gain, number in gains if number == 0),
-        "spectra": len(gains),
+        "helped": len(helped),
+        "harmed": len(harmed),
+        "harmed_first": harmed.count(parts[0]),
+        "spectra": len(compared),
         "least_loss": share(1.0 - max(ratios)),
         "most_loss": share(1.0 - min(ratios)),
         "gain": share(max(ratios) - 1.0),
     }
+
+
+def _walls_of(part: Mapping[str, Any]) -> Iterator[Place]:
+    """The places of the walls that have the parameters which a part names."""
+    return product(
+        *(
+            [axis.index(part[name])] if name in part else range(len(axis))
+            for name, axis in AXES.items()
+        )
+    )
+
+
+def _within(part: Mapping[str, Any], wall: float, none: float) -> bool | None:
+    """Whether the safe area with the wall is within a part's bounds; None where it has none."""
+    judged = [
+        holds(wall - part[name][0] * none, part[name][1])
+        for name, holds in BOUNDS.items()
+        if name in part
+    ]
+    return all(judged) if judged else None
 
 
 def towards_the_wall(paper: Paper) -> Measured:
@@ -489,29 +513,33 @@ def claims_of(paper: Paper) -> list[Claim]:
     A sentence holds if all its rows hold, or, where it says "generally", more than `GENERALLY` of
     them.
     """
-    found = []
-    for about in SENTENCES["claim"]:
-        rows, says = globals()[about["measure"]](paper, **about.get("with", {}))
-        judged = [row.holds for row in rows if row.holds is not None]
-        held = sum(judged)
-        enough = held > GENERALLY * len(judged) if "generally" in about else all(judged)
-        said = about["finding"].format(held=held, all=len(judged), **says)
-        against = [row.what for row in rows if row.holds is False]
-        if held and 0 < len(against) <= MOST_NAMED:
-            said += f" Not so: {'; '.join(against)}."
-        verdict = "holds" if enough else "holds in part" if held else "does not hold"
-        found.append(Claim(about, verdict, said, rows))
-    return found
+    return [_judged(paper, about) for about in SENTENCES["claim"]]
+
+
+def _judged(paper: Paper, about: Mapping[str, Any]) -> Claim:
+    rows, says = globals()[about["measure"]](paper, **about.get("with", {}))
+    judged = [row.holds for row in rows if row.holds is not None]
+    held = sum(judged)
+    enough = held > GENERALLY * len(judged) if "generally" in about else all(judged)
+    said = about["finding"].format(held=held, all=len(judged), **says)
+    against = [row.what for row in rows if row.holds is False]
+    if held and 0 < len(against) <= MOST_NAMED:
+        said += f" Not so: {'; '.join(against)}."
+    verdict = "holds" if enough else "holds in part" if held else "does not hold"
+    return Claim(about, verdict, said, rows)
 
 
 def findings_of(paper: Paper) -> list[Beyond]:
     """Findings from the spectra that are not in the paper."""
-    found = []
-    for about in SENTENCES["finding"]:
-        shown: Shown = globals()[about["measure"]](paper)
-        counts = {"gained": shown.gained.sum(), "lost": shown.lost.sum()}
-        found.append(Beyond(about, about["words"].format(**counts, **shown.says), shown))
-    return found
+    shown = [(about, globals()[about["measure"]](paper)) for about in SENTENCES["finding"]]
+    return [
+        Beyond(
+            about,
+            about["words"].format(gained=one.gained.sum(), lost=one.lost.sum(), **one.says),
+            one,
+        )
+        for about, one in shown
+    ]
 
 
 def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:

@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -190,8 +191,8 @@ class Conformance(Study):
             value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # the motion lacks the wanted event
             raise ModelFailure(printable(error, 200)) from None
-        told = {note for scene in what.scenes for note in scene_notes(scene)}  # of our own scenes
-        said = (note for history in histories for note in history.notes)
+        told = set(chain.from_iterable(map(scene_notes, what.scenes)))  # of our own scenes
+        said = chain.from_iterable(history.notes for history in histories)
         notes = dict.fromkeys(note for note in said if note not in told)
         shown = value if math.isfinite(value) else None
         return Seen(shown, *what.judge(value), version, tuple(notes))
@@ -375,18 +376,21 @@ def changes(before: Path, after: Path) -> Finding:
     does not any more.
     """
     old, new = _read(before), _read(after)
-    rows: list[list[Any]] = []
-    for key in {**old, **new}:
-        known = old.get(key) or new[key]
-        absent = known | {"version": "", "value": None, "verdict": "absent"}
-        was, now = (side.get(key, absent) for side in (old, new))
-        values, verdicts = ([one[name] for one in (was, now)] for name in ("value", "verdict"))
-        limit = SHARE * (math.inf if known["limit"] is None else known["limit"])
-        moved = None not in values and abs(values[1] - values[0]) > limit
-        if verdicts[0] != verdicts[1] or moved:
-            worse = verdicts[0] == "pass" and verdicts[1] in ("fail", "error", "absent")
-            versions = (one["version"] for one in (was, now))
-            rows.append([*key, known["name"], *versions, *verdicts, *values, worse])
+    gone = {"version": "", "value": None, "verdict": "absent"}
+    pairs = {
+        key: (old.get(key) or new[key] | gone, new.get(key) or old[key] | gone)
+        for key in {**old, **new}
+    }
+    rows = [
+        [
+            *key,
+            was["name"],
+            *(one[name] for name in ("version", "verdict", "value") for one in (was, now)),
+            was["verdict"] == "pass" and now["verdict"] in ("fail", "error", "absent"),
+        ]
+        for key, (was, now) in pairs.items()
+        if _changed(was, now)
+    ]
     worse = sum(row[-1] for row in rows)
     columns = [
         Column("engine", kind="model"),
@@ -409,6 +413,12 @@ def changes(before: Path, after: Path) -> Finding:
         verdict="fail" if worse else "changed" if rows else "pass",
         exit_code=int(worse > 0),
     )
+
+
+def _changed(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
+    known = None not in (was["value"], now["value"], was["limit"])
+    moved = known and abs(now["value"] - was["value"]) > SHARE * was["limit"]
+    return moved or bool(was["verdict"] != now["verdict"])
 
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:

@@ -264,11 +264,11 @@ class Tuning(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
-        ended = [done[task] for task in self.wanted if task in done]
+        ended = list(map(done.get, self.wanted))
         found = [one for one in ended if isinstance(one, Calibration)]
-        for one in ended:
-            if isinstance(one, Failure) and one.refused and not found:
-                raise InputError(one.reason)
+        refused = [one for one in ended if isinstance(one, Failure) and one.refused]
+        if refused and not found:
+            raise InputError(refused[0].reason)
         reached = sum(one.reached for one in found)
         return Finding(
             self.name,

@@ -1,6 +1,5 @@
 """Answers from the runs of an assessment, led by a sentence for an engineer's report."""
 
-import csv
 import io
 import itertools
 import math
@@ -15,7 +14,7 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.experience import WIDTH, known, outside
 from rockcheck.scenes.files import UncertainScene
-from rockcheck.validation.criteria import CRITERIA
+from rockcheck.validation.criteria import CRITERIA, Criterion
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.finding import (
@@ -27,12 +26,14 @@ from rockcheck.validation.finding import (
     Panel,
     Plot,
     Series,
+    Style,
     Table,
     Text,
     text,
 )
 from rockcheck.validation.studies.population.runs import Numbers, Played, Ran, Side, Sure
 from rockcheck.validation.studies.population.study import Population
+from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs, share_of
 
 #: The model of runs that are drawn or have another gap.
@@ -126,8 +127,8 @@ class Found:
     """The runs of an assessment, by the case: the scene under each of its motions.
 
     `drawn` has the draws of each case (empty: none were asked for); `at_gaps` the runs at each gap
-    (m), `free` those without the wall; `others` the runs by other models; `sure` how sure a run is,
-    "" the scene's own.
+    (m) and `free` those without the wall that have a motion; `others` the runs by other models;
+    `sure` how sure a run is, "" the scene's own.
     """
 
     study: Asked
@@ -158,6 +159,15 @@ class Found:
         return {case: one.runs[0] for case, one in self.shown.items() if not one.runs[0].reason}
 
     @cached_property
+    def judged(self) -> dict[str, Numerical]:
+        """By case, the numerical uncertainty; without records, by "", that of the scene's own."""
+        return {
+            case: one.numerical
+            for case, one in self.sure.items()
+            if one.numerical is not None and bool(case) == self.study.recorded
+        }
+
+    @cached_property
     def moved(self) -> dict[str, list[tuple[float, str]]]:
         """By name, each of the four figures of the runs that stand and have it, with its case."""
         return {
@@ -184,25 +194,17 @@ class Found:
 
 def finding_of(found: Found) -> Finding:
     """All answers, and what `--json` says."""
-    study, own, levels = found.study, found.sure.get(""), found.levels
-    scene = study.own.scene
+    study, own, scene = found.study, found.sure.get(""), found.study.own.scene
+    levels = found.levels or Finding("", "", "")
     overturning, gaps = overturning_of(found.runs), gaps_of(found)
     contributions, criteria = contributions_of(found), criteria_of(found)
-    quantities = {
-        q.name: {
-            "unit": q.unit,
-            **spread([value for value, _ in found.moved[q.name]]),
-            "record": max(found.moved[q.name], key=itemgetter(0), default=(0.0, None))[1],
-            "of": len(found.moved[q.name]),
-        }
-        for q in QUANTITIES
-    }
+    quantities = quantities_of(found)
     numerical = numerical_of(study, own)
     answers = {
         "Does it fall?": [_fall(found, overturning)],
         "How far does it move?": _move(quantities),
         "Which gap is safe?": _safe_gap(gaps),
-        "At which intensity does it fall?": [levels.answer] if levels else [],
+        "At which intensity does it fall?": [levels.answer],
         "How sure is that?": [*_sure(found, own), *_change(found, contributions)],
         "What do hand methods say?": _by_hand(criteria),
     }
@@ -217,7 +219,7 @@ def finding_of(found: Found) -> Finding:
         _criteria(criteria),
         *_strips(found),
         *_gaps(gaps["gaps"]),
-        *(levels.blocks if levels else ()),
+        *levels.blocks,
         _contributions(contributions),
         *_models(found),
         *_certainty(own, numerical),
@@ -235,7 +237,7 @@ def finding_of(found: Found) -> Finding:
         *_notes(found),
     ]
     data = {
-        **(levels.data if levels else {}),
+        **levels.data,
         "scene": scene.name,
         "model": study.model,
         "runs": len(found.each),
@@ -252,14 +254,14 @@ def finding_of(found: Found) -> Finding:
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
     failures = {case: why for case, one in found.shown.items() if (why := one.runs[0].reason)}
-    unsure = not (study.recorded or numerical["converged"] or levels)
+    unsure = not (study.recorded or numerical["converged"] or found.levels)
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
         " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
-        exit_code=3 if failures or (levels and levels.exit_code) else int(unsure),
+        exit_code=3 if failures or levels.exit_code else int(unsure),
         failures=failures,
         files={file_of(case): one.history for case, one in found.shown.items() if one.history},
     )
@@ -275,6 +277,19 @@ def overturning_of(runs: Mapping[str, Sequence[Ran]]) -> dict[str, Any]:
     return {"count": int(hits.sum()), **dict(zip(INTERVAL, shares, strict=True))}
 
 
+def quantities_of(found: Found) -> dict[str, dict[str, Any]]:
+    """By name, the spread of each of the four figures, and the case of the largest."""
+    return {
+        q.name: {
+            "unit": q.unit,
+            **spread([value for value, _ in found.moved[q.name]]),
+            "record": max(found.moved[q.name], key=itemgetter(0), default=(0.0, None))[1],
+            "of": len(found.moved[q.name]),
+        }
+        for q in QUANTITIES
+    }
+
+
 def gaps_of(found: Found) -> dict[str, Any]:
     """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
 
@@ -283,24 +298,9 @@ def gaps_of(found: Found) -> dict[str, Any]:
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
     whether a wider gap never lets fewer runs overturn.
     """
-    rows: list[dict[str, Any]] = []
-    for gap, runs in found.at_gaps.items():
-        known_of = [run for run in runs if not run.reason]
-        motions = [run.motion for run in known_of if run.motion]
-        speeds = [one.wall_speed for one in motions if one.wall_speed is not None]
-        speed = spread(speeds)
-        rows.append(
-            {
-                "gap": gap,
-                "runs": len(known_of),
-                "overturned": sum(run.fell for run in known_of),
-                "struck": len(speeds),
-                "wall_speed": {key: speed[key] for key in ("median", "largest")},
-            }
-        )
+    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items()]
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
-    sides = found.study.sides
-    reaches = [run.reach[side] for run in found.free if not run.reason for side in sides]
+    reaches = (run.reach[side] for run in found.free for side in found.study.sides)
     fallen = [row["overturned"] for row in rows]
     return {
         "gaps": rows,
@@ -311,39 +311,59 @@ def gaps_of(found: Found) -> dict[str, Any]:
     }
 
 
+def _at_gap(gap: float, runs: Sequence[Ran]) -> dict[str, Any]:
+    motions = [run.motion for run in runs if run.motion]
+    speeds = [one.wall_speed for one in motions if one.wall_speed is not None]
+    speed = spread(speeds)
+    return {
+        "gap": gap,
+        "runs": len(runs),
+        "overturned": sum(run.fell for run in runs),
+        "struck": len(speeds),
+        "wall_speed": {key: speed[key] for key in ("median", "largest")},
+    }
+
+
 def contributions_of(found: Found) -> list[dict[str, Any]]:
     """Shares of the variance of the peak rotation by source, the largest first.
 
     A block that falls counts as 1 alpha.
     """
+    forms = dict(found.apart)
+    laws = forms.pop(LAW, ())
     peaks = [[run.peak for run in runs] for runs in found.runs.values() if runs]
-    own, apart = found.sure.get(""), dict(found.apart)
-    variance: dict[str, float] = {}
-    if len(peaks) > 1:
-        variance["records"] = float(np.var([float(np.mean(some)) for some in peaks], ddof=1))
-    if any(found.drawn.values()):
-        variance["inputs"] = float(np.mean([np.var(some) for some in peaks]))
-    elif own and own.inputs:
-        peak = own.inputs.figures[0]
-        variance["inputs"] = ((peak.high - peak.low) / (2.0 * WIDTH)) ** 2
-    errors = [
-        0.0
-        if (run := found.nominal.get(case)) and run.fell
-        else one.numerical.u_num("peak_rotation")
-        for case, one in found.sure.items()
-        if one.numerical is not None and (bool(case) == found.study.recorded)
-    ]
-    if sure := [(error / WIDTH) ** 2 for error in errors if error is not None]:
-        variance["numerical error"] = float(np.mean(sure))
-    if laws := apart.pop(LAW, None):
-        variance[LAW] = float(np.mean([(0.5 * d) ** 2 for d in laws]))
-    if forms := [d for some in apart.values() for d in some]:
-        variance["model form"] = float(np.mean(np.square(forms)))
+    squares: dict[str, list[float]] = {
+        "records": [float(np.var(list(map(np.mean, peaks)), ddof=1))] if len(peaks) > 1 else [],
+        "inputs": _by_inputs(found, peaks),
+        "numerical error": _by_steps(found),
+        LAW: [(0.5 * difference) ** 2 for difference in laws],
+        "model form": np.square(list(itertools.chain(*forms.values()))).tolist(),
+    }
+    variance = {source: float(np.mean(some)) for source, some in squares.items() if some}
     total = sum(variance.values()) or 1.0
     return [
         {"source": name, "share": value / total, "sd": math.sqrt(value), "unit": "alpha"}
         for name, value in sorted(variance.items(), key=lambda one: -one[1])
     ]
+
+
+def _by_inputs(found: Found, peaks: Sequence[Sequence[float]]) -> list[float]:
+    """Variances of the peak by the draws of each case, or by those of the single run."""
+    if any(found.drawn.values()):
+        return [float(np.var(some)) for some in peaks]
+    own = found.sure.get("")
+    drawn = own.inputs.figures[:1] if own and own.inputs else []
+    return [((peak.high - peak.low) / (2.0 * WIDTH)) ** 2 for peak in drawn]
+
+
+def _by_steps(found: Found) -> list[float]:
+    """Variances of the peak by the step or tolerance; a block that falls has the peak 1."""
+    fallen = {case for case, run in found.nominal.items() if run.fell}
+    errors = [
+        0.0 if case in fallen else numerical.u_num("peak_rotation")
+        for case, numerical in found.judged.items()
+    ]
+    return [(error / WIDTH) ** 2 for error in errors if error is not None]
 
 
 def numerical_of(study: Asked, own: Sure | None) -> dict[str, Any]:
@@ -372,43 +392,47 @@ def numerical_of(study: Asked, own: Sure | None) -> dict[str, Any]:
     }
 
 
-#: Whether an event of a hand method happens in a run.
-HAPPENS = {
-    "uplifts": lambda run: run.fell or run.peak > MOVED,
-    "slides": lambda run: run.slid > MOVED,
-    "overturns": lambda run: run.fell,
+#: The event of a hand method: the figure of a run, its unit, and above what it happens.
+EVENTS = {
+    "uplifts": ("turned", "alpha", MOVED),
+    "slides": ("slid", "m", MOVED),
+    "overturns": ("turned", "alpha", 1.0),
 }
 
 
 def criteria_of(found: Found) -> list[dict[str, Any]]:
     """Predictions of hand methods for the cases, and how often they agree with the simulation."""
-    cases = [(run, found.shown[case].said) for case, run in found.nominal.items()]
-    cases = [(run, said) for run, said in cases if said]
-    rows = []
-    for k, criterion in enumerate(CRITERIA):
-        slides = criterion.event == "slides"
-        says = [said[k][0] for _, said in cases]
-        happens = [HAPPENS[criterion.event](run) for run, _ in cases]
-        pairs = [
-            (estimate, run.slid if slides else math.inf if run.fell else run.peak)
-            for run, said in cases
-            if (estimate := said[k][1]) is not None
-        ]
-        unsafe = sum(moved > estimate * (1.0 + MOVED) + MOVED for estimate, moved in pairs)
-        rows.append(
-            {
-                **{key: getattr(criterion, key) for key in METHOD},
-                "predicts": sum(says),
-                "of": len(cases),
-                "simulated": sum(happens),
-                "agrees": sum(a == b for a, b in zip(says, happens, strict=True)),
-                "estimate": _median([estimate for estimate, _ in pairs]),
-                "motion": _median([moved for _, moved in pairs]),
-                "unit": "m" if slides else "alpha",
-                "unsafe": unsafe if pairs else None,
-            }
-        )
-    return rows
+    cases = [(run, said) for case, run in found.nominal.items() if (said := found.shown[case].said)]
+    return [
+        _judged(criterion, [run for run, _ in cases], [said[k] for _, said in cases])
+        for k, criterion in enumerate(CRITERIA)
+    ]
+
+
+def _judged(
+    criterion: Criterion, runs: Sequence[Ran], said: Sequence[tuple[bool, float | None]]
+) -> dict[str, Any]:
+    """What a hand method said of some runs against what they did."""
+    figure, unit, least = EVENTS[criterion.event]
+    moved = [getattr(run, figure) for run in runs]
+    happens = [far > least for far in moved]
+    pairs = [
+        (estimate, far)
+        for (_, estimate), far in zip(said, moved, strict=True)
+        if estimate is not None
+    ]
+    unsafe = sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
+    return {
+        **{key: getattr(criterion, key) for key in METHOD},
+        "predicts": sum(says for says, _ in said),
+        "of": len(runs),
+        "simulated": sum(happens),
+        "agrees": sum(says == does for (says, _), does in zip(said, happens, strict=True)),
+        "estimate": _median([estimate for estimate, _ in pairs]),
+        "motion": _median([far for _, far in pairs]),
+        "unit": unit,
+        "unsafe": unsafe if pairs else None,
+    }
 
 
 def _median(values: Sequence[float]) -> float | None:
@@ -478,9 +502,10 @@ def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _sure(found: Found, own: Sure | None) -> list[str]:
     if found.study.recorded:
-        cases = [one for case, one in found.sure.items() if case]
-        judged = [one.numerical.converged for one in cases if one.numerical]
-        laws = sum(one.depends_on_law_from_s is not None for one in cases)
+        judged = [one.converged for one in found.judged.values()]
+        laws = sum(
+            one.depends_on_law_from_s is not None for case, one in found.sure.items() if case
+        )
         said = [f"{sum(judged)} of {len(judged)} runs are numerically converged."]
         return said + ([f"The law of impacts matters in {laws}."] if laws else [])
     if own is None or own.numerical is None:
@@ -579,23 +604,11 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
         return []
     rows = [row | row["wall_speed"] for row in gaps]
     across = [row["gap"] for row in rows]
-    shares, speeds = (
-        [
-            Series(name, across, [row[name] / max(row[of], 1) if of else row[name] for row in rows])
-            for name in names
-        ]
-        for names, of in ((("struck", "overturned"), "runs"), (("median", "largest"), ""))
-    )
-    columns = [
-        Column("gap", "clear gap", "m"),
-        Column("runs"),
-        Column("overturned"),
-        Column("struck"),
-        Column("median", "speed, median", "m/s"),
-        Column("largest", "largest", "m/s"),
+    shares = [
+        Series(name, across, [row[name] / max(row["runs"], 1) for row in rows])
+        for name in ("struck", "overturned")
     ]
-    marks = [Mark(row["overturned"], "fail" if row["overturned"] else "pass") for row in rows]
-    rows = [row | {"overturned": mark} for row, mark in zip(rows, marks, strict=True)]
+    speeds = [Series(name, across, [row[name] for row in rows]) for name in ("median", "largest")]
     return [
         Plot(
             "gaps",
@@ -606,8 +619,23 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
         ),
         Table(
             "gaps",
-            columns,
-            [[row[column.name] for column in columns] for row in rows],
+            [
+                Column("gap", "clear gap", "m"),
+                Column("runs"),
+                Column("overturned"),
+                Column("struck"),
+                Column("median", "speed, median", "m/s"),
+                Column("largest", "largest", "m/s"),
+            ],
+            [
+                [
+                    row["gap"],
+                    row["runs"],
+                    Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
+                    *(row[name] for name in ("struck", "median", "largest")),
+                ]
+                for row in rows
+            ],
             note="Runs that strike the wall, also those that then overturn.",
         ),
     ]
@@ -781,24 +809,32 @@ def _inputs(inputs: Inputs) -> list[Block]:
 
 def _histories(found: Found) -> list[Block]:
     """The rotations of all cases over time."""
-    columns = {
-        case: np.array([[float(row[key]) for row in rows] for key in ("t", "theta")])
+    rows = {
+        case: np.genfromtxt(io.StringIO(one.history), delimiter=",", names=True)
         for case, one in found.shown.items()
-        if (rows := list(csv.DictReader(io.StringIO(one.history))))
+        if one.history
     }
-    if not columns:
+    if not rows:
         return []
-    end = max(t[-1] for t, _ in columns.values())
-    times, alpha = np.linspace(0.0, end, POINTS), found.study.own.scene.block.alpha
-    series = []
-    for case, (t, theta) in columns.items():
-        after = math.nan if found.nominal[case].fell else None
-        line = np.interp(times, t, theta / alpha, right=after).tolist()
-        shown = [value if math.isfinite(value) else None for value in line]
-        style: Any = "thin" if len(columns) > 1 else "smooth"
-        series.append(Series(case, times.tolist(), shown, style=style))
-    values = [value for one in series for value in one.y if value is not None]
-    low, high = min(values), max(values)
+    times = np.linspace(0.0, max(one["t"][-1] for one in rows.values()), POINTS)
+    style: Style = "thin" if len(rows) > 1 else "smooth"
+    lines = np.array(
+        [
+            np.interp(
+                times,
+                one["t"],
+                one["theta"] / found.study.own.scene.block.alpha,
+                right=math.nan if found.nominal[case].fell else None,
+            )
+            for case, one in rows.items()
+        ]
+    )
+    shown = np.where(np.isfinite(lines), lines, None).tolist()  # type: ignore[call-overload]
+    series = [
+        Series(case, times.tolist(), line, style=style)
+        for case, line in zip(rows, shown, strict=True)
+    ]
+    low, high = float(np.nanmin(lines)), float(np.nanmax(lines))
     beyond = max(0.05 * (high - low), 0.5e-3)  # noise is not blown up
     return [
         Plot(

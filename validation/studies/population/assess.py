@@ -143,35 +143,33 @@ class Assessment(Asked, Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The answers to the engineer's questions."""
+        ended: dict[Any, Any] = {
+            task: one for task, one in done.items() if isinstance(one, Played | Sure)
+        }
 
-        def known(tasks: Mapping[Any, Sequence[Task]]) -> dict[Any, list[Any]]:
-            found = {key: [done.get(task) for task in some] for key, some in tasks.items()}
-            return {
-                key: [one for one in some if isinstance(one, Played | Sure)]
-                for key, some in found.items()
-            }
+        def first(tasks: Mapping[Any, Sequence[Task]]) -> dict[Any, Any]:
+            return {key: ended[some[0]] for key, some in tasks.items() if some[0] in ended}
 
-        def runs(tasks: Mapping[Any, Sequence[Run]]) -> dict[Any, list[Ran]]:
-            return {
-                k: [run for one in some for run in one.runs] for k, some in known(tasks).items()
-            }
+        def runs(tasks: Sequence[Run]) -> list[Ran]:
+            return [run for task in tasks if task in ended for run in ended[task].runs]
 
-        others: dict[str, dict[str, Ran]] = {}
-        for (model, case), some in runs(self.others).items():
-            if some:
-                others.setdefault(model, {})[case] = some[0]
-        at_gaps: dict[float, list[Ran]] = {}
-        for (_, gap), some in runs(self.at_gaps).items():
-            at_gaps.setdefault(gap, []).extend(some)
+        at_gaps: dict[float, list[Ran]] = {gap: [] for _, gap in self.at_gaps}
+        for (_, gap), tasks in self.at_gaps.items():
+            at_gaps[gap] += [run for run in runs(tasks) if not run.reason]
         return finding_of(
             Found(
                 study=self,
-                shown={case: some[0] for case, some in known(self.shown).items() if some},
-                drawn=runs(self.drawn),
+                shown=first(self.shown),
+                drawn={case: runs(tasks) for case, tasks in self.drawn.items()},
                 free=at_gaps.pop(np.inf, []),
                 at_gaps=at_gaps,
-                others=others,
-                sure={case: some[0] for case, some in known(self.certainties).items() if some},
+                others={
+                    model: {case: one.runs[0] for (_, case), one in some}
+                    for model, some in itertools.groupby(
+                        first(self.others).items(), lambda item: item[0][0]
+                    )
+                },
+                sure=first(self.certainties),
                 levels=self.levels.gather(done) if self.levels else None,
             )
         )

@@ -1,5 +1,6 @@
 """Runs of an assessment: what one is, what it gives, and how it is played."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
@@ -52,6 +53,11 @@ class Ran(Stored):
         """Peak rotation, alpha; 1, the balance point, where the block fell."""
         turned = self.motion.peak_rotation if self.motion else None
         return 1.0 if turned is None else min(turned, 1.0)
+
+    @property
+    def turned(self) -> float:
+        """Peak rotation, alpha; infinite where the block fell."""
+        return math.inf if self.fell else self.peak
 
 
 class Played(Stored):

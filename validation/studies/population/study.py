@@ -103,18 +103,24 @@ class Population(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """A curve a case and event; of one case also the lines of all motions."""
-        curves: list[Curve] = []
+        played = {
+            case: [batch for batch in batches if isinstance(done.get(batch), Runs)]
+            for case, batches in self.batches.items()
+        }
+        peaks = {
+            case: np.array([done[batch].peaks for batch in some]).reshape(len(some), 2, -1)
+            for case, some in played.items()
+            if some
+        }
+        curves = [
+            curve_of(case + event, some > limit, np.isnan(some), self.levels, DRAWS)
+            for case, some in peaks.items()
+            for event, limit in self.limits.items()
+        ]
         blocks: list[Block] = []
-        for case, batches in self.batches.items():
-            played = [one for one in batches if isinstance(done.get(one), Runs)]
-            if played:
-                peaks = np.array([done[one].peaks for one in played]).reshape(len(played), 2, -1)
-                if not case:
-                    blocks += lines_of([p.label for p in played], peaks, self.levels, self.across)
-                curves += [
-                    curve_of(case + event, peaks > limit, np.isnan(peaks), self.levels, DRAWS)
-                    for event, limit in self.limits.items()
-                ]
+        if "" in peaks:
+            names = [batch.label for batch in played[""]]
+            blocks += lines_of(names, peaks[""], self.levels, self.across)
         if curves:
             blocks += blocks_of(curves, self.across, self.other)
         unit = self.across.unit
