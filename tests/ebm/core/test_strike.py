@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from loaded import random_scene
 from stepping import ROCKS, run_at, setting_of, six
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, settle
 from rockcheck.ebm.core.laws import strike
 from rockcheck.ebm.core.names import Family, Guard, Pivot
@@ -177,3 +178,48 @@ def test_impacts_at_one_instant_end_plastic():
     assert speeds == [5e-8] * 20 + [np.inf]  # the first, and twenty more at its instant
     assert state.rules[Rule.ENDLESS_STAGES] == 1
     assert struck_at(state, 1.001) == 5e-8
+
+
+@pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
+def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
+    """In the world: the corner that strikes leaves with -e times its approach, the pivot stays on
+    the floor, and an impact that adds energy is counted, with its share."""
+    rng, gains = np.random.default_rng(3), 0
+    walls = tuple(Wall(side=side, gap=5.0, restitution=1.0) for side in ("left", "right"))
+    for _ in range(60):
+        scene = random_scene(rng).replace(walls=walls)
+        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        sense, tilt, w = int(rng.choice([-1, 1])), rng.uniform(0.2, 0.9), rng.uniform(-1.0, 1.0)
+        block, wall = scene.block, sense * case
+        theta = sense * tilt * block.pivot("left" if sense > 0 else "right").alpha
+        turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+        size = np.array([block.half_width, block.half_height])
+        pivot, corner = (
+            turn @ (size * signs - block.offset) / block.radius
+            for signs in ((-sense, -1), (-wall, case))
+        )
+        vx = w * corner[1] - wall * rng.uniform(0.1, 1.0)  # it approaches
+        start = [0.0, -pivot[1], theta, vx, -w * pivot[0], w]
+        state = run_at(start, **ROCKS, sense=sense).state
+        z, before = state.motion, vx - w * corner[1]
+        energy = vx**2 + start[4] ** 2 + w * w / b.spin
+        strike._wall_impact(b, state, case > 0, 1e-9)
+        assert z.vx - z.w * corner[1] == pytest.approx(-before, abs=1e-12)
+        assert z.vy + z.w * pivot[0] == pytest.approx(0.0, abs=1e-12)
+        gain = (z.vx**2 + z.vy**2 + z.w**2 / b.spin) / energy - 1.0
+        assert state.largest_gain == pytest.approx(max(gain, 0.0), abs=1e-11)
+        gains += state.gains
+    assert 0 < gains < 60
+
+
+@pytest.mark.parametrize(("gap", "leans"), [(0.3, True), (0.0, False)])
+def test_nothing_rebounds_between_two_walls(gap, leans):
+    """A block that leans on one wall as it strikes the other, and one that fills the room."""
+    walls = tuple(Wall(side=side, gap=gap, restitution=0.9) for side in ("left", "right"))
+    b = setting_of(0.4, walls=walls, unilateral=False)
+    flat = {"family": Family.TILT if leans else Family.FLAT, "sense": 1, "tip": leans}
+    state = run_at([0.0, math.cos(0.4), 0.1 * leans, -0.3, 0.1, 0.2], **flat).state
+    assert not strike._wall_impact(b, state, False, 1e-9)
+    assert (state.rules[Rule.WEDGED], state.rules.sum()) == (1, 1)
+    assert state.wall_impulse == 0.3
+    assert six(state.motion)[3:].tolist() == [0.0, 0.0, 0.0]
