@@ -72,14 +72,18 @@ def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> st
         return label_of(str(value))
     if isinstance(value, bool):
         return "yes" if value else "no"
-    if column.kind == "text" or not isinstance(value, int | float):
-        return str(value)
-    if column.kind == "used" and not value <= 1.0:
+    if column.kind in ("percent", "used") and isinstance(value, int | float):
+        return _share(value, column)
+    if column.kind == "number" and isinstance(value, float):
+        return write(value, column.digits)
+    return str(value)
+
+
+def _share(value: float, column: Column) -> str:
+    if column.kind == "used" and value > 1.0:
         return f"{_typed(value, 3)}×" if value < math.inf else "beyond"
-    if column.kind in ("percent", "used"):
-        after = max(column.digits - 2, 0) if column.kind == "percent" else 0
-        return f"{100.0 * value:.{after}f} %"
-    return str(value) if isinstance(value, int) else write(value, column.digits)
+    after = max(column.digits - 2, 0) if column.kind == "percent" else 0
+    return f"{100.0 * value:.{after}f} %"
 
 
 def _typed(value: float, digits: int) -> str:
@@ -108,15 +112,14 @@ def _for_page(cell: Any, column: Column) -> dict[str, Any]:
 
 def show(found: Finding, screen: Console) -> None:
     """The answer and the blocks that a terminal has room for."""
-    for block in found.blocks:
-        if isinstance(block, Table) and block.on == "all":
+    for block in (block for block in found.blocks if block.on == "all"):
+        if isinstance(block, Table):
             screen.print(_grid(block.shown))
             if len(block.rows) > block.most:
                 screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
-        elif isinstance(block, Text) and block.on == "all":
-            for line in (block.text, *map(": ".join, block.facts), *block.items):
-                if line:
-                    screen.print(line, style=COLOURS.get(block.verdict, ""), soft_wrap=True)
+        elif isinstance(block, Text):
+            for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
+                screen.print(line, style=COLOURS.get(block.verdict, ""), soft_wrap=True)
     for where, reason in found.failures.items():
         screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
     if not found.complete:

@@ -190,11 +190,10 @@ def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
     import numpy as np
 
     for series, colour in zip(panel.series, colours(panel), strict=True):
+        low, y, high = (np.array(one, float) for one in (series.low, series.y, series.high))
         if series.style == "level":
-            level = math.nan if series.y[0] is None else series.y[0]
-            drawn = ax.axhline(level, color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
+            drawn = ax.axhline(y[0], color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
         else:
-            low, y, high = (np.array(one, float) for one in (series.low, series.y, series.high))
             if series.high:
                 ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
             look = STYLES[series.style] | (

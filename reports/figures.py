@@ -189,11 +189,10 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
 
     Wall impacts are marked on each model's own curve.
     """
-    for order, (model, look) in enumerate(looks(view.run.models).items()):
-        if model not in view.values:
-            continue
-        first = model == next(iter(view.references), None)
-        values = view.drawn[model][channel.name]
+    looked = looks(view.run.models)
+    first = next(iter(view.references), None)
+    for order, model in enumerate(model for model in looked if model in view.values):
+        look, values = looked[model], view.drawn[model][channel.name]
         if model in view.measured:
             rows = view.measured[model]
             ax.plot(
@@ -210,37 +209,42 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
                 view.t,
                 values,
                 **look.line
-                | ({"linewidth": 1.6, "zorder": 1.9} if first else {"zorder": 2.0 + 0.01 * order}),
+                | (
+                    {"linewidth": 1.6, "zorder": 1.9}
+                    if model == first
+                    else {"zorder": 2.0 + 0.01 * order}
+                ),
             )
         if channel.name == "theta":
-            if model in view.falls:  # a cross where the block falls: nothing is drawn beyond
-                row = int(np.searchsorted(view.t, view.falls[model]))
-                ax.plot(
-                    view.t[row],
-                    values[row],
-                    marker="x",
-                    markersize=4.5,
-                    markeredgewidth=1.2,
-                    color=look.light,
-                    zorder=4.0,
-                )
-            until = view.falls.get(model, math.inf)
-            times = [
-                e.t
-                for e in view.histories[model].event_list
-                if e.kind == "wall impact" and e.t <= until
-            ]
-            if times:
-                ax.plot(
-                    times,
-                    np.interp(times, view.t, np.nan_to_num(values)),
-                    marker="D",
-                    markersize=2.4,
-                    markerfacecolor="white",
-                    markeredgecolor=look.light,
-                    linestyle="",
-                )
+            _marks(ax, view, model, look.light)
     ax.set_ylabel(channel.symbol)
+
+
+def _marks(ax: Axes, view: SceneView, model: str, colour: str) -> None:
+    """A diamond at each wall impact, and a cross where the block falls: the curve ends there."""
+    theta, until = view.drawn[model]["theta"], view.falls.get(model, math.inf)
+    if model in view.falls:
+        row = int(np.searchsorted(view.t, until))
+        ax.plot(
+            view.t[row],
+            theta[row],
+            marker="x",
+            markersize=4.5,
+            markeredgewidth=1.2,
+            color=colour,
+            zorder=4.0,
+        )
+    events = view.histories[model].event_list
+    if times := [event.t for event in events if event.kind == "wall impact" and event.t <= until]:
+        ax.plot(
+            times,
+            np.interp(times, view.t, np.nan_to_num(theta)),
+            marker="D",
+            markersize=2.4,
+            markerfacecolor="white",
+            markeredgecolor=colour,
+            linestyle="",
+        )
 
 
 def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:

@@ -5,7 +5,7 @@ scenes.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import geometric_mean
@@ -17,8 +17,19 @@ from rockcheck.reports.view import FALL, SceneView, all_figures
 from rockcheck.scenes.experience import Trust, known
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.finding import Axis, Block, Column, Mark, Panel, Plot, Series, Table, text
-from rockcheck.validation.suite.across import FEWEST, bias_and_scatter, pairs_of
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Mark,
+    Panel,
+    Plot,
+    Series,
+    Style,
+    Table,
+    text,
+)
+from rockcheck.validation.suite.across import pairs_of, trust_in
 from rockcheck.validation.suite.results import Cell, Check, Run, value_of
 from rockcheck.validation.suite.tables import used
 from rockcheck.validation.suite.tolerances import MEASURES, apart
@@ -140,24 +151,25 @@ def times_table(run: Run) -> Table:
 
     The seconds stand below.
     """
-    cells = run.by_scene()
-    rows = []
-    for model in run.models:
-        taken = {
-            place: (found[model].cost.wall_seconds, found[run.reference].cost.wall_seconds)
-            if run.reference in found and found[run.reference].status == "done"
-            else (found[model].cost.wall_seconds, 0.0)
-            for place, found in cells.items()
-            if model in found and found[model].status == "done"
+    places = run.by_scene()
+    taken = {
+        model: {
+            place: cells[model].cost.wall_seconds
+            for place, cells in places.items()
+            if model in cells and cells[model].status == "done"
         }
-        ratios = {place: own / base for place, (own, base) in taken.items() if own * base > 0.0}
+        for model in run.models
+    }
+    base, rows = taken.get(run.reference, {}), []
+    for model, own in taken.items():
+        ratios = {at: own[at] / base[at] for at in own if own[at] * base.get(at, 0.0) > 0.0}
         shown = (
-            Mark(ratio(ratios.get(place)), more=duration(taken[place][0]) if place in taken else "")
-            for place in cells
+            Mark(ratio(ratios.get(at)), more=duration(own[at]) if at in own else "")
+            for at in places
         )
         rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
     columns = [Column("model", kind="model"), Column("ratio", "geometric mean, ×")]
-    columns += [Column(f"scene {place}", place) for place in cells]
+    columns += [Column(f"scene {place}", place) for place in places]
     return Table("times", columns, rows)
 
 
@@ -451,38 +463,30 @@ def accuracy(run: Run) -> list[Block]:
 
     Nothing where neither is known.
     """
-    pairs = pairs_of([run])
-    everywhere = {m: of[QUANTITY] for m, of in known().trust.items() if QUANTITY in of}
-    here = {
-        m: Trust(bias=bias, scatter=scatter, count=len(pairs[m]))
-        for m in run.models
-        if m in pairs and len(pairs[m]) >= FEWEST
-        for bias, scatter in (bias_and_scatter(pairs[m]),)
+    pairs, everywhere, styles = pairs_of([run]), known().trust, looks(run.models)
+    trusts = {
+        model: (trust_in(pairs[model]), everywhere.get(model, {}).get(QUANTITY))
+        for model in run.models
+        if model in pairs
     }
-    found = [model for model in run.models if model in pairs]
-    if not any(model in here or model in everywhere for model in found):
+    if not any(map(any, trusts.values())):
         return []
-    styles = looks(run.models)
-    values = [value for model in found for pair in pairs[model] for value in pair]
+    values = [value for model in trusts for pair in pairs[model] for value in pair]
     ends = (
         10.0 ** math.floor(math.log10(0.8 * min(values))),
         10.0 ** math.ceil(math.log10(1.25 * max(values))),
     )
     panels, rows = [], []
-    for model in found:
-        x, y = zip(*pairs[model], strict=True)
-        trusts = here.get(model), everywhere.get(model)
-        trust, look = trusts[1] or trusts[0], styles[model].key
-        lines = [Series("", ends, ends, style="thin")]
-        if trust:
-            factors = [trust.bias * math.exp(sigma * trust.scatter) for sigma in (0.0, -2.0, 2.0)]
-            bias, *two = ([factor * end for end in ends] for factor in factors)
-            lines.append(Series("", ends, bias, look=look, style="smooth"))
-            lines += [Series("", ends, line, look=look, style="dots") for line in two]
-        lines.append(Series("", x, y, look=look, style="points"))
+    for model, (here, in_all) in trusts.items():
+        trust, (x, y) = in_all or here, zip(*pairs[model], strict=True)
+        lines = [
+            Series("", ends, ends, style="thin"),
+            *(_expected_lines(trust, ends, styles[model].key) if trust else ()),
+            Series("", x, y, look=styles[model].key, style="points"),
+        ]
         panels.append(Panel(styles[model].label, lines))
-        shown = [(one.bias, one.scatter) if one else (None, None) for one in trusts]
-        rows.append([model, len(x), *shown[0], *shown[1]])
+        shown = [getattr(one, name, None) for one in (here, in_all) for name in ("bias", "scatter")]
+        rows.append([model, len(x), *shown])
     columns = [
         Column("model", kind="model"),
         Column("scenes_here"),
@@ -512,3 +516,11 @@ def accuracy(run: Run) -> list[Block]:
         Plot(PEAKS, title, panels=panels, x=x_axis, y=y_axis, note=note),
         Table("accuracy", columns, rows),
     ]
+
+
+def _expected_lines(trust: Trust, ends: tuple[float, float], look: str) -> Iterator[Series]:
+    """The bias, and two standard deviations below and above it."""
+    styles: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
+    for sigma, style in styles.items():
+        factor = trust.bias * math.exp(sigma * trust.scatter)
+        yield Series("", ends, [factor * end for end in ends], look=look, style=style)

@@ -265,12 +265,12 @@ def uncertain_scene(
             raise InputError(
                 "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
             )
-        for name in pair:
-            if name not in names:
-                raise InputError(
-                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
-                    where,
-                )
+        if unknown := [name for name in pair if name not in names]:
+            raise InputError(
+                f"{unknown[0]!r} is not an uncertain number of the scene"
+                f"{suggestion(unknown[0], names)}",
+                where,
+            )
         if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
             raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
         i, j = (names.index(name) for name in pair)
@@ -311,20 +311,18 @@ def _changed(part: Part, name: str, value: float, place: str) -> Part:
 
 
 def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
-    if isinstance(value, Mapping):
-        if value.keys() & _KEYS:
-            name = ".".join(str(part) for part in place)
-            try:
-                spreads[name] = Spread(**value)
-            except InputError as error:
-                raise InputError(
-                    error.reason, f"{name}.{error.key}" if error.key else name
-                ) from None
-            return spreads[name].nominal
-        return {key: _plain(item, (*place, key), spreads) for key, item in value.items()}
     if isinstance(value, list):
         return [_plain(item, (*place, _label(item, k)), spreads) for k, item in enumerate(value)]
-    return value
+    if not isinstance(value, Mapping):
+        return value
+    if not value.keys() & _KEYS:
+        return {key: _plain(item, (*place, key), spreads) for key, item in value.items()}
+    name = ".".join(map(str, place))
+    try:
+        spreads[name] = Spread(**value)
+    except InputError as error:
+        raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
+    return spreads[name].nominal
 
 
 def _label(item: Any, k: int) -> str | int:

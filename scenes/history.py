@@ -449,8 +449,6 @@ def block_fields(block: Block) -> dict[str, Any]:
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:
-    import pandas as pd
-
     if missing := [name for name in ("t", "theta") if name not in frame.columns]:
         raise InputError(
             f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}"
@@ -459,24 +457,28 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
         raise InputError(f"{shown}: two columns {doubled[0]!r}")
     if len(frame) == 0:
         raise InputError(f"{shown}: no rows")
-    channels: dict[str, NDArray[Any]] = {}
-    for name in [one for one in COLUMNS if one in frame.columns]:
-        if name == "mode":
-            channels[name] = frame[name].astype(str).to_numpy()
-            continue
-        try:
-            if frame[name].dtype == bool:
-                raise ValueError("True is no number")
-            values = pd.to_numeric(frame[name]).to_numpy(dtype=float)
-        except (TypeError, ValueError):
-            raise InputError(f"{shown}: column {name!r} is not numeric") from None
-        bad = np.flatnonzero(~(np.abs(values) <= MOST))
-        if bad.size:
-            why = f"larger than {MOST:g}" if np.isfinite(values[bad[0]]) else "not finite"
-            raise InputError(
-                f"{shown}: column {name!r}, row {bad[0] + 1}: {values[bad[0]]} is {why}"
-            )
-        channels[name] = values
+    channels = {
+        name: frame[name].astype(str).to_numpy() if name == "mode" else _numbers(frame[name], shown)
+        for name in COLUMNS
+        if name in frame.columns
+    }
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")
     return channels
+
+
+def _numbers(column: pd.Series[Any], shown: str) -> NDArray[np.float64]:
+    import pandas as pd
+
+    try:
+        if column.dtype == bool:
+            raise ValueError("True is no number")
+        values = pd.to_numeric(column).to_numpy(dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{shown}: column {column.name!r} is not numeric") from None
+    bad = np.flatnonzero(~(np.abs(values) <= MOST))
+    if bad.size:
+        value = values[bad[0]]
+        why = f"larger than {MOST:g}" if np.isfinite(value) else "not finite"
+        raise InputError(f"{shown}: column {column.name!r}, row {bad[0] + 1}: {value} is {why}")
+    return values

@@ -8,8 +8,8 @@ import operator
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -60,7 +60,7 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
     finished: list[tuple[str, Path]] = []
     with ExitStack() as leavings:
         for path, content in contents.items():
-            try:
+            with _naming(path):
                 data = content.encode() if isinstance(content, str) else content
                 target = Path(os.path.realpath(path)) if named and path.is_symlink() else path
                 if named and path.exists() and not path.is_file() and not path.is_dir():
@@ -76,13 +76,9 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
                 if target.is_dir() and not target.is_symlink():
                     raise IsADirectoryError(21, "Is a directory")
                 finished.append((temporary, target))
-            except OSError as error:
-                raise _named(error, path) from None
         for temporary, target in finished:
-            try:
+            with _naming(target):
                 os.replace(temporary, target)
-            except OSError as error:
-                raise _named(error, target) from None
         leavings.pop_all()
 
 
@@ -91,21 +87,24 @@ def write_new(path: Path, content: str) -> Path:
 
     Raises `FileExistsError` where it is.
     """
-    try:
+    with _naming(path):
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-    except OSError as error:
-        raise _named(error, path) from None
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content.encode())
-    except BaseException as error:
-        path.unlink(missing_ok=True)
-        raise _named(error, path) if isinstance(error, OSError) else error from None
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                stream.write(content.encode())
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
     return path
 
 
-def _named(error: OSError, path: Path) -> OSError:
-    return OSError(error.errno, error.strerror or str(error), str(path))
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Errors of the system name this file, not the temporary one beside it."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
 
 
 #: Start of a cell that a spreadsheet takes for a formula; a number or a lone sign is none.

@@ -268,22 +268,21 @@ class _Acting(NamedTuple):
     """The contacts of a mode.
 
     The side that the block tips to, `spin` = 1/I, the friction `kappa` of a slipping pivot (Q =
-    -kappa P), and which contacts act; `stick` is the pivot's tangent.
+    -kappa P), and which contacts act.
     """
 
     side: Any
     spin: float
     kappa: float
     floor: bool
-    stick: bool
     tip: bool
     far: bool
 
 
 @inner_kernel
 def _acts(acting, which):
-    """Whether contact `which` acts: floor, stick, tip wall, far wall."""
-    return (acting.floor, acting.stick, acting.tip, acting.far)[which]
+    """Whether contact `which` acts: floor, tip wall, far wall."""
+    return (acting.floor, acting.tip, acting.far)[which]
 
 
 @inner_kernel
@@ -300,10 +299,10 @@ def _contact_rows(acting, a):
     """
     s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
-    along, upward = (0.0, 1.0, 1.0, -1.0), (1.0, 0.0, 0.0, 0.0)
-    turns, slips = (-s, c, -tip_arm, -far_arm), (kappa, 0.0, 0.0, 0.0)
+    along, upward = (0.0, 1.0, -1.0), (1.0, 0.0, 0.0)
+    turns, slips = (-s, -tip_arm, -far_arm), (kappa, 0.0, 0.0)
     n = 0
-    for which in range(4):
+    for which in range(3):
         if _acts(acting, which):
             row, column = Row.CONSTRAINT + n, Row.COLUMN + n
             a[row, 0], a[row, 1], a[row, 2] = along[which], upward[which], turns[which]
@@ -328,14 +327,11 @@ def _contact_series(block, mode, order, enough, reach, a):
     """
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
-    stick = (
-        mode.pivot == Pivot.STICK and not static
-    )  # wedged between two walls the block needs no friction
     kappa = (
         block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
     )  # Q = -kappa P
     side = side_of(block, mode.sense)
-    acting = _Acting(side, block.spin, kappa, floor, stick, tip, far)
+    acting = _Acting(side, block.spin, kappa, floor, tip, far)
     n = _contact_rows(acting, a)
     s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
     scale = 1.0
@@ -390,8 +386,6 @@ def _moment_of_lower_orders(acting, k, a):
     if acting.floor:
         a[Row.FLOOR_ARM, k] = a[Row.SIN, k] + acting.kappa * a[Row.COS, k]
         moment -= _products(a, Row.FLOOR_ARM, Row.P, 1, k, k)
-    if acting.stick:
-        moment += _products(a, Row.COS, Row.Q, 1, k, k)
     if acting.tip or acting.far:
         along, across = wall_turn(acting.side, acting.tip)
         a[Row.WALL_ARM, k] = along * a[Row.SIN, k] + across * a[Row.COS, k]
@@ -415,11 +409,10 @@ def _accelerations(acting, n, free, k, a):
     tip_arm, far_arm = _wall_arms(side, s, c)
     ax, ay, aphi = -a[Row.U, k], -a[Row.G, k], acting.spin * moment
     r = 0
-    for which in range(4):
+    for which in range(3):
         if _acts(acting, which):
             a[Row.KNOWN, r] = (
                 kc - ay + s * aphi,
-                ks - ax - c * aphi,
                 tip_reach - ax + tip_arm * aphi,
                 far_reach + ax + far_arm * aphi,
             )[which]
@@ -433,12 +426,11 @@ def _accelerations(acting, n, free, k, a):
         ay += a[Row.COLUMN + r, 1] * force
         aphi += acting.spin * a[Row.COLUMN + r, 2] * force
     r = 0
-    for which in range(4):
+    for which in range(3):
         if _acts(acting, which):
-            a[(Row.P, Row.Q, Row.NA, Row.NB)[which], k] = a[Row.FOUND, r]
+            a[(Row.P, Row.NA, Row.NB)[which], k] = a[Row.FOUND, r]
             r += 1
-    if not acting.stick:
-        a[Row.Q, k] = -acting.kappa * a[Row.P, k]
+    a[Row.Q, k] = -acting.kappa * a[Row.P, k]
     a[Row.WALL_PUSH, k] = a[Row.NA, k] + a[Row.NB, k]
     return ax, ay, aphi
 

@@ -267,20 +267,16 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     """
     from rockcheck.validation.execute.models import FAMILIES, family, not_installed
 
-    if names == ALL:
-        found: dict[str, dict[str, Any]] = {
-            name: {} for name in FAMILIES if name != "measured" and not not_installed(name)
-        }
-    else:
-        found = {name.strip(): {} for name in names.split(",") if name.strip()}
-        for name in found:
-            family(name)
-        if not found or "measured" in found:
-            raise InputError(
-                f"{printable(names)!r} is not allowed: models that play, with commas between, or"
-                " all",
-                "--models",
-            )
+    every = (name for name in FAMILIES if name != "measured" and not not_installed(name))
+    given = every if names == ALL else filter(None, map(str.strip, names.split(",")))
+    found: dict[str, dict[str, Any]] = {name: {} for name in given}
+    for name in found:
+        family(name)
+    if not found or "measured" in found:
+        raise InputError(
+            f"{printable(names)!r} is not allowed: models that play, with commas between, or all",
+            "--models",
+        )
     for text in settings:
         model, dot, rest = text.partition(".")
         if not dot or model not in found:

@@ -111,8 +111,7 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
     def command(context: typer.Context, *, quiet: bool, as_json: bool, **given: Any) -> None:
         code = 0
-        for name, group in groups.items():
-            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
+        given |= {name: _filled(group, given) for name, group in groups.items()}
         with speaking("json" if as_json else "quiet" if quiet else "tables"):
             try:
                 does(**given)
@@ -122,8 +121,8 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
                 console().print(f"total: {time.perf_counter() - context.obj:.1f} s")
         raise typer.Exit(code)
 
-    every = [option for one in own for option in _options(one)]
-    every += [
+    every = [
+        *(option for one in own for option in _options(one)),
         inspect.Parameter("context", _NAMED, annotation=typer.Context),
         inspect.Parameter("quiet", _NAMED, default=False, annotation=QuietOption),
         inspect.Parameter("as_json", _NAMED, default=False, annotation=JsonOption),
@@ -132,6 +131,11 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in every}
     return command
+
+
+def _filled(group: Any, given: dict[str, Any]) -> Any:
+    """A group with its options, which are taken out of those `given`."""
+    return group(**{one.name: given.pop(one.name) for one in fields(group)})
 
 
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:

@@ -1,5 +1,6 @@
 """`rockcheck compare`: any two histories, or two finished runs."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from rockcheck.commands import (
     scene_names,
     told,
 )
-from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes import History, InputError, Scene, load_scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare
 from rockcheck.validation.discrepancy.figures import value_words
@@ -81,14 +82,24 @@ def run(
         check_file(plot, "--plot")
     what = load_scene(scene) if scene else None
     try:
-        offset = 0.0 if align in (None, BEST) else float(align or 0.0)
+        offset = 0.0 if align == BEST else float(align or 0.0)
     except ValueError:
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
     given, other = read_measured(reference), read_measured(candidate, offset=offset)
-    shift = time_shift(given, other) if align == BEST else 0.0
-    found = compare(given, shifted(other, shift), until=until, scene=what)
-    histories = {"reference": given, "candidate": other}
-    motions = {role: motion_of(history, what) for role, history in histories.items()}
+    shift = time_shift(given, other) if align == BEST else None
+    found = compare(given, shifted(other, shift or 0.0), until=until, scene=what)
+    finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
+    document.show(finding, console())
+    if plot is not None:
+        save_figure(found.plot(), plot)
+    answer(finding.as_dict())
+
+
+def _finding(
+    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float | None
+) -> Finding:
+    """The finding on a comparison; `shift` (s): of the candidate, where the best one was found."""
+    motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [
             figure.label,
@@ -100,14 +111,14 @@ def run(
     ]
     columns = [text("measure"), Column("value"), text("unit"), text("note", " ")]
     models = f"{found.candidate} against {found.reference}"
-    said = {role: ", ".join(motion.words()) for role, motion in motions.items()}
+    words = {role: motion.words() for role, motion in motions.items()}
     notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
     blocks: list[Block] = [
         Text(headline(found)),
-        Text(facts=[(role, words) for role, words in said.items() if words]),
+        Text(facts=[(role, ", ".join(said)) for role, said in words.items() if said]),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
         Table("comparison", columns, rows),
-        Text(f"the candidate is shifted by {shift:+.4g} s" if align == BEST else ""),
+        Text("" if shift is None else f"the candidate is shifted by {shift:+.4g} s"),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]
@@ -116,7 +127,7 @@ def run(
         "candidate": found.candidate,
         "start": found.start,
         "end": found.end,
-        "shift": shift,
+        "shift": shift or 0.0,
         "gap": found.gap,
         "headline": headline(found),
         "motion": {role: motion.model_dump() for role, motion in motions.items()},
@@ -126,11 +137,7 @@ def run(
             for f in found.figures
         ],
     }
-    finding = Finding("comparison", models, "", blocks, data)
-    document.show(finding, console())
-    if plot is not None:
-        save_figure(found.plot(), plot)
-    answer(finding.as_dict())
+    return Finding("comparison", models, "", blocks, data)
 
 
 def headline(found: Discrepancy) -> str:

@@ -245,16 +245,13 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
         if header := _HEADER.match(line):
             index = _heed(path, lines, index, header, block)
         elif said := COSMOS_BLOCK.match(line):
-            if not block.step[0]:
-                raise fault(path, "no real header before this block states the time step", index)
             block.count, block.seconds = said[1], said[2] or ""
             block.unit = known_unit(said[3]) or _COSMOS_UNITS.get(said[4] or "", "")
             block.across, block.width = int(said[5]), int(said[6])
         elif said := CSMIP_BLOCK.match(line):
             rest = line[said.end() :]
             block.count, block.step = said[1], (index, number(path, index, said[2]))
-            if unit := _CSMIP_UNIT.search(rest):
-                block.unit = known_unit(unit[1])
+            block.unit = next(map(known_unit, _CSMIP_UNIT.findall(rest)), "")
             if shape := _CSMIP_FORMAT.search(rest):
                 block.across, block.width = map(int, shape.groups())
         elif named := _CHANNEL.search(line):
@@ -304,6 +301,8 @@ def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], block
 def _recording(
     path: Path, lines: list[str], index: int, about: _Block, reading: Reading
 ) -> Recording:
+    if not about.step[0]:
+        raise fault(path, "no real header before this block states the time step", index)
     count = checked_count(path, index, "the count of points", about.count)
     _fields(path, index, about.across, about.width)
     place, stated = about.step

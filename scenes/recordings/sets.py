@@ -114,33 +114,43 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
     in the component, as ELC-UP.AT2 does from ELC180.AT2. Raises `InputError` where there is not
     exactly one, and for a vertical component that belongs to no motion.
     """
-    horizontal: dict[Path, list[str]] = {}
-    upward: dict[Path, list[Recording]] = {}
-    for path, components in _read(paths, reading)[0].items():
-        if up := [one for one in components if is_vertical(path, one)]:
-            upward[path] = up
-        if len(up) < len(components) or reading.component is not None or reading.column is not None:
-            horizontal[path] = [name for name, _ in motions_of([path], reading)[0]]
-    alone = {path: up for path, up in upward.items() if path not in horizontal}
+    horizontal, upward = _directions(paths, reading)
+    alone = [path for path in upward if path not in horizontal]
+    sources = {path: path if upward[path] else _vertical_file(path, alone) for path in horizontal}
     found: dict[str, Recording] = {}
-    used: set[Path] = set()
-    for path, names in horizontal.items():
-        source = path if path in upward else _vertical_file(path, alone)
+    for path, source in sources.items():
         up = upward[source] if source else []
-        if source is None or len(up) != 1:
+        if len(up) != 1:
             where = "in it or in a file of the set that is named alike"
             raise InputError(
                 f"{printable(path)}: {len(up)} vertical components {where}: give exactly one",
                 "vertical",
             )
-        used.add(source)
-        found |= dict.fromkeys(names, up[0])
-    if unused := [path for path in alone if path not in used]:
+        found |= dict.fromkeys(horizontal[path], up[0])
+    if unused := [path for path in alone if path not in sources.values()]:
         raise InputError(
             f"{printable(unused[0])}: a vertical component, and no horizontal one is named alike",
             "vertical",
         )
     return found
+
+
+def _directions(
+    paths: Iterable[Path], reading: Reading
+) -> tuple[dict[Path, list[str]], dict[Path, list[Recording]]]:
+    """The names of the motions of each file that holds any; the vertical components of each."""
+    read = _read(paths, reading)[0]
+    upward = {
+        path: [one for one in components if is_vertical(path, one)]
+        for path, components in read.items()
+    }
+    named = reading.component is not None or reading.column is not None
+    horizontal = {
+        path: [name for name, _ in motions_of([path], reading)[0]]
+        for path, components in read.items()
+        if named or len(upward[path]) < len(components)
+    }
+    return horizontal, upward
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:

@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -74,43 +75,24 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
 
     Lines that start with # or % are remarks.
     """
-    if reading.component is not None:
-        raise fault(path, "a table has columns; give the option column in place of component")
-    rows: NumberedLines = [
-        (n, line)
-        for n, line in enumerate(lines, 1)
-        if n > (reading.header_lines or 0) and line.strip() and line[0] not in "#%"
-    ]
-    if not rows:
-        raise fault(path, "empty")
-    layout = _layout_of(path, rows, reading)
-    names, rows = _names_of(path, rows, layout, reading)
-    if len(rows) > MOST_SAMPLES:
-        raise fault(path, f"more than {MOST_SAMPLES} lines")
-    width = len(names) or len(layout.words(path, *rows[0]))
-    if width > MOST_COLUMNS:
-        raise fault(path, f"more than {MOST_COLUMNS} columns", rows[0][0])
-    cells = _Cells(path, rows, layout, names, width)
-    time, acceleration = _columns(cells, reading)
-    place, stated = acceleration
+    cells = _cells_of(path, lines, reading)
+    time, place, stated = _columns(cells, reading)
     if time is None and reading.time_step is None:
         raise fault(path, f"no column of times; give the time step: {option('time_step', 0.01)}")
     unit = settled_unit(path, stated, reading)
     samples, times, words = cells.read(place, time)
-    notes: list[str] = []
-    step = float(reading.time_step or 0.0)
+    step, notes = float(reading.time_step or 0.0), list[str]()
+    name = f"column {place + 1}" if cells.width > 1 else ""
     if time is not None:
-        step, notes = _step_of(path, times, words, [n for n, _ in rows], reading)
-        if not (names and names[time].lower() not in ("t", "time")):
+        step, notes = _step_of(path, times, words, [n for n, _ in cells.rows], reading)
+        if not cells.names or cells.names[time].lower() in ("t", "time"):
             notes.append(f"column {time + 1} is taken as the time in s")
-    form = "table" if layout.separator is None else "CSV"
-    name = printable(names[place], 30) if names else f"column {place + 1}" if width > 1 else ""
     return Recording(
         samples=samples * UNITS[unit],
         time_step=step,
         unit=unit,
-        form=form,
-        component=name,
+        form="table" if cells.layout.separator is None else "CSV",
+        component=printable(cells.names[place], 30) if cells.names else name,
         notes=tuple(notes),
     )
 
@@ -140,6 +122,26 @@ class _Cells:
                 words.append(cells[time])
             values.append(number(self.path, n, cells[place]))
         return np.array(values), np.array(times), words
+
+
+def _cells_of(path: Path, lines: list[str], reading: Reading) -> _Cells:
+    if reading.component is not None:
+        raise fault(path, "a table has columns; give the option column in place of component")
+    rows: NumberedLines = [
+        (n, line)
+        for n, line in enumerate(lines, 1)
+        if n > (reading.header_lines or 0) and line.strip() and line[0] not in "#%"
+    ]
+    if not rows:
+        raise fault(path, "empty")
+    layout = _layout_of(path, rows, reading)
+    names, rows = _names_of(path, rows, layout, reading)
+    if len(rows) > MOST_SAMPLES:
+        raise fault(path, f"more than {MOST_SAMPLES} lines")
+    width = len(names) or len(layout.words(path, *rows[0]))
+    if width > MOST_COLUMNS:
+        raise fault(path, f"more than {MOST_COLUMNS} columns", rows[0][0])
+    return _Cells(path, rows, layout, names, width)
 
 
 def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
@@ -186,25 +188,17 @@ def _names_of(
     first = layout.words(path, *rows[0])
     if any(word in NAMED or word == "time_s" for word in first):
         return first, rows[1:]
-    for index, (n, line) in enumerate(rows[:_MOST_HEADER]):
-        words = layout.words(path, n, line)
+    if all(map(is_number, first)):
+        return [], rows
+    searched = rows[: _MOST_HEADER if reading.header_lines is None else 2]
+    for index, ((n, above), line) in enumerate(pairwise(searched), 1):
+        words = layout.words(path, *line)
         if all(map(is_number, words)):
-            above = (
-                layout.words(
-                    path,
-                    rows[index - 1][0],
-                    rows[index - 1][1].replace(" [", "[").replace(" (", "("),
-                )
-                if index
-                else []
-            )
-            return (above if len(above) == len(words) else []), rows[index:]
-        if reading.header_lines is not None and index > 0:
-            break
+            names = layout.words(path, n, above.replace(" [", "[").replace(" (", "("))
+            return names if len(names) == len(words) else [], rows[index:]
     if len(first) > 1 and len(rows) > 1 and len(layout.words(path, *rows[1])) == len(first):
-        return first, rows[
-            1:
-        ]  # a column of words beside those of numbers, or a first line of data that is wrong
+        # a column of words beside those of numbers, or a first line of data that is wrong
+        return first, rows[1:]
     raise fault(
         path,
         f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"
@@ -213,31 +207,28 @@ def _names_of(
     )
 
 
-def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, tuple[int, str]]:
-    """The columns of times and of accelerations.
+def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, int, str]:
+    """The columns of times and of accelerations, and the unit of the latter.
 
-    Times are None if there is no such column. Accelerations have the unit that the column's name
-    states, "" if none. Raises `InputError` where the columns are not clear.
+    Times are None if there is no such column. The unit is the one that the column's name states, ""
+    if none. Raises `InputError` where the columns are not clear.
     """
-    names = cells.names
+    names, stated = cells.names, list(map(_unit_of, cells.names)) or [""] * cells.width
     times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
     time: int | None = times[0] if len(times) == 1 else None
     if not names and cells.width > 1 and reading.time_step is None:
         time = 0
     if reading.column is not None:
         place = _chosen(cells, reading.column)
-        return (None if time == place else time), (place, _unit_of(names[place]) if names else "")
-    stated = [index for index, name in enumerate(names) if name in NAMED]
-    if not stated:
-        stated = [
-            index
-            for index, name in enumerate(names)
-            if index != time and name.lower().startswith("acc") and _unit_of(name)
-        ]
+        return None if time == place else time, place, stated[place]
     rest = [index for index in range(cells.width) if index != time]
-    chosen = stated if names and stated else rest
+    chosen = (
+        [index for index, name in enumerate(names) if name in NAMED]
+        or [i for i in rest if stated[i] and names[i].lower().startswith("acc")]
+        or rest
+    )
     if len(chosen) == 1 and (time is not None or reading.time_step is not None or cells.width == 1):
-        return time, (chosen[0], _unit_of(names[chosen[0]]) if names else "")
+        return time, chosen[0], stated[chosen[0]]
     raise _unclear(cells)
 
 

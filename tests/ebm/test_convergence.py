@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from stepping import play, six
+from stepping import play, run_at, six
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import play_ensemble
+from rockcheck.ebm.core import march, series
 from rockcheck.ebm.core.state import workspace
 from rockcheck.scenes import (
     Block,
@@ -36,6 +37,20 @@ def distance(a: History, b: History) -> float:
     return max(
         float(np.max(np.abs(a.channels[name] - b.channels[name]))) for name in ("theta", "x")
     )
+
+
+def test_the_terms_that_are_left_out_are_half_of_the_tolerance(pulse_scene):
+    """A geometric series that falls from 1 to the tolerance within the order; and no impact has
+    added energy before the first one."""
+    scene = pulse_scene(2.0, 1.1, 1.0)
+    run = run_at()
+    run.state.control.tolerance = 1e-8
+    setting = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+    march.begin(setting, natural.base_of(scene), run)
+    later = 1e-8 ** (np.arange(1, 200) / series.ORDER)
+    alpha = scene.block.alpha
+    assert np.sum(run.state.last_term_rad * later) == pytest.approx(0.5e-8 * alpha, rel=1e-12)
+    assert run.state.largest_gain == run.state.gains == 0
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -5,7 +5,7 @@ The file keeps its comments and order.
 
 import math
 import re
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterable, Mapping, MutableMapping
 from typing import Any
 
 import tomlkit
@@ -14,7 +14,7 @@ from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.suite.results import Check, Run
+from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, judge
 
@@ -40,13 +40,24 @@ def accept(
     """
     changes: list[str] = []
     refused: list[str] = []
-    for included in suite.included or (suite,):
-        _accept(included, run, reason, changes, refused, write)
+    checks = [(cell, check) for cell, check in run.checks() if check.verdict != "not defined"]
+    for part in suite.included or (suite,):
+        of_part = [
+            (cell, check)
+            for cell, check in checks
+            if cell.scene in part.scenes or cell.scene in part.ensembles
+        ]
+        _accept(part, of_part, reason, changes, refused, write)
     return changes, refused
 
 
 def _accept(
-    suite: Suite, run: Run, reason: str | None, changes: list[str], refused: list[str], write: bool
+    suite: Suite,
+    checks: Iterable[tuple[Cell, Check]],
+    reason: str | None,
+    changes: list[str],
+    refused: list[str],
+    write: bool,
 ) -> None:
     path = suite.tolerances_path
     document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
@@ -54,28 +65,14 @@ def _accept(
         document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     )
     before = len(changes)
-    for cell, check in run.checks():
-        ours = cell.scene in suite.scenes or cell.scene in suite.ensembles
-        if check.verdict == "not defined" or not ours:
-            continue
-        figure = check.figure
-        against, key = figure.against or OWN_FIGURES, figure.windowed
+    for cell, check in checks:
+        against, key = check.figure.against or OWN_FIGURES, check.figure.windowed
         where = f"[{cell.scene}.{cell.model}.{against}] {key}"
         line = _accepted(check, reason)
+        old = {name: getattr(check, name) for name in Tolerance.model_fields}
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
-            continue
-        old = (
-            None
-            if check.limit is None
-            else {
-                "expected": check.expected,
-                "limit": check.limit,
-                "drift": check.drift,
-                "why": check.why,
-            }
-        )
-        if line != old:
+        elif line != old:
             table = _table(tables, (cell.scene, cell.model, against))
             changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
             entry = tomlkit.inline_table()
@@ -93,32 +90,39 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
     value, new = check.figure.value, check.limit is None
     if value is None or not math.isfinite(value) or check.gap:
         return check.gap or check.reason
-    outside = check.verdict == "fail" and not new
-    worse = outside or check.verdict == "changed"
+    worse = check.verdict in ("fail", "changed") and not new
     if worse and not reason:
         return f"{check.reason}; moving what is expected needs --reason"
-    measure = MEASURES[check.figure.measure]
-    limit, drift = _room(check, value)
-    tighter = check.verdict == "better" and measure.role == "error"
-    stricter = max if measure.sense == "at least" else min
-    if check.limit is not None and not outside:
-        limit = stricter(check.limit, limit) if tighter else check.limit
-    if check.drift is not None:
-        drift = min(check.drift, drift) if tighter else check.drift
-    why = (
-        (reason or "first accepted figure") if new else (reason if worse and reason else check.why)
-    )
+    why = (reason or "first accepted figure") if new else (reason if worse else check.why)
     expected = value if check.verdict != "pass" or check.expected is None else check.expected
+    limit, drift = _bounds(check, value)
     line: dict[str, Any] = {
         "expected": float(f"{expected:.8g}"),
         "limit": limit,
         "drift": drift,
         "why": why,
     }
+    measure = MEASURES[check.figure.measure]
     again = judge(
         check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor
     )
     return line if again.verdict == "pass" else again.reason
+
+
+def _bounds(check: Check, value: float) -> tuple[float, float]:
+    """Limit and drift band of the new line: the old ones, of a better error tighter if need be.
+
+    The room of a first line where there is none, or where the limit is exceeded.
+    """
+    limit, drift = _room(check, value)
+    measure = MEASURES[check.figure.measure]
+    tighter = check.verdict == "better" and measure.role == "error"
+    stricter = max if measure.sense == "at least" else min
+    if check.limit is not None and check.verdict != "fail":
+        limit = stricter(check.limit, limit) if tighter else check.limit
+    if check.drift is not None:
+        drift = min(check.drift, drift) if tighter else check.drift
+    return limit, drift
 
 
 def _room(check: Check, value: float) -> tuple[float, float]:
@@ -166,8 +170,8 @@ def _round(value: float, down: bool = False) -> float:
     return float(f"{steps * unit:.2g}")
 
 
-def _shown(line: Mapping[str, Any] | None) -> str:
-    if line is None:
+def _shown(line: Mapping[str, Any]) -> str:
+    if line["limit"] is None:
         return "none"
     return ", ".join(
         f"{name} {'-' if line[name] is None else line[name]}"

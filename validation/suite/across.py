@@ -127,10 +127,11 @@ def difference(before: Run, after: Run) -> Finding:
         [one.scene or "the run", one.model, f"{one.what} {one.name}".strip(), one.before, one.after]
         for one in found[: len(found) - left]
     ]
-    values = (Column(name, digits=6) for name in ("before", "after"))
-    table = Table(
-        "changed", [*map(text, ("scene", "model", "what")), *values], rows, most=len(rows)
-    )
+    columns = [
+        *map(text, ("scene", "model", "what")),
+        *(Column(name, digits=6) for name in ("before", "after")),
+    ]
+    table = Table("changed", columns, rows, most=len(rows))
     return Finding(
         "changes",
         f"{after.suite}, before and after",
@@ -220,8 +221,7 @@ def commit_of(folder: Path) -> str:
 
     Outside of a repository the continuous integration's commit, "" without one.
     """
-    git = shutil.which("git")
-    if git:
+    if git := shutil.which("git"):
         found = subprocess.run(
             [
                 git,
@@ -318,20 +318,11 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         f"{one.name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in one.values[-2:])}"
         for one in moved[:LISTED]
     ]
-    numbers = list(range(1, len(moments) + 1))
-    panels = []
-    for one in found[:DRAWN]:
-        bad = [
-            n for n, moment in zip(numbers, moments, strict=True) if one.name in moment.not_passed
-        ]
-        marked = Series("not passed", bad, [one.values[n - 1] for n in bad], style="points")
-        panels.append(
-            Panel(one.name.replace(": ", "\n", 1), [Series("", numbers, one.values), marked])
-        )
+    panels = [_panel(one, moments) for one in found[:DRAWN]]
     rows = [
         [one.name, one.values[0], min(one.known), max(one.known), *one.values[-2:]] for one in found
     ]
-    columns = [Column(name) for name in ("first", "least", "most", "before", "now")]
+    columns = [text("figure"), *map(Column, ("first", "least", "most", "before", "now"))]
     made = [
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
         for one in reversed(moments)
@@ -340,12 +331,25 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     blocks: list[Block] = [
         Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
-        Table("figures", [text("figure"), *columns], rows, "What varied", on="page"),
+        Table("figures", columns, rows, "What varied", on="page"),
         Table("runs", about, made, "Runs", on="page"),
     ]
-    same = len(last.figures) - len(found)
-    answer = f"{len(found)} figures varied, {same} stayed the same. The last run: {last.verdict}."
-    return Finding("trend", f"{last.suite} over {len(moments)} runs", answer, blocks)
+    counts = f"{len(found)} figures varied, {len(every) - len(found)} stayed the same"
+    return Finding(
+        "trend",
+        f"{last.suite} over {len(moments)} runs",
+        f"{counts}. The last run: {last.verdict}.",
+        blocks,
+    )
+
+
+def _panel(trend: Trend, moments: Sequence[Moment]) -> Panel:
+    points = dict(enumerate(trend.values, 1))
+    bad = [n for n, moment in enumerate(moments, 1) if trend.name in moment.not_passed]
+    marked = Series("not passed", bad, [points[n] for n in bad], style="points")
+    return Panel(
+        trend.name.replace(": ", "\n", 1), [Series("", list(points), trend.values), marked]
+    )
 
 
 #: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
@@ -394,17 +398,23 @@ def experience_of(runs: Sequence[Run]) -> Experience:
     The domain is the range of each axis, `scenes.experience.axes_of`.
     """
     trust: dict[str, dict[str, Trust]] = {}
-    for model, found in sorted(pairs_of(runs).items()):
-        if len(found) >= FEWEST:
-            bias, scatter = bias_and_scatter(found)
-            one = Trust(bias=bias, scatter=scatter, count=len(found))
-            trust[model] = {"peak_rotation": one}
+    for model, pairs in sorted(pairs_of(runs).items()):
+        if found := trust_in(pairs):
+            trust[model] = {"peak_rotation": found}
     scenes = [axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
     domain = {}
     for axis in dict.fromkeys(axis for one in scenes for axis in one):
         numbers = [number for one in scenes for number in one.get(axis, ())]
         domain[axis] = Range(low=min(numbers), high=max(numbers))
     return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain)
+
+
+def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
+    """Bias and scatter of (E, M) pairs, None for fewer than `FEWEST`."""
+    if len(pairs) < FEWEST:
+        return None
+    bias, scatter = bias_and_scatter(pairs)
+    return Trust(bias=bias, scatter=scatter, count=len(pairs))
 
 
 def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, too_short
-from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.execute import provenance, workers
@@ -259,38 +259,45 @@ def _compute(
     horizon: float | None,
 ) -> ComparisonRecord:
     """The comparison with `reference`; without one, the cell's own figures and impact law."""
-    candidate = store.load(planned.name)
-    yardstick = store.load(reference.name) if reference else None
+    candidate, landing = store.load(planned.name), landing_of(store, scene)
+    windows = _windows(DIFFERENCES if reference else FIGURES, windowed, horizon)
+    if reference is None:
+        return ComparisonRecord(
+            figures=tuple(
+                figure.model_copy(update={"window": window})
+                for window, until, measures in windows
+                for figure in describe(candidate, until=until, scene=scene, measures=measures)
+            ),
+            gaps={window: (too_short(candidate, until), False) for window, until, _ in windows},
+            impact_law=landing.followed_by(candidate, scene) if landing else None,
+            overturned_at=candidate.overturned_at,
+        )
+    yardstick = store.load(reference.name)
+    others = under_other_laws(scene, reference.variant) if landing else {}
     figures: list[Figure] = []
     gaps: dict[str, tuple[str, bool]] = {}
-    by_window: dict[str, list[str]] = {
-        "": [m.name for m in (DIFFERENCES if reference else FIGURES).values() if not m.on_request]
-    }
-    for what in windowed:
-        by_window.setdefault(what.window, []).append(what.measure)
-    landing = landing_of(store, scene)
-    others = under_other_laws(scene, reference.variant) if landing and reference else {}
-    for window, measures in by_window.items():
-        until = horizon if window == HORIZON else float(window[:-1]) if window else None
-        if yardstick is None:
-            found = describe(candidate, until=until, scene=scene, measures=measures)
-            gaps[window] = too_short(candidate, until), False
-        else:
-            discrepancy = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-            found, gaps[window] = discrepancy.figures, (discrepancy.gap, discrepancy.fall)
-            if landing and (until is None or until > landing.t):
-                found, own = by_any(discrepancy, others, candidate, scene, until, measures)
-                gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-        figures += (
-            [figure.model_copy(update={"window": window}) for figure in found] if window else found
-        )
-    law = landing.followed_by(candidate, scene) if landing and yardstick is None else None
-    return ComparisonRecord(
-        figures=tuple(figures),
-        gaps=gaps,
-        impact_law=law,
-        overturned_at=None if yardstick else candidate.overturned_at,
-    )
+    for window, until, measures in windows:
+        found = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
+        rivals = others if landing and (until is None or until > landing.t) else {}
+        nearest, own = by_any(found, rivals, candidate, scene, until, measures)
+        figures += [figure.model_copy(update={"window": window}) for figure in nearest]
+        gaps[window] = found.gap, found.fall
+        gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
+    return ComparisonRecord(figures=tuple(figures), gaps=gaps)
+
+
+def _windows(
+    known: Mapping[str, Measure], extra: Iterable[Windowed], horizon: float | None
+) -> list[tuple[str, float | None, list[str]]]:
+    """Each window, its end (s; None: the whole time), and its measures."""
+    found = {"": [measure.name for measure in known.values() if not measure.on_request]}
+    for what in extra:
+        found.setdefault(what.window, []).append(what.measure)
+    ends = {"": None, HORIZON: horizon}
+    return [
+        (window, ends[window] if window in ends else float(window[:-1]), measures)
+        for window, measures in found.items()
+    ]
 
 
 #: Quantities whose differences are explained, with their units.
@@ -312,23 +319,39 @@ def explanations(
     """
     if own.numerical is None:
         return
+    # of a measured history, the scatter of its repeats: rotations in rad, slips in m
+    sizes = {"alpha": scene.block.alpha, "m": 1.0}
+    u_inputs = {name: inputs.u_input(name) or 0.0 for name in QUANTITIES} if inputs else {}
     for against, (yardstick, other) in references.items():
         if own.outcome != other.outcome and "overturned" in own.outcome + other.outcome:
             yield _other_outcome(against, own.numerical, other.numerical, inputs)
             continue
         for name, unit in QUANTITIES.items():
-            mine, theirs = value_of(figures, name), value_of(yardstick, name)
-            error = None if mine is None or theirs is None else abs(mine - theirs)
-            if name == "theta_rms":
-                error = value_of(figures, name, against)
+            error = _difference(name, figures, yardstick, against)
             if error is None:
                 continue
             u_num, reason = _both(name, own.numerical, other.numerical)
-            # of a measured history, the scatter of its repeats: rotations in rad, slips in m
-            size = 1.0 if name == "last_slip" else scene.block.alpha
-            u_data = math.hypot(*(one.uncertainty.get(name, 0.0) / size for one in (own, other)))
-            u_input = (inputs.u_input(name) or 0.0) if inputs else 0.0
-            yield explain(name, unit, error, u_num, u_input, u_data, reason=reason, against=against)
+            scatters = own.uncertainty.get(name, 0.0), other.uncertainty.get(name, 0.0)
+            u_data = math.hypot(scatters[0] / sizes[unit], scatters[1] / sizes[unit])
+            yield explain(
+                name,
+                unit,
+                error,
+                u_num,
+                u_inputs.get(name, 0.0),
+                u_data,
+                reason=reason,
+                against=against,
+            )
+
+
+def _difference(
+    name: str, figures: Sequence[Figure], yardstick: Sequence[Figure], against: str
+) -> float | None:
+    if name == "theta_rms":
+        return value_of(figures, name, against)
+    mine, theirs = value_of(figures, name), value_of(yardstick, name)
+    return None if mine is None or theirs is None else abs(mine - theirs)
 
 
 def _other_outcome(

@@ -38,6 +38,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -82,26 +83,25 @@ def under_records(
     left_out: list[str] = []
     shaken: set[str] = set()
     for given in sets:
-        for name in given.scenes:
-            if name not in scenes:
-                raise InputError(str(unknown_name("scene", name, scenes)), "records.scenes")
+        if unknown := [name for name in given.scenes if name not in scenes]:
+            raise InputError(str(unknown_name("scene", unknown[0], scenes)), "records.scenes")
         files = files_of(given.files, folder)
         motions, vertical = motions_of(files, given)
         upward = verticals_of(files, given) if given.vertical else {}
         left_out += [] if given.vertical else vertical
+        labels = _labels([motion for motion, _ in motions])
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
-        for name in chosen:
-            for label, (motion, recording) in zip(
-                _labels([motion for motion, _ in motions]), motions, strict=True
-            ):
-                one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
-                if one.scene.name in found:
-                    raise InputError(
-                        f"scene {one.scene.name!r} is named twice: two records have one name",
-                        "records.files",
-                    )
-                found[one.scene.name] = one
+        for name, (label, (motion, recording)) in product(
+            chosen, zip(labels, motions, strict=True)
+        ):
+            one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
+            if one.scene.name in found:
+                raise InputError(
+                    f"scene {one.scene.name!r} is named twice: two records have one name",
+                    "records.files",
+                )
+            found[one.scene.name] = one
     return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
 
 

@@ -284,22 +284,10 @@ class SuiteStudy(Study):
         if planned in self.failures:
             return Cell(**about)
         scene, label, record = planned.scene, planned.variant.label, self.records[planned]
-        own, required = self.suite.suite_of(scene.name), self.suite.required(scene.name, label)
-        asked: dict[str, Asked] = {}
-        for name in dict.fromkeys(
-            [OWN_FIGURES, own.reference, own.model_form, *(place.against for place in required)]
-        ):
-            other = None if name == OWN_FIGURES else self.by_scene[scene.name].get(name)
-            if name == OWN_FIGURES or (other is not planned and other in self.records):
-                asked[name] = (
-                    other,
-                    sorted(
-                        p.what
-                        for p in required
-                        if p.against == name and (p.what.window or p.what.definition.on_request)
-                    ),
-                )
-        found = compared(self.store, scene, planned, asked)
+        own, found = (
+            self.suite.suite_of(scene.name),
+            compared(self.store, scene, planned, self._asked(planned)),
+        )
         figures = [figure for one in found.values() for figure in one.figures]
         gaps = {
             (name, window): gap for name, one in found.items() for window, gap in one.gaps.items()
@@ -326,6 +314,28 @@ class SuiteStudy(Study):
                 "impact_law": found[OWN_FIGURES].impact_law,
             }
         )
+
+    def _asked(self, planned: Planned) -> dict[str, Asked]:
+        """What a cell is compared with: its own figures, and the references that finished."""
+        required = self.suite.required(planned.place, planned.variant.label)
+        there: dict[str, Planned | None] = {
+            name: one
+            for name, one in self.by_scene[planned.place].items()
+            if one is not planned and one in self.records
+        }
+        there[OWN_FIGURES] = None
+        return {
+            name: (
+                there[name],
+                sorted(
+                    p.what
+                    for p in required
+                    if p.against == name and (p.what.window or p.what.definition.on_request)
+                ),
+            )
+            for name in self.suite.yardsticks(planned.place, required)
+            if name in there
+        }
 
     def _checks(
         self,
@@ -426,7 +436,7 @@ class SuiteStudy(Study):
         self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
     ) -> Cell:
         place, label = batches[0].place, batches[0].variant.label
-        own, origin, reason = samples[label], self.suite.suite_of(place), ""
+        own, reason = samples[label], ""
         if own.failures:
             first = own.outcomes[int(np.argmin(np.isfinite(own.peaks)))]
             reason = f"{own.failures} of {len(own.peaks)} scenes failed; the first: {first}"
@@ -438,9 +448,7 @@ class SuiteStudy(Study):
         required = self.suite.required(place, label)
         figures = [
             evaluate(measure, Samples(samples[name], own), "alpha", against=name)
-            for name in dict.fromkeys(
-                [origin.reference, origin.model_form, *(place.against for place in required)]
-            )
+            for name in self.suite.yardsticks(place, required)
             if name in samples and name != label
             for measure in STATISTICS.values()
         ]

@@ -223,7 +223,7 @@ class Suite:
             for place, line in own.tolerances.items()
             if (place.scene, place.model) == (scene, model)
         }
-        needed = {model, own.reference, own.model_form, *(place.against for place in tolerances)}
+        needed = {model, *own.yardsticks(scene, tolerances)}
         return replace(
             own,
             scenes={scene: own.scenes[scene]},
@@ -249,6 +249,11 @@ class Suite:
                 places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
         places += own._judged.get((scene, model), [])
         return {place: own.kind(place) for place in places}
+
+    def yardsticks(self, scene: str, checks: Iterable[Place]) -> list[str]:
+        """`OWN_FIGURES`, then the models that a scene's cells are compared with."""
+        own, named = self.suite_of(scene), (place.against for place in checks)
+        return list(dict.fromkeys((OWN_FIGURES, own.reference, own.model_form, *named)))
 
     def kind(self, place: Place) -> Kind:
         """The kind of a check.
@@ -292,10 +297,9 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
         )
     tables = read_toml(path)
     if "block" in tables:
-        names = f"scenes = [{printable(path.name)!r}], and tables [models.NAME]"
         raise InputError(
             f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and"
-            f" a suite is a file with {names}"
+            f" a suite is a file with scenes = [{printable(path.name)!r}], and tables [models.NAME]"
         )
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
@@ -447,14 +451,12 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
         for name in given.include
     ]
+    first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
-    for name in (name for name, count in names.items() if count > 1):
-        raise InputError(f"scene {name!r} is in two of the suites", "include")
-    for suite in included:
-        if suite.reference != included[0].reference:
-            raise InputError(
-                f"{suite.name} and {included[0].name} have different references", "include"
-            )
+    if twice := [name for name, count in names.items() if count > 1]:
+        raise InputError(f"scene {twice[0]!r} is in two of the suites", "include")
+    if others := [suite.name for suite in included if suite.reference != first.reference]:
+        raise InputError(f"{others[0]} and {first.name} have different references", "include")
     whole: dict[str, Any] = {
         what: {key: one for suite in included for key, one in getattr(suite, what).items()}
         for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
@@ -463,7 +465,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         name=path.stem,
         path=path,
         given=given,
-        reference=included[0].reference,
+        reference=first.reference,
         model_form=next((suite.model_form for suite in included if suite.model_form), ""),
         tolerances_path=path,
         left_out=tuple(name for suite in included for name in suite.left_out),

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Container, Iterator
+from itertools import groupby
 from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
@@ -67,17 +68,18 @@ def finding_of(run: Run) -> Finding:
         told = Text(OUTCOMES)
         return Finding("run", run.suite, "nothing judged", [*outcome_tables(run), told, wrong])
     better, waits = list(improvements(run)), run.without_tolerance
-    count = f"{run.up_to_date} of {len(run.cells)} simulations were up to date"
-    of_better = "better than expected; `rockcheck accept` makes today's the expected ones:"
-    of_waiting = f"{waits} figures have no tolerance yet: `rockcheck accept` makes today's the"
+    makes = "`rockcheck accept` makes today's the expected ones"
     blocks: list[Block] = [
         verdict_table(run),
         Text(items=not_shown(run)),
         wrong,
-        Text(of_better if better else ""),
+        Text(f"better than expected; {makes}:" if better else ""),
         Text(items=better, verdict="fail" if run.strict == "both" else "pass"),
-        Text(f"{of_waiting} expected ones" if waits else ""),
-        Text(f"{count}; played and judged in {run.wall_seconds:.1f} s"),
+        Text(f"{waits} figures have no tolerance yet: {makes}" if waits else ""),
+        Text(
+            f"{run.up_to_date} of {len(run.cells)} simulations were up to date; played and judged"
+            f" in {run.wall_seconds:.1f} s"
+        ),
     ]
     return Finding("run", run.suite, f"verdict: {run.words}", blocks)
 
@@ -87,49 +89,47 @@ def verdict_table(run: Run) -> Table:
 
     Of a large run, the scenes that are `shown`.
     """
-    places, before, rows = set(shown(run)), "", []
-    for cell in run.cells:
-        if cell.scene not in places:
-            continue
-        near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
-        judged = (
-            near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
-        )
-        idle = cell.status == "done" and not cell.checks
-        state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
-        rows.append(
-            [
-                "" if cell.scene == before else cell.scene,
-                cell.model,
-                judged if cell.status == "done" else cell.reason or "failed",
-                percent(near) if near else "",
-                f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
-            ]
-        )
-        before = cell.scene
+    places = set(shown(run))
+    cells = [cell for cell in run.cells if cell.scene in places]
+    rows = [
+        ["" if n else scene, *_verdict_row(cell)]
+        for scene, of_scene in groupby(cells, key=lambda cell: cell.scene)
+        for n, cell in enumerate(of_scene)
+    ]
     heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used")]
     return Table("verdicts", [*heads, text("verdict")], rows, most=len(rows))
 
 
+def _verdict_row(cell: Cell) -> list[Any]:
+    near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
+    judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
+    idle = cell.status == "done" and not cell.checks
+    state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
+    return [
+        cell.model,
+        judged if cell.status == "done" else cell.reason or "failed",
+        percent(near) if near else "",
+        f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
+    ]
+
+
 def outcome_tables(run: Run) -> Iterator[Table]:
     """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
-    names = ("peak_rotation_alpha", "apart_alpha")
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
-        rows = []
-        for model, cell in cells.items():
-            values, done = outcome_row(cell, run.reference), cell.status == "done"
-            peak, apart = (values[name] for name in names)
-            rows.append(
-                [
-                    model,
-                    cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
-                    peak,
-                    "ref." if model == run.reference else apart,
-                    f"{cell.cost.wall_seconds:.1f} s" if done else "",
-                ]
-            )
+        rows = [_outcome_cells(cell, run.reference) for cell in cells.values()]
         yield Table("outcomes", columns, rows, scene)
+
+
+def _outcome_cells(cell: Cell, reference: str) -> list[Any]:
+    values, done = outcome_row(cell, reference), cell.status == "done"
+    return [
+        cell.model,
+        cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
+        values["peak_rotation_alpha"],
+        "ref." if cell.model == reference else values["apart_alpha"],
+        f"{cell.cost.wall_seconds:.1f} s" if done else "",
+    ]
 
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
@@ -364,10 +364,10 @@ def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> Te
 
 def markdown(run: Run) -> str:
     """A summary for a job's page: the verdict, the reasons, and a table of scenes by models."""
-    count = f"{len(run.cells)} simulations, {run.up_to_date} up to date"
     parts = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
-        f"{count}, {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
+        f"{len(run.cells)} simulations, {run.up_to_date} up to date,"
+        f" {sum(1 for _ in run.checks())} checks, {run.wall_seconds:.1f} s.",
     ]
     for heading, lines in (
         ([], list(verdict_lines(run))),
