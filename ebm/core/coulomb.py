@@ -38,7 +38,6 @@ def expand(block, base, run, reach):
     """Series of the mode's motion: order, place of a sticking pivot, and length of the step."""
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     reach = min(reach, _FARTHER * state.stride)
-    state.place = 0.0
     if mode.family == Family.FLAT:
         order = state.order = flat_series(block, base, run, series.ORDER)
         state.length = series.step_size(a, Row.U, Row.G, order, state.last_term_rad, reach)

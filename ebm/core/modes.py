@@ -123,7 +123,6 @@ def wrong_by(block, base, run, measured):
     # The plain constant would make numba compile all series once more, for it alone.
     look = min(_LOOK, series.WIDTH)
     state, mode, t, a = run.state, run.state.mode, run.state.t, run.a
-    state.place = 0.0
     if mode.family == Family.FLAT:
         order = flat_series(block, base, run, look)
     else:

@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 from loaded import G, random_scene, scene_of
-from stepping import TILTED, run_at
+from stepping import TILTED, run_at, six
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core import bouc_wen, motion
-from rockcheck.ebm.core.names import Pivot, Row
+from rockcheck.ebm.core import bouc_wen, contacts, motion
+from rockcheck.ebm.core.names import Family, Pivot, Row
+from rockcheck.ebm.core.state import Run
 from rockcheck.scenes import Block, Record, Wall
 
 
@@ -162,3 +163,39 @@ def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
         for k in range(1, order - 1):
             reach = case * (sine * a[Row.COS, k] - cosine * a[Row.SIN, k])
             assert a[Row.XI, k] == pytest.approx(reach, rel=1e-10, abs=1e-10), k
+
+
+@pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
+def test_a_step_along_a_wall_ends_on_wall_and_floor(case):
+    """LADDER of 50 loaded blocks: corner and pivot stay where they are held, and rates are those of
+    the places."""
+    rng = np.random.default_rng(21)
+    walls = (Wall(side="left", gap=0.3), Wall(side="right", gap=0.4))
+    for _ in range(50):
+        scene = random_scene(rng).replace(walls=walls)
+        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        S, w = int(rng.choice([-1, 1])), rng.uniform(-0.3, 0.3)
+        side = b.left if S > 0 else b.right
+        phi = rng.uniform(0.1, 0.8) * side.alpha
+        along = {"sense": S, "pivot": Pivot.SLIPPING, "slip": 1, "tip": case > 0, "far": case < 0}
+        run = run_at([0.0, 0.0, S * phi, 0.0, 0.0, S * w], t=1.0, **TILTED | along)
+        z = run.state.motion
+        z.x -= S * case * contacts.wall_gap(b, z, S * case)
+        run.state.order = motion.tilt_series(b, natural.base_of(scene), run, 15, 0.0, 0.0)
+        before, there, after = (ended_at(b, run, tau) for tau in (0.02 - 1e-5, 0.02, 0.02 + 1e-5))
+        assert contacts.wall_gap(b, run.state.sampled, S * case) == pytest.approx(0.0, abs=1e-14)
+        assert contacts.floor_gap(b, run.state.sampled) == pytest.approx(0.0, abs=1e-14)
+        assert there[3:] == pytest.approx((after - before)[:3] / 2e-5, abs=1e-8)
+
+
+def ended_at(b: np.record, run: Run, tau: float) -> np.ndarray:
+    motion.motion_at(b, run.state, run.a, tau, run.state.sampled)
+    return six(run.state.sampled)
+
+
+def test_a_flat_block_falls_freely():
+    scene = scene_of(excitation=Record.from_samples([0.0, 0.0], 1.0))
+    b = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    run = run_at([0.1, 1.5, 0.0, 0.2, 0.3, 0.0], family=Family.FLAT, sense=1, pivot=Pivot.OFF)
+    run.state.order = motion.flat_series(b, natural.base_of(scene), run, 15)
+    assert ended_at(b, run, 0.4) == pytest.approx([0.18, 1.54, 0.0, 0.2, -0.1, 0.0], abs=1e-14)
