@@ -11,15 +11,16 @@ from rockcheck.engines.marching import LYING, FloatArray
 from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
 
+Flags = NDArray[np.bool_]
+#: Time (s), kind, the step end where it is told, impulse per unit mass (m/s).
+Found = tuple[float, str, int, float]
 # s: shorter openings of a contact are the engine's chatter, and an impulse is summed over this time
 HOLD = 2e-3
 REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
 # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
 CLOSED = 1e-6
-GAP_NOISE, SLIP_NOISE = (
-    1e-4,
-    1e-3,
-)  # of the thresholds: what a gap and a slip of a contact that holds may show
+# of the thresholds: what a gap and a slip of a contact that holds may show
+GAP_NOISE, SLIP_NOISE = 1e-4, 1e-3
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
@@ -38,41 +39,13 @@ def events_of(
     after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, contacts, t, states, felt)
-    found: list[tuple[float, str, int, float]] = []
     closed = [motion.closed(contact) for contact in contacts]
-    for contact, flags in zip(contacts, closed, strict=True):
-        for index in _rises(flags):
-            kind = "floor impact" if contact.surface == "floor" else "wall impact"
-            found.append(
-                (motion.onset(contact, index), kind, index, motion.impulse(contact, index))
-            )
-        if contact.surface != "floor":
-            found += [
-                (t[end], "release", end, 0.0)
-                for end in _falls(flags)
-                if t[end] - t[_run_start(flags, end)] > HOLD
-            ]
-    floor = [
-        flags for contact, flags in zip(contacts, closed, strict=True) if contact.surface == "floor"
+    found = [
+        event
+        for contact, flags in zip(contacts, closed, strict=True)
+        for event in motion.at_contact(contact, flags)
     ]
-    flat, flight = floor[0] & floor[1], ~(floor[0] | floor[1])
-    noise = GAP_NOISE * motion.near
-    lowest, highest = np.sort([motion.gap(contact) for contact in contacts[:2]], axis=0)
-    found += [
-        (t[_start(highest, i, noise)], "uplift", i, 0.0)
-        for i in _falls(_held(flat, t, REST, value=True))
-        if not flight[i]
-    ]
-    found += [(t[_start(lowest, i, noise)], "lift-off", i, 0.0) for i in _rises(flight)]
-    found += [(t[i], "landing", i, 0.0) for i in _falls(flight)]
-    slip_speed = np.abs(motion.slip_rate)
-    slipping = _held(_held(~flight & (slip_speed > SLIPPING), t), t, value=True)
-    found += [
-        (t[_start(slip_speed, i, SLIP_NOISE * SLIPPING)], "slip", i, 0.0) for i in _rises(slipping)
-    ]
-    found += [(t[i], "stick", i, 0.0) for i in _falls(slipping) if not flight[i]]
-    resting = _held(flat & ~slipping & (np.abs(states[:, 5]) < TURNING), t, REST, value=True)
-    found += [(t[i], "settled", i, 0.0) for i in _rises(resting)]
+    found += motion.at_floor(closed[0], closed[1])
     if abs(states[-1, 2]) >= LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
         side = "left" if states[-1, 2] > 0 else "right"
@@ -122,7 +95,7 @@ class _Motion:
         arm = arm_of(*contact.corner, np.cos(theta), np.sin(theta))
         return np.asarray(gap_of(*contact.normal, contact.distance, x, y, arm))
 
-    def closed(self, contact: Contact) -> NDArray[np.bool_]:
+    def closed(self, contact: Contact) -> Flags:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
         return _held(self.gap(contact) < self.near, self.t)
 
@@ -133,6 +106,43 @@ class _Motion:
         before, after = self.gap(contact, slice(index - 1, index + 1))
         part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
+
+    def at_contact(self, contact: Contact, closed: Flags) -> list[Found]:
+        """Impacts of a contact; of one with a wall, releases too."""
+        kind, t = "floor impact" if contact.surface == "floor" else "wall impact", self.t
+        impacts = [
+            (self.onset(contact, i), kind, i, self.impulse(contact, i)) for i in _rises(closed)
+        ]
+        if contact.surface == "floor":
+            return impacts
+        return impacts + [
+            (t[end], "release", end, 0.0)
+            for end in _falls(closed)
+            if t[end] - t[_run_start(closed, end)] > HOLD
+        ]
+
+    def at_floor(self, left: Flags, right: Flags) -> list[Found]:
+        """Uplift, flight, slip and rest, from which lower corners are closed."""
+        t, flat, flight = self.t, left & right, ~(left | right)
+        noise = GAP_NOISE * self.near
+        lowest, highest = np.sort([self.gap(contact) for contact in self.contacts[:2]], axis=0)
+        speed = np.abs(self.slip_rate)
+        slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
+        still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
+        # Where each kind began, and where it is told.
+        places = {
+            "uplift": [
+                (_start(highest, i, noise), i)
+                for i in _falls(_held(flat, t, REST, value=True))
+                if not flight[i]
+            ],
+            "lift-off": [(_start(lowest, i, noise), i) for i in _rises(flight)],
+            "landing": [(i, i) for i in _falls(flight)],
+            "slip": [(_start(speed, i, SLIP_NOISE * SLIPPING), i) for i in _rises(slipping)],
+            "stick": [(i, i) for i in _falls(slipping) if not flight[i]],
+            "settled": [(i, i) for i in _rises(_held(still, t, REST, value=True))],
+        }
+        return [(t[start], kind, i, 0.0) for kind, found in places.items() for start, i in found]
 
     def later(self, index: int) -> int:
         """The first step end 2 ms after `index`, or the last one."""
@@ -147,7 +157,6 @@ class _Motion:
         from scipy.optimize import nnls
 
         first, last = max(index - 1, 0), self.later(index)
-        inertia = self.scene.block.gyration_squared
         gained = self.states[last, 3:] - self.states[first, 3:]
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
         theta = self.states[index, 2]
@@ -167,7 +176,8 @@ class _Motion:
                 owners += [other, other]
         scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
         impulses, _ = nnls(
-            np.array(columns).T * scale[:, None], gained * np.array([1.0, 1.0, inertia]) * scale
+            np.array(columns).T * scale[:, None],
+            gained * np.array([1.0, 1.0, self.scene.block.gyration_squared]) * scale,
         )
         return float(
             sum(part for part, owner in zip(impulses, owners, strict=True) if owner is contact)
@@ -185,11 +195,11 @@ class _Motion:
         ]
 
 
-def _rises(flags: NDArray[np.bool_]) -> list[int]:
+def _rises(flags: Flags) -> list[int]:
     return [int(i) for i in np.flatnonzero(flags[1:] & ~flags[:-1]) + 1]
 
 
-def _falls(flags: NDArray[np.bool_]) -> list[int]:
+def _falls(flags: Flags) -> list[int]:
     return _rises(~flags)
 
 
@@ -203,15 +213,13 @@ def _start(values: FloatArray, index: int, noise: float) -> int:
     return index
 
 
-def _run_start(flags: NDArray[np.bool_], end: int) -> int:
+def _run_start(flags: Flags, end: int) -> int:
     """Where the run of set flags that ends before `end` began."""
     unset = np.flatnonzero(~flags[:end])
     return int(unset[-1]) + 1 if unset.size else 0
 
 
-def _held(
-    flags: NDArray[np.bool_], t: FloatArray, hold: float = HOLD, *, value: bool = False
-) -> NDArray[np.bool_]:
+def _held(flags: Flags, t: FloatArray, hold: float = HOLD, *, value: bool = False) -> Flags:
     """`flags` without those runs of `value` inside it that last for `hold` s or less."""
     edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
     starts, ends = edges[:-1], edges[1:]  # of runs that neither begin nor end the motion

@@ -162,11 +162,12 @@ def trusted(predicted: float, limits: Limits) -> float:
 
 
 @inner_kernel
-def time_to_close(gap: float, rate: float, curvature: float) -> float:
-    """When a gap with this rate and acceleration is zero, s; infinity if never.
+def time_to_close(corner: Floats, z: Floats, arm: Any, gap: float, rate: float) -> float:
+    """When the gap of a contact is zero, s, by its acceleration if known; infinity if never.
 
     A gap that opens closes on its way back.
     """
+    curvature = pulled(corner, z, arm) if z[KNOWN] != 0.0 else 0.0
     discriminant = rate * rate - 2.0 * curvature * gap
     if discriminant < 0.0:
         return math.inf
@@ -177,10 +178,14 @@ def time_to_close(gap: float, rate: float, curvature: float) -> float:
 
 @inner_kernel
 def stopping_time(z: Floats, arm: Any, dt: float, limits: Limits) -> float:
-    """When the slip of a corner on the floor stops within `dt`, s; infinity if it does not."""
+    """When the slip of a corner on the floor stops within `dt`, s; infinity if never or unknown."""
     slip = z[VX] - z[W] * arm[1]
     slowing = z[AX] - z[SPIN] * arm[1] - z[W] * z[W] * arm[0]
-    if slip * slowing < 0.0 and 0.2 * limits.resting < abs(slip) < abs(slowing) * dt:
+    if (
+        z[KNOWN] != 0.0
+        and slip * slowing < 0.0
+        and 0.2 * limits.resting < abs(slip) < abs(slowing) * dt
+    ):
         return abs(slip / slowing)
     return math.inf
 
@@ -200,13 +205,12 @@ def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[floa
         arm, gap, rate = seen(corners[i], z, cos, sin)
         run.closed[i] = not (gap > limits.closed or rate > leaving)
         if not run.closed[i]:
-            curvature = pulled(corners[i], z, arm) if known else 0.0
-            closing = time_to_close(gap, rate, curvature)
+            closing = time_to_close(corners[i], z, arm, gap, rate)
             if closing < dt:
                 dt, stops = max(trusted(closing, limits), limits.shortest), False
         elif rate < -resting:
             slowest = min(slowest, -rate)
-        elif i < FLOOR and known:
+        elif i < FLOOR:
             stopping = stopping_time(z, arm, dt, limits)
             if stopping < math.inf:
                 dt = trusted(stopping, limits)

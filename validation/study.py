@@ -171,14 +171,19 @@ class _Run:
         self.store = Store(folder, study.kinds)
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
+        self.stack = ExitStack()
+        #: `Task.where` of the tasks that workers play.
+        self.elsewhere = (
+            ("worker", "here") if scheduler is not None else ("worker",) if jobs > 0 else ()
+        )
 
     def finding(self, minutes: float | None) -> Finding:
         until = self.began + 60.0 * minutes if minutes else math.inf
         complete = True
-        with ExitStack() as stack:
-            stack.callback(THREADS.reset, THREADS.set(self.jobs))
+        with self.stack:
+            self.stack.callback(THREADS.reset, THREADS.set(self.jobs))
             try:
-                self._play(stack, until)
+                self._play(until)
             except KeyboardInterrupt:
                 complete = False
         # In the order of the tasks: a finding must not depend on which ended first.
@@ -189,47 +194,43 @@ class _Run:
         failed = {
             task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
         }
-        about = Made(
-            created=datetime.now(UTC).isoformat(timespec="seconds"),
-            jobs=self.jobs,
-            wall_seconds=time.monotonic() - self.began,
-            versions=provenance.versions(),
-            hardware=provenance.hardware(),
+        return replace(
+            found,
+            failures={**failed, **found.failures},
+            complete=complete and found.complete and len(self.done) == len(self.known),
+            made=Made(
+                created=datetime.now(UTC).isoformat(timespec="seconds"),
+                jobs=self.jobs,
+                wall_seconds=time.monotonic() - self.began,
+                versions=provenance.versions(),
+                hardware=provenance.hardware(),
+            ),
         )
-        whole = complete and found.complete and len(self.done) == len(self.known)
-        return replace(found, failures={**failed, **found.failures}, complete=whole, made=about)
 
-    def _play(self, stack: ExitStack, until: float) -> None:
+    @cached_property
+    def _workers(self) -> Pool:
+        return self.stack.enter_context(
+            Pool(self.jobs, self.study.memory_mb)
+            if self.scheduler is None
+            else Cluster(self.scheduler, self.study.memory_mb)
+        )
+
+    def _play(self, until: float) -> None:
         """Waves of tasks, until the study has no more."""
-        workers: Pool | None = None
         while waiting := self._next():
             self._estimate(waiting)
-            elsewhere = [
-                task
-                for task in waiting
-                if (
-                    task.where == "worker" and self.jobs > 0
-                    if self.scheduler is None
-                    else task.where != "timed"
-                )
-            ]
+            calls = deque[Call]()
             for task in waiting:
-                if task not in elsewhere and time.monotonic() < until:
+                if task.where in self.elsewhere:
+                    calls.append(
+                        Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
+                    )
+                elif time.monotonic() < until:
                     self._end(task, guarded(self.study.play, task))
-            if not elsewhere:
+            if not calls:
                 continue
-            if workers is None:
-                workers = stack.enter_context(
-                    Pool(self.jobs, self.study.memory_mb)
-                    if self.scheduler is None
-                    else Cluster(self.scheduler, self.study.memory_mb)
-                )
-            calls = (
-                Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
-                for task in elsewhere
-            )
-            for ended in workers.run(deque(calls), until=until):
-                self._end(ended.call.key, Failure(ended.fault) if ended.error else ended.result)
+            for ended in self._workers.run(calls, until=until):
+                self._end(ended.call.key, ended.outcome)
             if time.monotonic() >= until:
                 return
 

@@ -87,41 +87,41 @@ def compare(
     for key, history in (("reference", reference), ("candidate", candidate)):
         check_kind(history, History, "simulate or History.load", key)
     blocks = [one.block for one in (reference, candidate) if one.block is not None]
-    if scene is None and len(blocks) == 2 and not _same_block(*blocks):
-        known = (
-            [pair for pair in one.model_dump().items() if pair[1] is not None] for one in blocks
-        )
-        said = (", ".join(f"{name} = {value}" for name, value in one) for one in known)
-        raise InputError(
-            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
-        )
+    if scene is None and len(blocks) == 2:
+        _check_same(*blocks)
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
-    chosen, angle = _chosen(DIFFERENCES, measures), "rad" if pair.alpha is None else "alpha"
-    figures = _figures(chosen, pair, angle, until, reference.model)
-    gap, fall = _gap(pair, until)
+    angle = "rad" if pair.alpha is None else "alpha"
     return Discrepancy(
         reference.model,
         candidate.model,
-        figures,
+        _figures(_chosen(DIFFERENCES, measures), pair, angle, until, reference.model),
         pair.start,
         pair.end,
-        gap,
-        fall,
+        *_gap(pair, until),
         histories=(reference, candidate),
     )
 
 
-def _same_block(one: Block, other: Block) -> bool:
-    """Whether the blocks agree within the digits of a hand-written file."""
+def _check_same(one: Block, other: Block) -> None:
+    """Raise `InputError` if blocks differ by more than the digits of a hand-written file."""
     first, second = (
         (block.half_width, block.half_height, *block.offset, block.gyration_squared)
         for block in (one, other)
     )
-    return bool(np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius))
+    if not np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius):
+        said = (
+            ", ".join(
+                f"{name} = {value}" for name, value in block.model_dump(exclude_none=True).items()
+            )
+            for block in (one, other)
+        )
+        raise InputError(
+            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
+        )
 
 
 def describe(

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -206,8 +207,7 @@ class WindowedHistory:
 
     def strong(self, kind: str) -> float:
         """The number of impacts that are not weak (`WEAK_IMPACT`)."""
-        impulses = [abs(event.impulse) for event in self.events(kind)]
-        return float(sum(impulse >= WEAK_IMPACT * max(impulses) for impulse in impulses))
+        return float(sum(_strong(self.events(kind))))
 
     def heights(self) -> Array:
         """Height of the lowest corner above the floor, m."""
@@ -360,29 +360,42 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
     Weak impacts (`WEAK_IMPACT`) need no counterpart. Overturning counts as an event of its own
     kind.
     """
-    pairs: list[tuple[Event, Event]] = []
-    alone: tuple[list[Event], list[Event]] = ([], [])
-    for kind in IMPACTS + TURNS:
-        both = [[e for e in events if e.kind == kind] for events in (reference, candidate)]
-        times = np.array([e.t for e in both[1]])
-        near = [
-            (abs(times[j] - first.t), i, j)
-            for i, first in enumerate(both[0])
-            for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
-        ]
-        taken: tuple[set[int], set[int]] = (set(), set())
-        for _, i, j in sorted(near):
-            if i not in taken[0] and j not in taken[1]:
-                taken[0].add(i)
-                taken[1].add(j)
-                pairs.append((both[0][i], both[1][j]))
-        for left, events, matched in zip(alone, both, taken, strict=True):
-            weak = WEAK_IMPACT * max((abs(e.impulse) for e in events), default=0.0)
-            left += [e for n, e in enumerate(events) if n not in matched and abs(e.impulse) >= weak]
+    found = [
+        _matched(*([e for e in events if e.kind == kind] for events in (reference, candidate)))
+        for kind in IMPACTS + TURNS
+    ]
     return MatchedImpacts(
-        sorted(pairs, key=lambda two: two[0].t),
-        *(sorted(some, key=attrgetter("t")) for some in alone),
+        sorted((pair for one in found for pair in one.pairs), key=lambda two: two[0].t),
+        sorted((e for one in found for e in one.only_reference), key=attrgetter("t")),
+        sorted((e for one in found for e in one.only_candidate), key=attrgetter("t")),
     )
+
+
+def _matched(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
+    """Match events that all are of one kind."""
+    times = np.array([e.t for e in candidate])
+    near = [
+        (abs(times[j] - first.t), i, j)
+        for i, first in enumerate(reference)
+        for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
+    ]
+    partners: dict[int, int] = {}
+    taken: set[int] = set()
+    for _, i, j in sorted(near):
+        if i not in partners and j not in taken:
+            partners[i] = j
+            taken.add(j)
+    alone = (
+        [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
+        for events, matched in ((reference, partners), (candidate, taken))
+    )
+    return MatchedImpacts([(reference[i], candidate[j]) for i, j in partners.items()], *alone)
+
+
+def _strong(impacts: Sequence[Event]) -> list[bool]:
+    """Which impacts are not weak (`WEAK_IMPACT`)."""
+    most = max((abs(event.impulse) for event in impacts), default=0.0)
+    return [abs(event.impulse) >= WEAK_IMPACT * most for event in impacts]
 
 
 def _impact(event: Event) -> Event:

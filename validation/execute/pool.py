@@ -102,6 +102,11 @@ class Ended:
     seconds: float = math.inf
 
     @property
+    def outcome(self) -> Any:
+        """The result, or a `Failure` where there is none."""
+        return Failure(self.fault) if self.error else self.result
+
+    @property
     def fault(self) -> str:
         """Why there is no result, in one line; empty where there is one."""
         from pebble import ProcessExpired
@@ -171,14 +176,14 @@ class Pool:
                 self._begin(waiting, running)
                 done = wait(
                     running,
-                    None if until == math.inf else max(0.0, until - time.monotonic()),
+                    min(max(0.0, until - time.monotonic()), threading.TIMEOUT_MAX),
                     FIRST_COMPLETED,
                 ).done
                 if not done:
                     return
-                for future in [one for one in running if one in done]:  # as they were begun
+                for future in sorted(done, key=list(running).index):  # as they were begun
                     call, seconds = running.pop(future)
-                    if all(other is not call for other, _ in running.values()):
+                    if call not in dict(running.values()):
                         self._compiled.add(call.compiles)
                     if call not in told:
                         told.add(call)
@@ -357,7 +362,7 @@ def alone(
         _mine.run, _mine.pool = run, Pool(1, memory_mb).__enter__()
         Finalize(None, _mine.pool.__exit__, (InterruptedError,), exitpriority=100)
     (ended,) = _mine.pool.run(deque([Call(function, arguments, seconds)]))
-    return Failure(ended.fault) if ended.error else ended.result
+    return ended.outcome
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from functools import cache
 from importlib import metadata
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -132,8 +133,7 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
         followed.add(name)
         found[name] = path
         parents = name.split(".")[:-1]
-        for depth in range(len(parents)):
-            parent = ".".join(parents[: depth + 1])
+        for parent in accumulate(parents, "{}.{}".format):
             found.setdefault(parent, _source(parent, search_path) or path)
         waiting += _imports(
             path, name if path.name == "__init__.py" else ".".join(parents), packages, search_path
@@ -148,27 +148,28 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     No code of `search_path` is run.
     """
     parts = name.split(".")
-    for depth in range(min(2, len(parts)), 0, -1):  # rockcheck's folders do not lie in each other
-        try:
-            spec = (
-                find_spec(".".join(parts[:depth]))
-                if depth == 1 or parts[0] == OWN_PACKAGE
-                else None
-            )
-        except (ModuleNotFoundError, ValueError):
-            continue
-        if spec is None and depth == 1:
-            spec = PathFinder.find_spec(parts[0], list(search_path))
-        if spec is None or spec.origin is None:
-            continue
-        if depth == len(parts):
-            return Path(spec.origin)
-        base = Path(spec.origin).parent.joinpath(*parts[depth:])
-        return next(
-            (path for path in (base / "__init__.py", base.with_suffix(".py")) if path.is_file()),
-            None,
-        )
+    # rockcheck's folders do not lie in each other
+    for depth in range(min(2, len(parts)) if parts[0] == OWN_PACKAGE else 1, 0, -1):
+        if origin := _origin(".".join(parts[:depth]), search_path):
+            if depth == len(parts):
+                return origin
+            base = origin.parent.joinpath(*parts[depth:])
+            return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
     return None
+
+
+def _origin(name: str, search_path: tuple[str, ...]) -> Path | None:
+    """The file of a package or module of the interpreter's path, or, at the top, of `search_path`.
+
+    None where there is none.
+    """
+    try:
+        spec = find_spec(name)
+    except (ModuleNotFoundError, ValueError):
+        return None
+    if spec is None and "." not in name:
+        spec = PathFinder.find_spec(name, list(search_path))
+    return Path(spec.origin) if spec and spec.origin else None
 
 
 def _imports(
