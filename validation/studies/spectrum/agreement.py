@@ -175,21 +175,28 @@ def mapped(panels: Sequence[Panel]) -> list[Panel]:
 def _maps(
     book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]
 ) -> Iterator[dict[str, Any]]:
-    letters: dict[str, dict[str, list[str]]] = {}
-    for model, one in requests.items():
-        for panel in mapped(panels) if model not in PLAYED_SHARE else ():
-            if (drawn := book.spectrum(panel, _coarse(one))) is not None:
-                rows = letters_of(drawn.outcomes, drawn.undecided)
-                letters.setdefault(model, {})[panel.name] = ["".join(row) for row in rows]
+    chosen = mapped(panels)
+    drawn = {
+        model: [book.spectrum(panel, _coarse(one)) for panel in chosen]
+        for model, one in requests.items()
+        if model not in PLAYED_SHARE
+    }
+    if book.wanted:
+        return
+    letters = {
+        model: np.array([letters_of(one.outcomes, one.undecided) for one in some if one])
+        for model, some in drawn.items()
+    }
     for model, mine in letters.items():
-        true = letters.get("ebm-unilateral", {})
-        equal = sum(
-            a == b
-            for name in mine.keys() & true.keys()
-            for a, b in zip("".join(mine[name]), "".join(true[name]), strict=True)
-        )
-        nodes = MAP_SIZE**2 * len(mine)
-        yield {"model": model, "nodes": nodes, "equal": equal, "outcomes": mine}
+        yield {
+            "model": model,
+            "nodes": mine.size,
+            "equal": int(np.sum(mine == letters["ebm-unilateral"])),
+            "outcomes": {
+                panel.name: ["".join(row) for row in grid]
+                for panel, grid in zip(chosen, mine, strict=True)
+            },
+        }
 
 
 def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:

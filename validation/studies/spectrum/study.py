@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse
-from rockcheck.scenes import Ricker, Sine
+from rockcheck.scenes import Ricker, Scene, Sine
 from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text
 from rockcheck.validation.execute import provenance
@@ -34,6 +34,7 @@ from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing
 from rockcheck.validation.study import Study
 from rockcheck.validation.uncertainty.population import compiled
 
+Indices = NDArray[np.int64]
 #: Nodes an axis whose histories are kept, both ends of the axis among them.
 KEPT_AN_AXIS = 16
 ABOUT = (
@@ -141,47 +142,71 @@ class Spectra(Study):
 
     def _found(self, book: Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
-        request, found = self.request, _Found()
-        how = request.model, request.settings
-        i, j = (axis.ravel() for axis in np.meshgrid(*[_spread(request.size)] * 2, indexing="ij"))
-        fast = compiled(build(*how))
+        found = _Found()
+        fast = compiled(build(self.request.model, self.request.settings))
         for panel in self.panels:
-            one = book.spectrum(panel, request)
-            laws = [book.spectrum(panel, request, law) for law in request.other_laws(panel.scene)]
+            one = self._spectrum(book, panel)
             if fast:
-                nodes = request.amplitudes[i], request.frequencies[j]
-                motions = book.ask(tiles.nodes_of(panel.scene, *nodes, *how, "motions"))
-                found.motions[panel] = motions[0] if motions else tiles.Played()
+                found.motions[panel] = self._motions(book, panel)
             if one is not None:
-                whole = [law for law in laws if law is not None]
-                law = differing(one, whole) if laws and len(whole) == len(laws) else None
-                found.spectra[panel] = replace(one, depends_on_law=law)
+                found.spectra[panel] = one
         if len(found.spectra) == len(self.panels):
             if self._papers:
                 found.paper = self._paper(book, list(found.spectra.values()))
             if self.compared:
-                found.agreement = agreement.agree(book, found.spectra, request, self.compared)
+                found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
         return found
 
-    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+    def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
+        """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
+        one = book.spectrum(panel, self.request)
+        laws = [
+            book.spectrum(panel, self.request, law) for law in self.request.other_laws(panel.scene)
+        ]
+        known = [law for law in laws if law is not None]
+        if one is None or len(known) < len(laws) or not laws:
+            return one
+        return replace(one, depends_on_law=differing(one, known))
+
+    def _motions(self, book: Book, panel: Panel) -> tiles.Played:
+        i, j = (
+            axis.ravel() for axis in np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
+        )
+        motions = book.ask(self._nodes(panel.scene, i, j, "motions"))
+        return motions[0] if motions else tiles.Played()
+
+    def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
         request = self.request
-        how = request.model, request.settings
-        least, one_impact = {}, {}
+        nodes = request.amplitudes[i], request.frequencies[j]
+        return tiles.nodes_of(scene, *nodes, request.model, request.settings, what)
+
+    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+        least = {
+            measures.SCANNED_WALLS[one.scene.name]: self._least(book, one.scene)
+            for one in spectra
+            if one.scene.name in measures.SCANNED_WALLS
+        }
+        tongues = {
+            one.scene.floor.friction: self._one_impact(book, one)
+            for one in spectra
+            if not one.scene.walls
+        }
+        return None if book.wanted else measures.Paper(spectra, least, tongues)
+
+    def _least(self, book: Book, scene: Scene) -> float:
+        """The lowest amplitude of the scan that overturns; infinite while none is known."""
         scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
-        for scene in (one.scene for one in spectra if one.scene.name in measures.SCANNED_WALLS):
-            if (outcomes := book.outcomes(scene, *scan, *how)) is not None:
-                fallen = measures.SCANNED[outcomes[0] != SAFE]
-                least[measures.SCANNED_WALLS[scene.name]] = float(fallen.min(initial=np.inf))
-        for one in (one for one in spectra if not one.scene.walls):
-            i, j = measures.near_one_impact(one)
-            tasks = tiles.nodes_of(
-                one.scene, request.amplitudes[i], request.frequencies[j], *how, "one impact"
-            )
-            if (records := book.ask(tasks)) is not None:
-                mask = np.zeros(one.outcomes.shape, dtype=bool)
-                mask[i, j] = [letter == "Y" for record in records for letter in record.letters]
-                one_impact[one.scene.floor.friction] = mask
-        return None if book.wanted else measures.Paper(spectra, least, one_impact)
+        outcomes = book.outcomes(scene, *scan, self.request.model, self.request.settings)
+        fallen = measures.SCANNED[outcomes[0] != SAFE] if outcomes else np.array([])
+        return float(fallen.min(initial=np.inf))
+
+    def _one_impact(self, book: Book, one: Spectrum) -> measures.Mask:
+        """The nodes that overturn after one impact, as far as they are known."""
+        mask = np.zeros(one.outcomes.shape, dtype=bool)
+        i, j = measures.near_one_impact(one)
+        if records := book.ask(self._nodes(one.scene, i, j, "one impact")):
+            mask[i, j] = [letter == "Y" for record in records for letter in record.letters]
+        return mask
 
     def _shares(self, spectra: Mapping[Panel, Spectrum], laws: bool) -> Table:
         columns = [

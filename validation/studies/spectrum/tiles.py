@@ -65,6 +65,11 @@ class Nodes(Task):
         """Its hash."""
         return self.hash
 
+    def scenes(self) -> list[Scene]:
+        """The scene of each node."""
+        nodes = zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
+        return [node_scene(self.scene, *node) for node in nodes]
+
 
 @dataclass(frozen=True)
 class Played:
@@ -112,17 +117,15 @@ def play(task: Nodes) -> Played:
     player = build(task.model, task.settings)
     if task.what == "motions":
         return _motions(task, player)
-    nodes = list(zip(task.amplitudes.tolist(), task.frequencies.tolist(), strict=True))
     if task.what == "one impact":
-        scenes = [node_scene(task.scene, *node) for node in nodes]
-        histories = [player.simulate(one.replace(output_step=one.duration)) for one in scenes]
-        kinds = [[event.kind for event in one.event_list] for one in histories]
+        scenes = (one.replace(output_step=one.duration) for one in task.scenes())
+        kinds = [[event.kind for event in player.simulate(one).event_list] for one in scenes]
         return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
     if compiled(player):
         where = task.scene, task.amplitudes, task.frequencies
         sides, failed = play_nodes(*where, model=player, jobs=cores())
     else:
-        runs = population.play([node_scene(task.scene, *node) for node in nodes], player)
+        runs = population.play(task.scenes(), player)
         sides, failed = np.array(runs.side), np.array(runs.failed)
     letters = np.where(failed, UNDECIDED, np.array(list(LETTERS))[sides - LEFT])
     return Played("".join(letters))

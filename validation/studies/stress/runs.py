@@ -46,23 +46,25 @@ def shrink(
     or `seconds` with the scene found by then; the second value is then false.
     """
     until = time.monotonic() + seconds
-    again = True
-    while again:
-        again = False
-        for tables in _changes(scene):
-            try:
-                simpler = Scene(**tables)
-            except InputError:
-                continue
-            if simpler == scene:
-                continue
-            if trials == 0 or time.monotonic() > until:
-                return scene, False
-            trials -= 1
-            if shows(simpler):
-                scene, again = simpler, True
-                break
+    simpler = _simpler(scene)
+    while one := next(simpler, None):
+        if trials == 0 or time.monotonic() > until:
+            return scene, False
+        trials -= 1
+        if shows(one):
+            scene, simpler = one, _simpler(one)
     return scene, True
+
+
+def _simpler(scene: Scene) -> Iterator[Scene]:
+    """The scene with one simplification each, the greatest first."""
+    for tables in _changes(scene):
+        try:
+            simpler = Scene(**tables)
+        except InputError:
+            continue
+        if simpler != scene:
+            yield simpler
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:

@@ -525,35 +525,38 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
 
 def _maps(found: Sequence[Stable]) -> list[Plot | Table]:
     lines = list(dict.fromkeys(one.line for one in found))
-    panels, tables = [], []
-    for axis, words in AXIS_WORDS.items():
-        of = {(one.line, one.value): one for one in found if one.axis == axis}
-        values = list(dict.fromkeys(value for _, value in of))
-        rows = [[of.get((line, value)) for value in values] for line in lines]
-        panels.append([words, values, [[one and one.step for one in row] for row in rows]])
-        table = Table(
-            f"steps-{axis}",
-            [text("line", "model"), *(text(f"{value:g}") for value in values)],
-            [
-                [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
-                for line, row in zip(lines, rows, strict=True)
-            ],
-            f"Largest stable step, √(R/g), by {words}",
-            folded=True,
-        )
-        tables.append(table)
+    drawn = [
+        _by_axis(axis, lines, [one for one in found if one.axis == axis]) for axis in AXIS_WORDS
+    ]
     plot = Plot(
         "stable-steps",
         "Where engines and the continuous model break: largest stable step, √(R/g)",
         "stable-steps",
-        data={"tried": STEPS, "models": lines, "panels": panels},
+        data={"tried": STEPS, "models": lines, "panels": [panel for panel, _ in drawn]},
         note="All finer steps that were tried are stable, too. The paper's shape of block beside a"
         " wall, R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of 3 g tan α, one thing"
         " changed. A run is stable if it does not blow up, no corner sinks deeper than 0.02 R and"
         " the distance of a step, and the energy gained without a source is below a tenth of all"
         " work. “none”: not even the finest step is stable (3e-4, with adaptive steps 3e-3).",
     )
-    return [plot, *tables, table_of("stable-steps", Stable, found)]
+    return [plot, *(table for _, table in drawn), table_of("stable-steps", Stable, found)]
+
+
+def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[list[Any], Table]:
+    of = {(one.line, one.value): one for one in found}
+    values = list(dict.fromkeys(one.value for one in found))
+    rows = [[of.get((line, value)) for value in values] for line in lines]
+    table = Table(
+        f"steps-{axis}",
+        [text("line", "model"), *(text(f"{value:g}") for value in values)],
+        [
+            [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
+            for line, row in zip(lines, rows, strict=True)
+        ],
+        f"Largest stable step, √(R/g), by {AXIS_WORDS[axis]}",
+        folded=True,
+    )
+    return [AXIS_WORDS[axis], values, [[one and one.step for one in row] for row in rows]], table
 
 
 def _stood(found: Sequence[Still]) -> Table:

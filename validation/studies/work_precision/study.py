@@ -38,6 +38,7 @@ from rockcheck.validation.studies.work_precision.runs import (
     REFERENCES,
     WALLS,
     BenchmarkRun,
+    DiagramLine,
     Play,
     prepared,
 )
@@ -126,24 +127,26 @@ class WorkPrecision(Study):
         An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
         s, and the adaptive ones of DART, which cost as much.
         """
-        families = QUICK if self.quick else tuple(FAMILIES)
-        for member, family, line in itertools.product(
-            range(QUICK_MEMBERS if self.quick else MEMBERS), families, LINES.values()
+        members = range(QUICK_MEMBERS if self.quick else MEMBERS)
+        lines = [
+            (line, value)
+            for line in LINES.values()
+            if not not_installed(line.model)
+            for value in (line.quick if self.quick else line.values)
+        ]
+        for member, family, (line, value) in itertools.product(
+            members, QUICK if self.quick else FAMILIES, lines
         ):
-            for value in line.quick if self.quick else line.values:
-                fine = line.knob == "time_step" and value <= 1e-4
-                dear = fine or line.label == "dart adaptive"
-                if not (self.quick and dear and member) and not not_installed(line.model):
-                    small = line.knob == "time_step" and value < runs.SIDE_BY_SIDE
-                    expected = A_STEP * 3.0 / value if line.knob == "time_step" else A_RUN
-                    yield Play(
-                        family,
-                        member,
-                        line.label,
-                        value,
-                        where="worker" if small else "timed",
-                        expected=expected,
-                    )
+            step = value if line.knob == "time_step" else math.inf
+            if not (self.quick and member and (step <= 1e-4 or line.label == "dart adaptive")):
+                yield Play(
+                    family,
+                    member,
+                    line.label,
+                    value,
+                    where="worker" if step < runs.SIDE_BY_SIDE else "timed",
+                    expected=_usual(line, value, 3.0),
+                )
 
     def _convergence(self) -> Iterator[Task]:
         lines = [line for line in LINES.values() if line.converge and not not_installed(line.model)]
@@ -157,8 +160,7 @@ class WorkPrecision(Study):
                 and not (line.model == "drake" and bounces)
             ):
                 value = line.converge[place]
-                expected = A_STEP * 4.0 / value if line.knob == "time_step" else A_RUN
-                yield Play(name, 0, line.label, value, 1, expected=expected)
+                yield Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
 
     @staticmethod
     def play(task: Any) -> Sequence[Row]:
@@ -169,7 +171,8 @@ class WorkPrecision(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
-        rows = [row for one in done.values() if not isinstance(one, Failure) for row in one]
+        played = (one for one in done.values() if not isinstance(one, Failure))
+        rows = list(itertools.chain.from_iterable(played))
         rows += [
             runs.lost(task, one.reason)
             for task, one in done.items()
@@ -181,20 +184,26 @@ class WorkPrecision(Study):
         plain, walls = (
             [one for one in samples if (one.family in WALLS) == beside] for beside in (False, True)
         )
-        blocks: list[Block] = [
-            *(_models(plain) if plain else ()),
-            *(_converged(walls) if walls else ()),
-            *_batches(times, sizes, starts),
-            *_saved(saved),
-        ]
-        answer = _answer(plain, walls, times)
+        parts: Sequence[tuple[Callable[[Any], Iterator[Block]], Sequence[Any]]] = (
+            (_models, plain),
+            (_converged, walls),
+            (_batches, times),
+            (_cold_starts, starts),
+            (_sizes, sizes),
+            (_saved, saved),
+        )
         return Finding(
             self.name,
             f"Benchmark{'' if self.what == 'all' else f': {self.what}'}"
             f"{', quick' if self.quick else ''}",
-            answer,
-            blocks,
+            _answer(plain, walls, times),
+            list(itertools.chain.from_iterable(part(some) for part, some in parts if some)),
         )
+
+
+def _usual(line: DiagramLine, value: float, seconds: float) -> float:
+    """The usual CPU time (s) of a run that simulates some `seconds`."""
+    return A_STEP * seconds / value if line.knob == "time_step" else A_RUN
 
 
 def _answer(
@@ -433,91 +442,85 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
     )
 
 
-def _batches(
-    times: Sequence[timings.BatchTime],
-    sizes: Sequence[timings.BatchSize],
-    starts: Sequence[timings.ColdStart],
-) -> Iterator[Block]:
-    if times:
-        best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
-        yield Table(
-            "batches-at-level",
+def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
+    best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
+    yield Table(
+        "batches-at-level",
+        [
+            text("case", "batch, one core"),
+            Column("tolerance"),
+            Column("cpu", "CPU", "μs a run"),
+            Column("evaluations", "right-hand sides"),
+            Column("error_95", "p95 error", "rad", digits=2),
+            text("wrong"),
+        ],
+        [
             [
-                text("case", "batch, one core"),
-                Column("tolerance"),
-                Column("cpu", "CPU", "μs a run"),
-                Column("evaluations", "right-hand sides"),
-                Column("error_95", "p95 error", "rad", digits=2),
-                text("wrong"),
-            ],
-            [
-                [
-                    row.case,
-                    row.tolerance,
-                    1e6 * row.cpu,
-                    row.evaluations,
-                    row.error_95,
-                    f"{row.wrong} of {row.runs}",
-                ]
-                for row in best
-            ],
-            "Compiled batches of the event-based model",
-            f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
-            f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
+                row.case,
+                row.tolerance,
+                1e6 * row.cpu,
+                row.evaluations,
+                row.error_95,
+                f"{row.wrong} of {row.runs}",
+            ]
+            for row in best
+        ],
+        "Compiled batches of the event-based model",
+        f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
+        f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
+    )
+    series = [
+        Series(
+            f"{case.name}: {case.words}",
+            [row.error_95 for row in times if row.case == case.name and row.error_95 > 0.0],
+            [1e6 * row.cpu for row in times if row.case == case.name and row.error_95 > 0.0],
         )
-        series = [
-            Series(
-                f"{case.name}: {case.words}",
-                [row.error_95 for row in times if row.case == case.name and row.error_95 > 0.0],
-                [1e6 * row.cpu for row in times if row.case == case.name and row.error_95 > 0.0],
-            )
-            for case in timings.CASES
-        ]
-        yield Plot(
-            "batches",
-            panels=[Panel("", series)],
-            x=Axis("p95 error of the peak, rad", log=True),
-            y=Axis("CPU μs a run, one core", log=True),
-        )
-        yield table_of(
-            "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
-        )
-    if starts:
-        yield Table(
-            "cold-starts",
-            [
-                text("cache", "compile cache"),
-                Column("importing", "import", "s"),
-                Column("first_simulation", "first run", "s"),
-            ],
-            [[start.cache, start.importing, start.first_simulation] for start in starts],
-            "Cold starts",
-        )
-    if sizes:
-        threads = sorted({one.threads for one in sizes})
-        wall = {(one.runs, one.threads): 1e6 * one.wall for one in sizes}
-        yield Table(
-            "batch-sizes",
-            [
-                Column("runs"),
-                *(
-                    Column(f"threads_{n}", f"{n} thread{'s' * (n > 1)}", "μs a run")
-                    for n in threads
-                ),
-            ],
-            [
-                [count, *(wall.get((count, n)) for n in threads)]
-                for count in dict.fromkeys(one.runs for one in sizes)
-            ],
-            "Cost of a batch against its size",
-            "Random pulses, packing included.",
-            on="page",
-        )
+        for case in timings.CASES
+    ]
+    yield Plot(
+        "batches",
+        panels=[Panel("", series)],
+        x=Axis("p95 error of the peak, rad", log=True),
+        y=Axis("CPU μs a run, one core", log=True),
+    )
+    yield table_of(
+        "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
+    )
+
+
+def _cold_starts(starts: Sequence[timings.ColdStart]) -> Iterator[Block]:
+    yield Table(
+        "cold-starts",
+        [
+            text("cache", "compile cache"),
+            Column("importing", "import", "s"),
+            Column("first_simulation", "first run", "s"),
+        ],
+        [[start.cache, start.importing, start.first_simulation] for start in starts],
+        "Cold starts",
+    )
+
+
+def _sizes(sizes: Sequence[timings.BatchSize]) -> Iterator[Block]:
+    threads = sorted({one.threads for one in sizes})
+    wall = {(one.runs, one.threads): 1e6 * one.wall for one in sizes}
+    yield Table(
+        "batch-sizes",
+        [
+            Column("runs"),
+            *(Column(f"threads_{n}", f"{n} thread{'s' * (n > 1)}", "μs a run") for n in threads),
+        ],
+        [
+            [count, *(wall.get((count, n)) for n in threads)]
+            for count in dict.fromkeys(one.runs for one in sizes)
+        ],
+        "Cost of a batch against its size",
+        "Random pulses, packing included.",
+        on="page",
+    )
 
 
 def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
-    if not found:
-        return
     yield Table(
         "savings",
         [
