@@ -224,8 +224,9 @@ class EnsembleView:
             Axis(f"{PEAK} by {of}", log=True, limits=(LEAST * 0.8, FALLEN * 1.5), ticks=ticks)
             for of in (known[reference].label, "the model")
         )
-        title = "Scene by scene"
-        return Plot(f"{self.slug}-scenes", title, panels=panels, x=x_axis, y=y_axis, note=POINTS)
+        return Plot(
+            f"{self.slug}-scenes", "Scene by scene", panels=panels, x=x_axis, y=y_axis, note=POINTS
+        )
 
     def agreement(self, against: str) -> Table:
         """Who falls in how many scenes beside a reference, and the statistics of the peaks."""

@@ -126,8 +126,10 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     if work < FEW:
         yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
         return
-    every = (*stamps.items(), (INDEX, ""))
-    calls = [Call(_write_page, (pages.folder, pages.wanted, *one)) for one in every]
+    calls = [
+        Call(_write_page, (pages.folder, pages.wanted, *one))
+        for one in (*stamps.items(), (INDEX, ""))
+    ]
     yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
 
 
@@ -142,9 +144,8 @@ class _Pages:
         self.run = Run.load(folder)
         self.wanted = tuple(wanted)
         slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
-        for name in wanted:
-            if name not in slugs:
-                raise unknown_name("scene of the run", name, slugs)
+        if unknown := [name for name in wanted if name not in slugs]:
+            raise unknown_name("scene of the run", unknown[0], slugs)
         chosen = {*shown(self.run), *wanted}
         self.scenes = scene_views(self.run, folder, chosen)
         self.ensembles = [
@@ -152,8 +153,10 @@ class _Pages:
         ]
         found: list[View] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
-        links = [(view.name, _address(view)) for view in found]
-        links += [(title, address) for title, address in STUDIES if (folder / address).exists()]
+        links = [
+            *((view.name, _address(view)) for view in found),
+            *((title, address) for title, address in STUDIES if (folder / address).exists()),
+        ]
         self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
 
     def write(self, name: str, stamp: str) -> None:

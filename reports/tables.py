@@ -505,15 +505,12 @@ def accuracy(run: Run) -> list[Block]:
         Axis(f"peak |θ|/α by {of}", log=True, limits=ends)
         for of in (styles[run.reference].label, "the model")
     )
-    title, note = (
-        "Predicted against reference",
-        (
-            "Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted: two"
-            " standard deviations."
-        ),
+    note = (
+        "Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted: two"
+        " standard deviations."
     )
     return [
-        Plot(PEAKS, title, panels=panels, x=x_axis, y=y_axis, note=note),
+        Plot(PEAKS, "Predicted against reference", panels=panels, x=x_axis, y=y_axis, note=note),
         Table("accuracy", columns, rows),
     ]
 

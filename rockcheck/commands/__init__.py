@@ -10,8 +10,8 @@ import sys
 import tempfile
 import threading
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,6 +35,7 @@ from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.recordings.sets import Odd
 from rockcheck.scenes.writing import json_text, made
+from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,8 +126,6 @@ def console() -> Console:
 
 def tell_missing() -> None:
     """Print the models that a study of all models leaves out: those that are not installed."""
-    from rockcheck.validation.execute.models import FAMILIES, not_installed
-
     for name in FAMILIES:
         if missing := not_installed(name):
             console().print(f"left out: {name}, {missing}", style="yellow", soft_wrap=True)
@@ -193,6 +192,14 @@ def progress(title: str) -> Iterator[OnProgress]:
             yield on_progress
         finally:
             over.set()
+
+
+def playing(
+    title: str, models: Iterable[tuple[str, Mapping[str, Any]]]
+) -> AbstractContextManager[OnProgress]:
+    """Progress of `models` (family, settings) that play; it says if one may compile first."""
+    slow = any(compiles(*one) for one in models)
+    return progress(f"{title}, may compile first" if slow else title)
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
@@ -265,8 +272,6 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
 
     Raises `InputError` for an unknown one.
     """
-    from rockcheck.validation.execute.models import FAMILIES, family, not_installed
-
     every = (name for name in FAMILIES if name != "measured" and not not_installed(name))
     given = every if names == ALL else filter(None, map(str.strip, names.split(",")))
     found: dict[str, dict[str, Any]] = {name: {} for name in given}
@@ -360,8 +365,6 @@ def suite_names(incomplete: str) -> list[str]:
 
 def model_names(incomplete: str) -> list[str]:
     """For the shell's completion: families of models."""
-    from rockcheck.validation.execute.models import FAMILIES
-
     return [name for name in FAMILIES if name.startswith(incomplete)]
 
 

@@ -193,9 +193,12 @@ def levels_of(text: str) -> tuple[str, Floats]:
     except ValueError:
         first = last = number = 0.0
     if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
-        said = (
-            "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
-            f" {MOST_LEVELS} of them, not {text!r}"
+        raise InputError(
+            printable(
+                "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
+                f" {MOST_LEVELS} of them, not {text!r}",
+                160,
+            ),
+            "--levels",
         )
-        raise InputError(printable(said, 160), "--levels")
     return ":".join(filter(None, measure)), np.linspace(first, last, int(number))

@@ -134,7 +134,6 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
 
 def _filled(group: Any, given: dict[str, Any]) -> Any:
-    """A group with its options, which are taken out of those `given`."""
     return group(**{one.name: given.pop(one.name) for one in fields(group)})
 
 

@@ -109,7 +109,6 @@ def _finding(
         ]
         for figure in found.figures
     ]
-    columns = [text("measure"), Column("value"), text("unit"), text("note", " ")]
     models = f"{found.candidate} against {found.reference}"
     words = {role: motion.words() for role, motion in motions.items()}
     notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
@@ -117,7 +116,11 @@ def _finding(
         Text(headline(found)),
         Text(facts=[(role, ", ".join(said)) for role, said in words.items() if said]),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
-        Table("comparison", columns, rows),
+        Table(
+            "comparison",
+            [text("measure"), Column("value"), text("unit"), text("note", " ")],
+            rows,
+        ),
         Text("" if shift is None else f"the candidate is shifted by {shift:+.4g} s"),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),

@@ -1,6 +1,6 @@
 """`rockcheck record`: how a file of a recorded ground motion was read."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -63,14 +63,8 @@ def run(
     if plot is not None:
         check_file(plot, "--plot")
     reading = Reading(**dict(setting_of(word, "--read") for word in read or ()))
-    found: list[tuple[Path, Recording]] = []
-    faults: list[Odd] = []
     asked = files_of(files)
-    for path in asked:
-        try:
-            found += [(path, one) for one in read_components(path, reading)]
-        except InputError as error:
-            faults.append(Odd(error))
+    found, faults = _components(asked, reading)
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)
@@ -85,6 +79,19 @@ def run(
         tell_left_out(faults[1:])
         more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
+
+
+def _components(
+    files: Iterable[Path], reading: Reading
+) -> tuple[list[tuple[Path, Recording]], list[Odd]]:
+    found: list[tuple[Path, Recording]] = []
+    faults: list[Odd] = []
+    for path in files:
+        try:
+            found += [(path, one) for one in read_components(path, reading)]
+        except InputError as error:
+            faults.append(Odd(error))
+    return found, faults
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:
@@ -155,5 +162,11 @@ def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
         return []
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
     reading = {name: value for name, value in Reading(**given) if value is not None}
-    files = tuple(str(record_path(word, Path()).absolute()) for word in records)
-    return [RecordSet(files=files, scale=scale, vertical=vertical, **reading)]
+    return [
+        RecordSet(
+            files=tuple(str(record_path(word, Path()).absolute()) for word in records),
+            scale=scale,
+            vertical=vertical,
+            **reading,
+        )
+    ]

@@ -14,7 +14,7 @@ from rockcheck.commands import (
     check_file,
     console,
     model_names,
-    progress,
+    playing,
     report_file,
     save_figure,
     scene_names,
@@ -27,7 +27,7 @@ from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening
 from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.execute import workers
-from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, compiles, is_own
+from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, is_own
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 
@@ -65,28 +65,29 @@ def run(
     """
     check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
-    player = None if is_own(model) else build(model, given)
+    simulate = (
+        partial(_played_apart, model, given) if is_own(model) else build(model, given).simulate
+    )
     what = load_scene(scene)
     files = output or [Path(f"{name_of(what.name, model)}.csv")]
     figures = [path for path in files if path.suffix.lower()[1:] in FORMATS]
     histories = [path for path in files if path not in figures]
-    of_history = partial(check_format, more=f"; its figure as {ENDINGS}")
+    checks = dict.fromkeys(histories, partial(check_format, more=f"; its figure as {ENDINGS}"))
     for path in files:
-        check_file(path, "--output", kind_of if path in figures else of_history)
-    slow = ", may compile first" if compiles(model, given) else ""
-    with progress(f"{what.name}, {model}{slow}") as on_progress, listening(on_progress):
-        history = player.simulate(what) if player else _played_apart(what, model, given)
-    for path in histories:
-        try:
+        check_file(path, "--output", checks.get(path, kind_of))
+    title = f"{what.name}, {model}"
+    with playing(title, [(model, given)]) as on_progress, listening(on_progress):
+        history = simulate(what)
+    try:
+        for path in histories:
             history.save(path)
-        except OSError as error:
-            raise InputError(
-                f"{printable(path)}: cannot be written: {error.strerror}", "--output"
-            ) from None
+    except OSError as error:
+        raise InputError(
+            f"{printable(path)}: cannot be written: {error.strerror}", "--output"
+        ) from None
     motion = motion_of(history, what)
     took = f"simulated in {history.cost.wall_seconds:.2g} s"
-    moved = ", ".join([history.fate, *motion.words(), took])
-    console().print(f"{what.name}, {model}: {moved}")
+    console().print(f"{title}: {', '.join([history.fate, *motion.words(), took])}")
     for note in history.notes:
         console().print(f"note: {note}", style="yellow", soft_wrap=True)
     for path in histories:
@@ -110,7 +111,7 @@ def run(
     )
 
 
-def _played_apart(scene: Scene, model: str, settings: dict[str, Any]) -> History:
+def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
     task = workers.Task(
         label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene

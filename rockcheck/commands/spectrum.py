@@ -108,16 +108,16 @@ def run(
     hops = what not in PAPER and panels[0].wall is not None
     given = dict(setting_of(one) for one in settings or [])
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
-    axes = grid.size, grid.frequencies, grid.amplitudes
-    request = Request(*axes, name, given, grid.refine)
+    request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
         if name != "ebm":
             raise InputError(
                 "cannot be given together with --model: all are compared", "--agreement"
             )
         if not 2 <= agreement <= grid.size**2:
-            said = f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes"
-            raise InputError(said, "--agreement")
+            raise InputError(
+                f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes",
+                "--agreement",
+            )
         tell_missing()
-    study = Spectra(panels, request, agreement or 0)
-    studied(study, played)
+    studied(Spectra(panels, request, agreement or 0), played)

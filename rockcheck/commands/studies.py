@@ -1,8 +1,9 @@
 """`rockcheck benchmark`, `rockcheck stress`, `rockcheck conformance`: the models under test."""
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, Any, NoReturn, get_args
 
 import typer
 
@@ -23,6 +24,7 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import NotInstalled, printable, unknown_name
+from rockcheck.validation.execute import models
 
 #: Nothing begins later than this; what was left out begins with the next run.
 MINUTES = 25.0
@@ -85,17 +87,15 @@ def stress(
     An interrupted run resumes where it ended.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from rockcheck.validation.execute.models import not_installed
     from rockcheck.validation.studies.stress.players import PLAYERS
     from rockcheck.validation.studies.stress.study import Stress, What
 
     part: What = one_of("stress", what, get_args(What))
     for name in model or ():
-        if missing := not_installed(one_of("model", name, PLAYERS).split()[0]):
+        if missing := models.not_installed(one_of("model", name, PLAYERS).split()[0]):
             raise NotInstalled(missing, name)
     tell_missing()
-    study = Stress(part, seed, quick, runs, tuple(model or ()))
-    studied(study, played)
+    studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
 
 
 def conformance(
@@ -140,35 +140,49 @@ def conformance(
     Writes a card an engine: a page, JSON, JUnit and Markdown. Exit 1 where an engine fails one.
     With --tune, finds what an engine needs for a restitution: it drops a block, and slides it.
     """
-    from rockcheck.validation.execute import models
     from rockcheck.validation.studies.conformance.study import Conformance, named, written
-    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
 
     if export is not None:
         _export(usable_folder(export))
         return
-    known, given = models.engine_names(), dict(setting_of(text) for text in sets or [])
-    here = [] if histories else [name for name in known if not models.not_installed(name)]
-    names = list(dict.fromkeys(engine or here))
+    given, folders = dict(setting_of(text) for text in sets or []), histories or []
+    known = () if folders else models.engine_names()
+    names = list(
+        dict.fromkeys(engine or [name for name in known if not models.not_installed(name)])
+    )
     for name in names:
-        models.check_allowed(name, allow_code or ())
-        if name not in known and (tune is not None or not models.is_own(name)):
-            allowed = f"give one of {', '.join(known)}" + ", or module:Class" * (tune is None)
-            raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
-        if reason := models.not_installed(name):
-            raise InputError(reason, f"--engine {name}")
+        _check_engine(name, allow_code or (), own=tune is None)
     if tune is not None:
-        if histories:
+        if folders:
             raise InputError("does not go with --histories", "--tune")
-        if unknown := given.keys() - (WANTED.keys() - {"restitution"}):
-            raise unknown_name("setting", min(unknown), WANTED.keys() - {"restitution"})
-        wanted = tuple(Tune(name, tune, **given) for name in names)
-        studied(Tuning(wanted), dataclasses.replace(played, out=played.out / "tuned"))
+        _tune(names, tune, given, played)
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
     players = [named(name, kind, given) for name in names for kind in kinds]
-    players += [written(folder) for folder in histories or []]
+    players += [written(folder) for folder in folders]
     studied(Conformance(tuple(players)), played)
+
+
+def _check_engine(name: str, allow_code: Sequence[str], *, own: bool) -> None:
+    models.check_allowed(name, allow_code)
+    known = models.engine_names()
+    if name not in known and not (own and models.is_own(name)):
+        allowed = f"give one of {', '.join(known)}" + ", or module:Class" * own
+        raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
+    if reason := models.not_installed(name):
+        raise InputError(reason, f"--engine {name}")
+
+
+def _tune(
+    engines: Sequence[str], restitution: float, given: Mapping[str, Any], played: Played
+) -> NoReturn:
+    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
+
+    settings = WANTED.keys() - {"restitution"}
+    if unknown := given.keys() - settings:
+        raise unknown_name("setting", min(unknown), settings)
+    wanted = tuple(Tune(name, restitution, **given) for name in engines)
+    studied(Tuning(wanted), dataclasses.replace(played, out=played.out / "tuned"))
 
 
 def _export(folder: Path) -> None:

@@ -1,8 +1,10 @@
 """`rockcheck validate`: the main job; `rockcheck accept`: its figures become the expected ones."""
 
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -16,6 +18,7 @@ from rockcheck.commands import (
     chosen_models,
     console,
     model_names,
+    playing,
     progress,
     suite_names,
     tell_left_out,
@@ -27,7 +30,6 @@ from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.commands.report import keep, publish
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.execute.models import compiles
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
@@ -71,15 +73,17 @@ class OfScene:
     read: ReadOption = None
 
 
+#: The argument of both commands.
+_named = partial(
+    typer.Argument,
+    help="Named, or a .toml file (default: suite paper).",
+    show_default=False,
+    autocompletion=suite_names,
+)
+
+
 def run(
-    what: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[SUITE or SCENE]",
-            help="Named, or a .toml file (default: suite paper).",
-            autocompletion=suite_names,
-        ),
-    ] = None,
+    what: Annotated[str, _named(metavar="[SUITE or SCENE]")] = "",
     of_scene: OfScene = OfScene(),
     played: Played = Played(),
     force: Annotated[
@@ -119,39 +123,12 @@ def run(
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of
     rockcheck itself.
     """
-    scene = what if what is not None and is_scene(what) else None
-    before: Run | None = None
-    if scene is None:
-        for name, given in vars(of_scene).items():
-            if given and given != ALL:
-                raise InputError("is for a scene: a suite says which models play what", f"--{name}")
-        folder = usable_folder(played.out)
-        suite = load_suite(what or "paper", allow_code=allow_code or ())
-        tell_left_out(suite.left_out)
-    else:
-        if strict:
-            raise InputError(
-                f"{printable(scene)} is a scene, and nothing of it is judged: give a suite",
-                "--strict",
-            )
-        sets = record_sets(of_scene.records or (), of_scene.read or ())
-        chosen = chosen_models(of_scene.models, of_scene.set or ())
-        suite = scene_suite(scene, chosen, records=sets, allow_code=allow_code or ())
-        folder = usable_folder(played.out)
-        if of_scene.models == ALL:
-            tell_missing()
-        with suppress(InputError):  # no run there, or none that can be read
-            before = Run.load(folder)
-        if before is not None and before.judged:
-            raise InputError(
-                f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
-                " folder",
-                "--out",
-            )
-        tell_left_out(
-            suite.left_out,
-            "--read vertical=true plays such a component together with the horizontal ones",
+    asked = _scene if is_scene(what) else _suite
+    if strict and asked is _scene:
+        raise InputError(
+            f"{printable(what)} is a scene, and nothing of it is judged: give a suite", "--strict"
         )
+    suite, folder = asked(what, of_scene, played.out, allow_code or ())
     how: Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document
 
@@ -160,8 +137,8 @@ def run(
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None and suite.judged:
-        moments = remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
-        trend = trend_of(moments)
+        moment = moment_of(finished, Path(finished.tolerances_file).parent)
+        trend = trend_of(remember(history, moment))
         document.show(trend, console())
         if report:
             where = document.publish(trend, usable_folder(folder, TREND))
@@ -175,11 +152,49 @@ def run(
     raise typer.Exit(finished.exit_code)
 
 
+def _suite(
+    name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
+) -> tuple[Suite, Path]:
+    """The suite to play, and its folder."""
+    for option, given in vars(of_scene).items():
+        if given and given != ALL:
+            raise InputError("is for a scene: a suite says which models play what", f"--{option}")
+    folder = usable_folder(out)
+    suite = load_suite(name or "paper", allow_code=allow_code)
+    tell_left_out(suite.left_out)
+    return suite, folder
+
+
+def _scene(
+    name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
+) -> tuple[Suite, Path]:
+    """A scene to play, as a suite, and its folder."""
+    sets = record_sets(of_scene.records or (), of_scene.read or ())
+    chosen = chosen_models(of_scene.models, of_scene.set or ())
+    suite = scene_suite(name, chosen, records=sets, allow_code=allow_code)
+    folder = usable_folder(out)
+    if of_scene.models == ALL:
+        tell_missing()
+    before: Run | None = None
+    with suppress(InputError):  # no run there, or none that can be read
+        before = Run.load(folder)
+    if before is not None and before.judged:
+        raise InputError(
+            f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
+            " folder",
+            "--out",
+        )
+    tell_left_out(
+        suite.left_out,
+        "--read vertical=true plays such a component together with the horizontal ones",
+    )
+    return suite, folder
+
+
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    models = [(one.family, one.settings) for one in suite.models.values()]
-    said = ", may compile first" if any(compiles(*one) for one in models) else ""
-    with progress(f"{suite.name}{said}") as told:
+    models = ((one.family, one.settings) for one in suite.models.values())
+    with playing(suite.name, models) as told:
         how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
         return run_suite(suite, folder, **how)
 
@@ -202,14 +217,7 @@ def tell_faults(finished: Run, folder: Path) -> None:
 
 
 def accept(
-    suite: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[SUITE]",
-            help="A named suite or a .toml file (default: paper).",
-            autocompletion=suite_names,
-        ),
-    ] = None,
+    suite: Annotated[str, _named(metavar="[SUITE]")] = "",
     reason: Annotated[
         str | None,
         typer.Option(
@@ -228,10 +236,7 @@ def accept(
     They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
     moved, the last two only with --reason.
     """
-    name = suite or "paper"
-    folder = usable_folder(played.out)
-    loaded = load_suite(name, allow_code=allow_code or ())
-    tell_left_out(loaded.left_out)
+    loaded, folder = _suite(suite, OfScene(), played.out, allow_code or ())
     finished = play(loaded, folder, played)
     changes, refused = acceptance.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)

@@ -157,7 +157,7 @@ def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     for (what, name), was, now in _pairs(*said):
         if was != now:
             yield Change(**place, what=what, name=name, before=was, after=now)
-    figures = [{figure.title: figure for figure in cell.figures} for cell in (old, new)]
+    figures = ({figure.title: figure for figure in cell.figures} for cell in (old, new))
     for name, one, other in _pairs(*figures):
         if (
             one

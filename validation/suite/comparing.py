@@ -134,9 +134,13 @@ def _of_scene(scene: Scene, what: str, module: str, **more: Any) -> str:
 
 def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     """The effect of the spread of a scene's inputs on its figures; kept in the store."""
-    spreads = {name: spread.model_dump() for name, spread in given.spreads.items()}
-    more = {"spreads": spreads, "correlation": given.correlation.tolist()}
-    name = _of_scene(given.scene, "inputs", "validation.uncertainty.population", **more)
+    name = _of_scene(
+        given.scene,
+        "inputs",
+        "validation.uncertainty.population",
+        spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
+        correlation=given.correlation.tolist(),
+    )
     found: Inputs = kept(store, name, Inputs, lambda: propagate(given).inputs)
     return found
 
@@ -228,7 +232,6 @@ def compared(
         if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
         else None
     )
-    code = provenance.code_digest(__name__)  # with `compare`
     against = [
         [name, reference.key if reference else "", list(map(str, extra))]
         for name, (reference, extra) in asked.items()
@@ -236,7 +239,10 @@ def compared(
     name = name_of(
         scene.name,
         planned.variant.label,
-        provenance.digest(json.dumps([planned.key, against, horizon, code])),
+        provenance.digest(
+            # with the code of this module and of `compare`
+            json.dumps([planned.key, against, horizon, provenance.code_digest(__name__)])
+        ),
     )
     found: dict[str, ComparisonRecord] = kept(
         store,

@@ -84,8 +84,12 @@ def run_suite(
     if not found.complete:
         raise KeyboardInterrupt
     finished: Run = found.data["run"]
-    seconds = found.made.wall_seconds if found.made else 0.0
-    return finished.model_copy(update={"strict": strict, "wall_seconds": seconds})
+    return finished.model_copy(
+        update={
+            "strict": strict,
+            "wall_seconds": found.made.wall_seconds if found.made else 0.0,
+        }
+    )
 
 
 class SuiteStudy(Study):
@@ -153,8 +157,7 @@ class SuiteStudy(Study):
         for start in range(0, ensemble.count, ensemble.batch):
             numbers = range(start, min(start + ensemble.batch, ensemble.count))
             drawn = {**drawing, "numbers": [numbers.start, numbers.stop]}
-            of = {"ensemble": ensemble, "numbers": numbers}
-            yield self._planned(base, variant, {"drawn": drawn}, **of)
+            yield self._planned(base, variant, {"drawn": drawn}, ensemble=ensemble, numbers=numbers)
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""
@@ -453,8 +456,12 @@ class SuiteStudy(Study):
             for measure in STATISTICS.values()
         ]
         checks = self._checks(place, label, figures, {}, lambda measure: None)
-        outcome = f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned"
-        return Cell(**about, outcome=outcome, figures=tuple(figures), checks=tuple(checks))
+        return Cell(
+            **about,
+            outcome=f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned",
+            figures=tuple(figures),
+            checks=tuple(checks),
+        )
 
 
 def as_expected(reference: Cell) -> dict[tuple[str, str], float | None]:

@@ -324,9 +324,11 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         for e in given.ensemble
     }
     _check_names(given, models, scenes, ensembles)
-    beside = path.with_name(f"{path.stem}.tolerances.toml")
-    if shipped:
-        beside = DATA / "tolerances" / path.name
+    beside = (
+        DATA / "tolerances" / path.name
+        if shipped
+        else path.with_name(f"{path.stem}.tolerances.toml")
+    )
     tables, tolerances_path = given.tolerances, path
     if tables is None:
         tables, tolerances_path = read_toml(beside) if beside.exists() else {}, beside

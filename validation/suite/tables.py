@@ -65,8 +65,9 @@ def finding_of(run: Run) -> Finding:
     """A run on a terminal: verdicts, or outcomes if nothing is judged, and why it does not pass."""
     wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
     if not run.judged:
-        told = Text(OUTCOMES)
-        return Finding("run", run.suite, "nothing judged", [*outcome_tables(run), told, wrong])
+        return Finding(
+            "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), wrong]
+        )
     better, waits = list(improvements(run)), run.without_tolerance
     makes = "`rockcheck accept` makes today's the expected ones"
     blocks: list[Block] = [

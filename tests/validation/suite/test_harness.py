@@ -112,7 +112,7 @@ FAULTS = [
         "(vx, vy, w), 1.001 * dt,",
         15,
     ),
-    ("a lost impact", "engines/events.py", r"in _rises\(flags\):", "in _rises(flags)[1:]:", 15),
+    ("a lost impact", "engines/events.py", r"in _rises\(closed\)", "in _rises(closed)[1:]", 15),
     (
         "friction 5 % low",
         "ebm/natural.py",

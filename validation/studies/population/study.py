@@ -124,8 +124,6 @@ class Population(Study):
         if curves:
             blocks += blocks_of(curves, self.across, self.other)
         unit = self.across.unit
-        columns = [text("motion"), Column("own", f"{self.across.label} as it is", unit)]
-        rows = [[name, own] for name, _, own in self.motions]
         medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
         return Finding(
             self.name,
@@ -133,7 +131,17 @@ class Population(Study):
             f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
             " Median"
             f" {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}.",
-            [*blocks, Table("motions", columns, rows, "Motions", on="page", folded=True)],
+            [
+                *blocks,
+                Table(
+                    "motions",
+                    [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
+                    [[name, own] for name, _, own in self.motions],
+                    "Motions",
+                    on="page",
+                    folded=True,
+                ),
+            ],
             {"model": self.model, **self.data},
             exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
         )

@@ -142,12 +142,13 @@ class Spectra(Study):
 
     def _found(self, book: Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
-        found = _Found()
-        fast = compiled(build(self.request.model, self.request.settings))
+        found, fast = _Found(), compiled(build(self.request.model, self.request.settings))
+        i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         for panel in self.panels:
             one = self._spectrum(book, panel)
             if fast:
-                found.motions[panel] = self._motions(book, panel)
+                motions = book.ask(self._nodes(panel.scene, i.ravel(), j.ravel(), "motions"))
+                found.motions[panel] = motions[0] if motions else tiles.Played()
             if one is not None:
                 found.spectra[panel] = one
         if len(found.spectra) == len(self.panels):
@@ -167,13 +168,6 @@ class Spectra(Study):
         if one is None or len(known) < len(laws) or not laws:
             return one
         return replace(one, depends_on_law=differing(one, known))
-
-    def _motions(self, book: Book, panel: Panel) -> tiles.Played:
-        i, j = (
-            axis.ravel() for axis in np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
-        )
-        motions = book.ask(self._nodes(panel.scene, i, j, "motions"))
-        return motions[0] if motions else tiles.Played()
 
     def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
         request = self.request
