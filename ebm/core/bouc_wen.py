@@ -21,24 +21,11 @@ the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that has not (ROCK
 
 import math
 
-from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes
+from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
 from rockcheck.ebm.core.block import side_of, wall_turn
 from rockcheck.ebm.core.motion import flat_series, tilt_series, turned
 from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.ebm.core.series import (
-    AHEAD,
-    INSTANT,
-    NO_ROOT,
-    NOISE,
-    ORDER,
-    first_root,
-    force_step,
-    leading,
-    product,
-    step_size,
-    value,
-)
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -63,8 +50,8 @@ def _fill_z(block, a, k, loads, yielded):
         return
     rate = a[Row.V, k]
     if loads:
-        a[Row.Z2, k] = product(a, Row.Z, Row.Z, k)
-        rate -= product(a, Row.V, Row.Z2, k)
+        a[Row.Z2, k] = series.product(a, Row.Z, Row.Z, k)
+        rate -= series.product(a, Row.V, Row.Z2, k)
     a[Row.Z, k + 1] = rate / (block.yields * (k + 1))
 
 
@@ -79,7 +66,7 @@ def _less_later(known, a, x, y, k):
 @inner_kernel
 def _loads(mode, a):
     """Whether the pivot loads: V z > 0."""
-    return mode.slip * a[Row.Z, 0] > -NOISE[Kind.POSITION]
+    return mode.slip * a[Row.Z, 0] > -series.NOISE[Kind.POSITION]
 
 
 @inner_kernel
@@ -87,7 +74,7 @@ def _flat_friction_series(block, mode, a, friction, yielded, order):
     loads = _loads(mode, a)
     for k in range(order - 1):
         a[Row.P, k] = a[Row.G, k]
-        a[Row.Q, k] = -friction * product(a, Row.Z, Row.P, k)
+        a[Row.Q, k] = -friction * series.product(a, Row.Z, Row.P, k)
         a[Row.XI, k + 2] = (a[Row.Q, k] - a[Row.U, k]) / ((k + 2) * (k + 1))
         a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
         _fill_z(block, a, k, loads, yielded)
@@ -132,13 +119,13 @@ def _fill_friction_series(block, state, a, zeta, yielded, order):
     wall_sin, wall_cos = wall_turn(turned(block, state, a), mode.tip != 0)
     for k in range(order):
         a[Row.PHI, k + 1] = a[Row.OMEGA, k] / (k + 1)
-        a[Row.SIN, k + 1] = -product(a, Row.OMEGA, Row.COS, k) / (k + 1)
-        a[Row.COS, k + 1] = product(a, Row.OMEGA, Row.SIN, k) / (k + 1)
+        a[Row.SIN, k + 1] = -series.product(a, Row.OMEGA, Row.COS, k) / (k + 1)
+        a[Row.COS, k + 1] = series.product(a, Row.OMEGA, Row.SIN, k) / (k + 1)
         a[Row.V, k] = (k + 1) * (a[Row.XI, k + 1] - a[Row.SIN, k + 1])
         if k == order - 1:
             break
-        a[Row.SPIN2, k] = product(a, Row.OMEGA, Row.OMEGA, k)
-        a[Row.WEIGHT, k] = a[Row.G, k] - product(a, Row.COS, Row.SPIN2, k)  # g
+        a[Row.SPIN2, k] = series.product(a, Row.OMEGA, Row.OMEGA, k)
+        a[Row.WEIGHT, k] = a[Row.G, k] - series.product(a, Row.COS, Row.SPIN2, k)  # g
         a[Row.TURN, k] = wall * (wall_sin * a[Row.SIN, k] + wall_cos * a[Row.COS, k])  # C
         a[Row.ARM, k] = a[Row.COS, k] + a[Row.TURN, k]
         a[Row.INERTIA, k] = 1.0 / block.spin if k == 0 else 0.0
@@ -146,16 +133,18 @@ def _fill_friction_series(block, state, a, zeta, yielded, order):
         normal = a[Row.WEIGHT, k] / block.spin
         if wall != 0.0:
             a[Row.REACH, k] = wall_sin * a[Row.COS, k] - wall_cos * a[Row.SIN, k]  # s'
-            a[Row.INERTIA, k] += product(a, Row.TURN, Row.TURN, k)
-            a[Row.LOAD, k] = a[Row.U, k] - wall * product(a, Row.REACH, Row.SPIN2, k)
-            a[Row.PUSH, k] = product(a, Row.TURN, Row.LOAD, k)  # C f
-            normal = product(a, Row.WEIGHT, Row.INERTIA, k) - product(a, Row.SIN, Row.PUSH, k)
-        a[Row.ZA, k] = product(a, Row.Z, Row.ARM, k)
+            a[Row.INERTIA, k] += series.product(a, Row.TURN, Row.TURN, k)
+            a[Row.LOAD, k] = a[Row.U, k] - wall * series.product(a, Row.REACH, Row.SPIN2, k)
+            a[Row.PUSH, k] = series.product(a, Row.TURN, Row.LOAD, k)  # C f
+            normal = series.product(a, Row.WEIGHT, Row.INERTIA, k) - series.product(
+                a, Row.SIN, Row.PUSH, k
+            )
+        a[Row.ZA, k] = series.product(a, Row.Z, Row.ARM, k)
         a[Row.LEVER, k] = a[Row.SIN, k] + friction * a[Row.ZA, k]  # s + k (c + C)
-        a[Row.DEN, k] = a[Row.INERTIA, k] + product(a, Row.SIN, Row.LEVER, k)
+        a[Row.DEN, k] = a[Row.INERTIA, k] + series.product(a, Row.SIN, Row.LEVER, k)
         a[Row.P, k] = _less_later(normal, a, Row.DEN, Row.P, k) / a[Row.DEN, 0]
-        a[Row.Q, k] = -friction * product(a, Row.Z, Row.P, k)
-        moment = -product(a, Row.LEVER, Row.P, k)
+        a[Row.Q, k] = -friction * series.product(a, Row.Z, Row.P, k)
+        moment = -series.product(a, Row.LEVER, Row.P, k)
         if wall != 0.0:
             moment = _less_later(moment - a[Row.PUSH, k], a, Row.INERTIA, Row.TORQUE, k)
         a[Row.TORQUE, k] = moment / a[Row.INERTIA, 0]  # theta''
@@ -163,7 +152,9 @@ def _fill_friction_series(block, state, a, zeta, yielded, order):
         along = a[Row.Q, k] - a[Row.U, k]
         # The corner slides on the wall: x'' = Sw (c' theta'' - s' w^2), which takes the force N.
         if wall != 0.0:
-            held = product(a, Row.TURN, Row.TORQUE, k) - wall * product(a, Row.REACH, Row.SPIN2, k)
+            held = series.product(a, Row.TURN, Row.TORQUE, k) - wall * series.product(
+                a, Row.REACH, Row.SPIN2, k
+            )
             a[push, k] = wall * (held - along)
             along = held
         a[Row.XI, k + 2] = along / ((k + 2) * (k + 1))
@@ -230,18 +221,18 @@ def _leave_rest(block, base, run):
     u, g = ground.acceleration(base.horizontal, t), 1.0 + ground.acceleration(base.vertical, t)
     # Friction falls with P: nothing tips until the floor pulls.
     soon = 1.0 + ground.acceleration_after(base.vertical, t) <= 0.0
-    hangs = g <= 0.0 if abs(g) > NOISE[Kind.FORCE] else soon
+    hangs = g <= 0.0 if abs(g) > series.NOISE[Kind.FORCE] else soon
     arm = side_of(block, sense).arm
     held = hangs or soon or contacts.closed_wall(block, state.motion, sense, False)
     tips = block.mu_k * block.height > (1.0 + _YIELDS) * arm
     if hangs or tips:
         zeta = min(max(-u / max(block.mu_k * abs(g), contacts.SLOW), -1.0), 1.0)
         uplift = g * min(arm / block.height, block.mu_k)
-        if u != 0.0 and abs(abs(u) - uplift) < NOISE[Kind.FORCE]:
+        if u != 0.0 and abs(abs(u) - uplift) < series.NOISE[Kind.FORCE]:
             # Just where it tips or slips. Near g = 0 the quotient is no better known, and its
             # rounding would act as a moment.
             limit = min(arm / (block.height * block.mu_k), 1.0) if block.mu_k > 0.0 else 1.0
-            zeta = -math.copysign(limit, u if abs(u) > NOISE[Kind.FORCE] else float(sense))
+            zeta = -math.copysign(limit, u if abs(u) > series.NOISE[Kind.FORCE] else float(sense))
         if _tip(block, base, run, sense, zeta, not held):
             return zeta
     if held or (tips and abs(u) < g * block.mu_k):
@@ -264,7 +255,7 @@ def _tip(block, base, run, first, zeta, free):
     v = contacts.slip_velocity(block, state.motion)
     for sense in (first, -first):
         _tilts(block, base, run, sense, v, zeta)
-        grows = leading(run.a, Row.PHI, _LOOK, NOISE[Kind.POSITION], AHEAD)
+        grows = series.leading(run.a, Row.PHI, _LOOK, series.NOISE[Kind.POSITION], series.AHEAD)
         if state.tried[code_of(state.mode)] == 0 and (grows > 0 or (grows == 0 and free)):
             return True
     return False
@@ -378,13 +369,17 @@ def _wall_holds(block, run, tip, touched):
     mode, slack, a = run.state.mode, run.state.slack, run.a
     if (mode.tip if tip else mode.far) != 0:
         push = Row.NA if tip else Row.NB
-        return leading(a, push, _LOOK - 2, slack * NOISE[Kind.FORCE], AHEAD) >= 0
+        return (
+            series.leading(a, push, _LOOK - 2, slack * series.NOISE[Kind.FORCE], series.AHEAD) >= 0
+        )
     if touched & (1 if tip else 2) == 0:
         return True
     guards.fill_guards(block, run.state, run.a)
     guards.guard(Guard.TIP_GAP if tip else Guard.FAR_GAP, _LOOK, a)
     a[Row.GUARD, 0] = a[Row.GUARD, 1] = 0.0  # it is closed: its acceleration decides
-    return leading(a, Row.GUARD, _LOOK, slack * NOISE[Kind.POSITION], AHEAD) >= 0
+    return (
+        series.leading(a, Row.GUARD, _LOOK, slack * series.NOISE[Kind.POSITION], series.AHEAD) >= 0
+    )
 
 
 @inner_kernel
@@ -415,9 +410,9 @@ def _has_sign(a, sign, ended):
 
     Where the other one has just ended, it may do so an instant later.
     """
-    if ended != 0 and abs(a[Row.P, 0]) <= abs(a[Row.P, 1]) * INSTANT:
+    if ended != 0 and abs(a[Row.P, 0]) <= abs(a[Row.P, 1]) * series.INSTANT:
         return True
-    return sign * leading(a, Row.P, _LOOK - 2, NOISE[Kind.FORCE], AHEAD) >= 0
+    return sign * series.leading(a, Row.P, _LOOK - 2, series.NOISE[Kind.FORCE], series.AHEAD) >= 0
 
 
 @called_kernel
@@ -450,19 +445,19 @@ def _initial_friction(block, base, run):
 def expand(block, base, run, reach):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     state, mode, a, last = run.state, run.state.mode, run.a, run.state.last_term_rad
-    order = ORDER
+    order = series.ORDER
     if mode.pivot == Pivot.SLIPPING:
         friction_series(block, base, run, state.zeta, not state.holds, order)
     elif mode.family == Family.FLAT:
         order = flat_series(block, base, run, order)
     else:
         order = _wedged_series(block, base, run, state.zeta, order, reach)
-    h = step_size(a, Row.U, Row.G, order - 1, last, reach)
+    h = series.step_size(a, Row.U, Row.G, order - 1, last, reach)
     if mode.pivot == Pivot.SLIPPING:
-        h = force_step(a, Row.Z, order - 1, state.tolerance_rad, h)
-        h = step_size(a, Row.XI, Row.XI, order - 1, last, h)
+        h = series.force_step(a, Row.Z, order - 1, state.tolerance_rad, h)
+        h = series.step_size(a, Row.XI, Row.XI, order - 1, last, h)
         if mode.family == Family.TILT:
-            h = step_size(a, Row.PHI, Row.COS, order, last, h)
+            h = series.step_size(a, Row.PHI, Row.COS, order, last, h)
     state.order, state.place, state.length = order, mode.sense * state.motion.x - a[Row.SIN, 0], h
 
 
@@ -480,13 +475,13 @@ def locate(block, run):
         guards.drop(a, Guard.CONE_PLUS)
         guards.drop(a, Guard.CONE_MINUS)
     guards.first_event(run)
-    if mode.pivot == Pivot.SLIPPING and mode.slip * a[Row.Z, 0] <= -NOISE[Kind.POSITION]:
+    if mode.pivot == Pivot.SLIPPING and mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]:
         tau, degree = state.tau, state.order - 1
         for k in range(degree + 1):
             a[Row.GUARD, k] = -mode.slip * a[Row.Z, k]
-        noise = NOISE[Kind.POSITION]
-        root = first_root(a, Row.GUARD, degree, tau, tau, noise, AHEAD, run.stack)
-        if root != NO_ROOT:
+        noise = series.NOISE[Kind.POSITION]
+        root = series.first_root(a, Row.GUARD, degree, tau, tau, noise, series.AHEAD, run.stack)
+        if root != series.NO_ROOT:
             state.tau, state.guard = root, Guard.LOADS
 
 
@@ -496,9 +491,9 @@ def advance(run):
     state, mode = run.state, run.state.mode
     if mode.pivot != Pivot.SLIPPING or not state.holds:
         return
-    zeta = mode.sense * value(run.a, Row.Z, state.order - 1, state.tau)
+    zeta = mode.sense * series.value(run.a, Row.Z, state.order - 1, state.tau)
     towards = mode.sense * mode.slip * zeta
-    near = _NEARLY * max(state.tolerance_rad, NOISE[Kind.POSITION])
+    near = _NEARLY * max(state.tolerance_rad, series.NOISE[Kind.POSITION])
     if towards > 0.0 and 1.0 - towards < near:
         before = mode_code(state)
         zeta = math.copysign(1.0, zeta)

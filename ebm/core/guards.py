@@ -25,22 +25,9 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import contacts, lanes, motion
+from rockcheck.ebm.core import contacts, lanes, motion, series
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
-from rockcheck.ebm.core.series import (
-    AHEAD,
-    INSTANT,
-    NO_ROOT,
-    NOISE,
-    eighth,
-    first_root,
-    halves,
-    leads_up,
-    least_change,
-    slope,
-    value,
-)
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -267,16 +254,16 @@ def _with_slack(which, slack, a):
     one instant come to an end.
     """
     if KIND[which] != Kind.POSITION:
-        return slack * NOISE[KIND[which]]
+        return slack * series.NOISE[KIND[which]]
     if (
         slack == 1.0
         or which == Guard.PHI
         or abs(a[Row.GUARD, 0]) > contacts.CLOSED
         or a[Row.GUARD, 1] < -contacts.SLOW
     ):
-        return min(slack * NOISE[Kind.POSITION], contacts.CLOSED)
+        return min(slack * series.NOISE[Kind.POSITION], contacts.CLOSED)
     a[Row.GUARD, 0] += contacts.CLOSED
-    return NOISE[Kind.POSITION]
+    return series.NOISE[Kind.POSITION]
 
 
 @inner_kernel
@@ -286,7 +273,7 @@ def seen(kind, smooth):
     Forces follow the base acceleration at once, and the series does not know it beyond its next
     kink. Positions change little at one.
     """
-    return min(AHEAD, smooth) if kind == Kind.FORCE else AHEAD
+    return min(series.AHEAD, smooth) if kind == Kind.FORCE else series.AHEAD
 
 
 @inner_kernel
@@ -314,11 +301,13 @@ def starts_positive(which, ahead, a):
         return False
     begin = _coefficient(which, 0, a) + a[row, _CONSTANT]
     floor = (
-        max(NOISE[KIND[which]], contacts.CLOSED)
+        max(series.NOISE[KIND[which]], contacts.CLOSED)
         if Guard.LANDING <= which <= Guard.FAR_GAP
-        else NOISE[KIND[which]]
+        else series.NOISE[KIND[which]]
     )
-    return leads_up(begin, _coefficient(which, 1, a), _coefficient(which, 2, a), floor, ahead)
+    return series.leads_up(
+        begin, _coefficient(which, 1, a), _coefficient(which, 2, a), floor, ahead
+    )
 
 
 @inner_kernel
@@ -338,9 +327,13 @@ def _stays_positive(which, order, until, slack, a):
         lanes.upto(_coefficients(which, lanes.LANES, a), degree - lanes.LANES),
     )
     fallen = lanes.total(
-        (lanes.above(lanes.falls(low), 0) + lanes.falls(high) * eighth(until)) * lanes.powers(until)
+        (lanes.above(lanes.falls(low), 0) + lanes.falls(high) * series.eighth(until))
+        * lanes.powers(until)
     )
-    return begin > max(slack * NOISE[KIND[which]], contacts.CLOSED) and -fallen < 0.999999 * begin
+    return (
+        begin > max(slack * series.NOISE[KIND[which]], contacts.CLOSED)
+        and -fallen < 0.999999 * begin
+    )
 
 
 @inner_kernel
@@ -354,8 +347,8 @@ def _past_a_touch(which, degree, times, noise, a):
     if KIND[which] != Kind.FORCE or not 0.0 < root <= _NEARBY * h:
         return root
     begin, fall, half_bend, power = (
-        value(a, Row.GUARD, degree, root),
-        slope(a, Row.GUARD, degree, root),
+        series.value(a, Row.GUARD, degree, root),
+        series.slope(a, Row.GUARD, degree, root),
         0.0,
         1.0,
     )
@@ -363,13 +356,13 @@ def _past_a_touch(which, degree, times, noise, a):
         half_bend += 0.5 * k * (k - 1) * a[Row.GUARD, k] * power
         power *= root
     touches = fall < 0.0 and fall * fall < 4.0 * half_bend * (begin + noise)
-    return root + max(-fall / half_bend, INSTANT) if touches else root
+    return root + max(-fall / half_bend, series.INSTANT) if touches else root
 
 
 @inner_kernel
 def _latest(tau, which, other):
     """The time before which a root of another guard takes the place of this one's at tau."""
-    return tau - INSTANT if 0 <= which <= Guard.FAR_GAP < other else tau
+    return tau - series.INSTANT if 0 <= which <= Guard.FAR_GAP < other else tau
 
 
 @inner_kernel
@@ -388,11 +381,11 @@ def first_event(run):
         degree = guard(k, order, a)
         noise = _with_slack(k, slack, a)
         # Compared in h, not tau: a mirror image has its guards in another order.
-        root = first_root(a, Row.GUARD, degree, h, tau, noise, seen(KIND[k], h), run.stack)
+        root = series.first_root(a, Row.GUARD, degree, h, tau, noise, seen(KIND[k], h), run.stack)
         if math.isnan(root):
             tau, which = root, k
             break
-        if root == NO_ROOT or root >= _latest(tau, which, k):
+        if root == series.NO_ROOT or root >= _latest(tau, which, k):
             continue
         past = _past_a_touch(k, degree, (root, h), noise, a)
         if past < tau:
@@ -427,21 +420,23 @@ def rock_guards_hold(block, run):
     if block.no_slip and not block.unilateral:
         return True
     mu, share = (1.0, 0.0) if block.no_slip else (block.mu_s, 1.0)
-    p_low, p_high = halves(a, Row.P, order - 2)
-    q_low, q_high = halves(a, Row.Q, order - 2)
-    plus = least_change(mu * p_low + -share * q_low, mu * p_high + -share * q_high, h)
-    minus = least_change(mu * p_low + share * q_low, mu * p_high + share * q_high, h)
+    p_low, p_high = series.halves(a, Row.P, order - 2)
+    q_low, q_high = series.halves(a, Row.Q, order - 2)
+    plus = series.least_change(mu * p_low + -share * q_low, mu * p_high + -share * q_high, h)
+    minus = series.least_change(mu * p_low + share * q_low, mu * p_high + share * q_high, h)
     push, pull = mu * a[Row.P, 0], share * a[Row.Q, 0]
-    return min(push - pull + plus, push + pull + minus) > NOISE[Kind.FORCE]
+    return min(push - pull + plus, push + pull + minus) > series.NOISE[Kind.FORCE]
 
 
 @inner_kernel
 def _rock_gap_holds(row, order, h, a):
     """Whether a bound on the gap in this row of the table shows it open in ROCK up to h."""
     along, across = a[row, Row.COS], a[row, Row.SIN]
-    cos_low, cos_high = halves(a, Row.COS, order)
-    sin_low, sin_high = halves(a, Row.SIN, order)
-    low = least_change(along * cos_low + across * sin_low, along * cos_high + across * sin_high, h)
+    cos_low, cos_high = series.halves(a, Row.COS, order)
+    sin_low, sin_high = series.halves(a, Row.SIN, order)
+    low = series.least_change(
+        along * cos_low + across * sin_low, along * cos_high + across * sin_high, h
+    )
     return (
         along * a[Row.COS, 0] + across * a[Row.SIN, 0] + a[row, _CONSTANT] + low > contacts.CLOSED
     )

@@ -10,19 +10,10 @@ from types import ModuleType
 
 import numpy as np
 
-from rockcheck.ebm.core import (
-    bouc_wen,
-    contacts,
-    coulomb,
-    decide,
-    ground,
-    guards,
-    modes,
-    moving,
-    rest,
-    series,
-    settle,
-)
+from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, moving, rest, series, settle
+from rockcheck.ebm.core.contacts import closed_floor
+from rockcheck.ebm.core.decide import quiet_from
+from rockcheck.ebm.core.guards import KIND
 from rockcheck.ebm.core.laws.strike import strike
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
 from rockcheck.ebm.core.state import Base, Records, Run, mode_code, rests
@@ -97,7 +88,7 @@ def begin(block, base, run):
     ratio = control.tolerance ** (1.0 / series.ORDER)
     state.tolerance_rad = control.tolerance * min(block.left.alpha, block.right.alpha)
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
-    state.quiet_from = decide.quiet_from(base, state.tolerance_rad)
+    state.quiet_from = quiet_from(base, state.tolerance_rad)
     state.steps = state.events = state.wall_impacts = state.rows = state.gains = 0
     state.largest_gain = state.floor_impulse = state.wall_impulse = 0.0
     state.rules[:] = 0
@@ -109,7 +100,7 @@ def begin(block, base, run):
     run.a[Row.G, 0] = 1.0
     stands = motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     state.guard, state.before, state.changing = Guard.NONE, 0, True
-    leaves = stands and contacts.closed_floor(block, motion)
+    leaves = stands and closed_floor(block, motion)
     state.event = Event.LEAVES_REST if leaves else Event.UNTOLD
     mode = state.mode
     mode.family = mode.sense = mode.pivot = mode.slip = mode.pull = mode.tip = mode.far = 0
@@ -140,7 +131,7 @@ def resolve(block, base, run):
     state = run.state
     state.before, state.known, state.changing = mode_code(state), False, True
     state.event = Event.UNTOLD
-    modes.leave(state, guards.KIND[state.guard])
+    modes.leave(state, KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
         state.floor_impulse = state.wall_impulse = 0.0
         resting = settle.settling_speed(state)

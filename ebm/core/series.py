@@ -14,24 +14,12 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.lanes import (
-    LANES,
-    above,
-    falls,
-    first,
-    load,
-    powers,
-    ramp,
-    shifted,
-    store,
-    total,
-    upto,
-)
+from rockcheck.ebm.core import lanes
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series. From 14 to 20 the same error costs about the same, at all tolerances; 16
 #: terms are two registers.
-ORDER = 2 * LANES - 1
+ORDER = 2 * lanes.LANES - 1
 #: Width of the rows that hold a polynomial, and behind it what else is kept with it.
 WIDTH = 32
 #: Natural time at which the first coefficients of a guard are compared.
@@ -51,7 +39,9 @@ _SPAN, _START = 30, 31  # where the root search keeps an interval's width and le
 @inner_kernel
 def halves(a, row, n):
     """The coefficients of 1 to tau^7 and of tau^8 to tau^15 of a polynomial of degree n."""
-    return upto(load(a, row, 0), n), upto(load(a, row, LANES), n - LANES)
+    return lanes.upto(lanes.load(a, row, 0), n), lanes.upto(
+        lanes.load(a, row, lanes.LANES), n - lanes.LANES
+    )
 
 
 @inner_kernel
@@ -74,14 +64,19 @@ def product(a, x, y, k):
 def value(a, row, n, tau):
     """c(tau) for a polynomial of degree n."""
     low, high = halves(a, row, n)
-    return total((low + high * eighth(tau)) * powers(tau))
+    return lanes.total((low + high * eighth(tau)) * lanes.powers(tau))
 
 
 @inner_kernel
 def slope(a, row, n, tau):
     """dc/dtau at tau for a polynomial of degree n >= 1."""
-    low, high = upto(load(a, row, 1), n - 1), upto(load(a, row, LANES + 1), n - 1 - LANES)
-    return total((low * (ramp() + 1.0) + high * (ramp() + 9.0) * eighth(tau)) * powers(tau))
+    low, high = (
+        lanes.upto(lanes.load(a, row, 1), n - 1),
+        lanes.upto(lanes.load(a, row, lanes.LANES + 1), n - 1 - lanes.LANES),
+    )
+    return lanes.total(
+        (low * (lanes.ramp() + 1.0) + high * (lanes.ramp() + 9.0) * eighth(tau)) * lanes.powers(tau)
+    )
 
 
 @inner_kernel
@@ -92,10 +87,10 @@ def least_change(low, high, h):
     cancel negative terms of higher order: c_1 those of c_2 and all others, c_2 those of the others.
     NaN in the input gives no bound.
     """
-    low, high = low * powers(h), high * (eighth(h) * powers(h))
-    least = total(above(falls(low), 2) + falls(high))
-    once = shifted(low)
-    for term in (first(shifted(once)), first(once)):
+    low, high = low * lanes.powers(h), high * (eighth(h) * lanes.powers(h))
+    least = lanes.total(lanes.above(lanes.falls(low), 2) + lanes.falls(high))
+    once = lanes.shifted(low)
+    for term in (lanes.first(lanes.shifted(once)), lanes.first(once)):
         least += term
         if least > 0.0:
             least = 0.0
@@ -261,9 +256,11 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
         zeros, lift = 0, floor if a[row, 0] > -floor else floor - a[row, 0]
     elif a[row, zeros] < 0.0:
         return 0.0
-    terms = powers(h)
-    store(stack, 0, 0, load(a, row, zeros) * terms)
-    store(stack, 0, LANES, load(a, row, zeros + LANES) * (terms * eighth(h)))
+    terms = lanes.powers(h)
+    lanes.store(stack, 0, 0, lanes.load(a, row, zeros) * terms)
+    lanes.store(
+        stack, 0, lanes.LANES, lanes.load(a, row, zeros + lanes.LANES) * (terms * eighth(h))
+    )
     stack[0, 0] += lift
     z = _isolate(stack, n - zeros)
     return NO_ROOT if z < 0.0 else z * h
@@ -339,8 +336,10 @@ def _falling_root(stack, row, n, end):
     after the next one, if they go on shrinking quadratically, would be below rounding.
     """
     low, high = halves(stack, row, n)
-    low_slope = upto(load(stack, row, 1), n - 1) * (ramp() + 1.0)
-    high_slope = upto(load(stack, row, LANES + 1), n - 1 - LANES) * (ramp() + 9.0)
+    low_slope = lanes.upto(lanes.load(stack, row, 1), n - 1) * (lanes.ramp() + 1.0)
+    high_slope = lanes.upto(lanes.load(stack, row, lanes.LANES + 1), n - 1 - lanes.LANES) * (
+        lanes.ramp() + 9.0
+    )
     a, b = 0.0, 1.0
     begin, fall = stack[row, 0], -stack[row, 1]
     z = min(
@@ -351,9 +350,9 @@ def _falling_root(stack, row, n, end):
     )
     last = 0.0
     for _ in range(100):
-        terms, far = powers(z), eighth(z)
-        f = total((low + high * far) * terms)
-        gradient = total((low_slope + high_slope * far) * terms)
+        terms, far = lanes.powers(z), eighth(z)
+        f = lanes.total((low + high * far) * terms)
+        gradient = lanes.total((low_slope + high_slope * far) * terms)
         if f > 0.0:
             a = z
         else:

@@ -51,7 +51,7 @@ for _bits in range(1 << CONTACTS):
 _ON_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
 # than this give no solution.
-_ROUNDING, _PARALLEL = NOISE[Kind.POSITION], CLOSED
+ROUNDING, _PARALLEL = NOISE[Kind.POSITION], CLOSED
 _MOST_STAGES = 40
 _HALVINGS, _FRICTIONS = 45, len(Friction)
 
@@ -283,9 +283,9 @@ def _strike(block, stage, v):
             if not fits or not _try_set(block, stage, v, number, friction):
                 continue
             scale = _size(v) + _size(stage.trial) + _size(stage.lam)
-            wrong = _violation(block, stage, number, friction, _ROUNDING * scale)
+            wrong = _violation(block, stage, number, friction, ROUNDING * scale)
             energy = kinetic_energy(block.spin, stage.trial)
-            lower = wrong == least and energy < lowest - _ROUNDING * scale * scale
+            lower = wrong == least and energy < lowest - ROUNDING * scale * scale
             if wrong < least or lower:
                 least, lowest = wrong, energy
                 _keep(stage, number, friction)
@@ -429,7 +429,7 @@ def contact_impact(block, impact, state, work):
     contact_rows(block, impact.sense, impact.phi, rows)
     stage.part[:] = 0.0
     stage.after[:] = 0.0
-    rounding = _ROUNDING * _size(v)
+    rounding = ROUNDING * _size(v)
     found = Found.FITS
     for number in range(_MOST_STAGES):
         # Impacts that alternate between floor and wall without end become plastic.
@@ -441,7 +441,7 @@ def contact_impact(block, impact, state, work):
         before = kinetic_energy(block.spin, v)
         if not _strike(block, stage, v):
             found = Found.LEAST_WRONG
-        noise = 2.0 * _ROUNDING * before
+        noise = 2.0 * ROUNDING * before
         gains = kinetic_energy(block.spin, stage.after) - before > noise
         if block.energy_cap and not plastic and gains:
             _strike_without_gain(block, stage, v, before)

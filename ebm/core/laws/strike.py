@@ -9,21 +9,11 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import contacts, modes, series
+from rockcheck.ebm.core import contacts, modes
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.laws import impacts
-from rockcheck.ebm.core.laws.contact_impacts import WORK, Impact, contact_impact
-from rockcheck.ebm.core.names import (
-    Branch,
-    Contact,
-    Event,
-    Family,
-    Found,
-    Guard,
-    Kind,
-    Landing,
-    Pivot,
-)
+from rockcheck.ebm.core.laws.contact_impacts import ROUNDING, WORK, Impact, contact_impact
+from rockcheck.ebm.core.names import Branch, Contact, Event, Family, Found, Guard, Landing, Pivot
 from rockcheck.ebm.core.rules import Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, place
@@ -223,7 +213,7 @@ def _corner_impact(block, state, sw, e, resting):
 @inner_kernel
 def count_gain(before, after, state):
     """Counts an impact that added energy, and keeps the largest relative gain."""
-    if after > before * (1.0 + 10.0 * series.NOISE[Kind.POSITION]):
+    if after > before * (1.0 + 10.0 * ROUNDING):
         state.gains += 1
         state.largest_gain = max(state.largest_gain, after / before - 1.0)
 
