@@ -22,7 +22,7 @@ the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that has not (ROCK
 import math
 
 from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
-from rockcheck.ebm.core.block import side_of, wall_turn
+from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.motion import flat_series, tilt_series, turned
 from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
@@ -162,16 +162,36 @@ def _fill_friction_series(block, state, a, zeta, yielded, order):
 
 
 @called_kernel
-def _held(block, base, run):
-    """Whether a flat block without speed stays at rest; if so, its mode is that of rest."""
-    mode = run.state.mode
-    slip, pull = mode.slip, mode.pull
-    _rest(block, base, run.state)
-    if modes.wrong_by(block, base, run, False) == 0.0:
-        return True
-    place(mode, Family.FLAT, 1, Pivot.SLIPPING, slip)
-    mode.pull = pull
-    return False
+def _held(block, base, state):
+    """Whether a flat block without speed stays at rest.
+
+    The base then neither lifts nor slides it, or presses it on a wall. One that stays at its limit,
+    but for rounding, is at rest; its guards say when it leaves.
+    """
+    motion, t = state.motion, state.t
+    g, u = 1.0 + ground.acceleration(base.vertical, t), ground.acceleration(base.horizontal, t)
+    to_left, to_right = block.left.arm / block.height, block.right.arm / block.height
+    slope = to_left if (u > 0.0) == (g >= 0.0) else to_right
+    # At its limit where it goes decides.
+    limit = (min(slope, block.mu_s) if g >= 0.0 else slope) * abs(g)
+    if abs(abs(u) - limit) < series.NOISE[Kind.FORCE]:
+        g = 1.0 + ground.acceleration_after(base.vertical, t)
+        u = ground.acceleration_after(base.horizontal, t)
+    left = contacts.closed_wall(block, motion, 1, False)
+    right = contacts.closed_wall(block, motion, -1, False)
+    # Hanging: by both corners, as long as nothing at all tells to which side it tips.
+    if g < 0.0 and not left and not right:
+        return u == 0.0
+    if g < 0.0:  # a wall on which it is pressed holds it flat
+        return (left and u >= -to_right * g - series.NOISE[Kind.FORCE]) or (
+            right and u <= to_left * g + series.NOISE[Kind.FORCE]
+        )
+    share = 1.0 if block.mu_s == LEAST_FRICTION else g
+    low, high = (
+        -min(to_right, block.mu_s) * share - series.NOISE[Kind.FORCE],
+        min(to_left, block.mu_s) * share + series.NOISE[Kind.FORCE],
+    )
+    return (u <= high or left) and (u >= low or right)
 
 
 @inner_kernel
@@ -279,7 +299,10 @@ def _starts(block, base, run, zeta):
     v = contacts.slip_velocity(block, motion)
     if motion.theta == 0.0 and motion.w == 0.0:
         if v == 0.0:
-            return 0.0 if _held(block, base, run) else _leave_rest(block, base, run)
+            if not _held(block, base, state):
+                return _leave_rest(block, base, run)
+            _rest(block, base, state)
+            return 0.0
         place(state.mode, Family.FLAT, 1, Pivot.SLIPPING, 1 if v > 0.0 else -1)
         return zeta
     sense = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
@@ -535,7 +558,7 @@ def _follow(block, base, run):
         state.zeta = 0.0
         return Event.UNTOLD
     if which == Guard.SLIP:
-        return _turn(block, base, run)
+        return _turn(block, base, state)
     if mode.family == Family.FLAT and (which == Guard.FLOOR_PUSH or _hangs_on(base, state)):
         mode.pull = -mode.pull
         state.rules[Rule.HANGS] += modes.hangs_flat(mode)
@@ -554,26 +577,25 @@ def _follow(block, base, run):
 
 
 @inner_kernel
-def _turn(block, base, run):
+def _turn(block, base, state):
     """The slip has come to its end: the pivot slips back, or a flat block rests.
 
     Returns the Event.
     """
-    state = run.state
     event = Event.UNTOLD if state.holds else Event.STICKS
     state.holds = True
     state.mode.slip = -state.mode.slip
-    return Event.STICKS if _comes_to_rest(block, base, run) else event
+    return Event.STICKS if _comes_to_rest(block, base, state) else event
 
 
 @inner_kernel
-def _comes_to_rest(block, base, run):
+def _comes_to_rest(block, base, state):
     """Whether a flat block whose slip has ended is held: then it rests."""
-    state = run.state
-    if state.mode.family != Family.FLAT or not _held(block, base, run):
+    if state.mode.family != Family.FLAT or not _held(block, base, state):
         return False
     state.motion.vx = 0.0
     state.holds = True
+    _rest(block, base, state)
     return True
 
 
@@ -585,7 +607,7 @@ def _tip_sliding(block, base, run):
     """
     state, slip = run.state, run.state.mode.slip
     # It slid by rounding, whose sign would choose the side.
-    if abs(state.motion.vx) < contacts.SLOW and _comes_to_rest(block, base, run):
+    if abs(state.motion.vx) < contacts.SLOW and _comes_to_rest(block, base, state):
         return Event.STICKS
     if state.holds and 1.0 - slip * state.zeta < _YIELDS:
         state.zeta = float(slip)
