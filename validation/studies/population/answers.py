@@ -14,6 +14,7 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.experience import WIDTH, known, outside
 from rockcheck.scenes.files import UncertainScene
+from rockcheck.scenes.writing import finite
 from rockcheck.validation.criteria import CRITERIA, Criterion
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
 from rockcheck.validation.execute.models import build
@@ -829,10 +830,9 @@ def _histories(found: Found) -> list[Block]:
             for case, one in rows.items()
         ]
     )
-    shown = np.where(np.isfinite(lines), lines, None).tolist()  # type: ignore[call-overload]
     series = [
         Series(case, times.tolist(), line, style=style)
-        for case, line in zip(rows, shown, strict=True)
+        for case, line in zip(rows, finite(lines.tolist()), strict=True)
     ]
     low, high = float(np.nanmin(lines)), float(np.nanmax(lines))
     beyond = max(0.05 * (high - low), 0.5e-3)  # noise is not blown up
