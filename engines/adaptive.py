@@ -13,12 +13,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from rockcheck.engines.base_motion import BaseMotion, FloatArray
+from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.marching import Marched
+from rockcheck.engines.world import Vector
 from rockcheck.scenes import ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
-Vector = tuple[float, float, float]  # along x, y and theta
 #: Rows of the march for which there is room at first.
 _ROOM = 8192
 
@@ -29,15 +30,15 @@ _ROOM = 8192
 Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
 
 
-def march_adaptively(
+def adaptive_march(
     scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2), until |theta| = pi/2.
+) -> Callable[[], Marched]:
+    """The march of a scene until |theta| = pi/2, to be called once; its compiled step is loaded.
 
     The scene is one of a block with R = 1, see `engines.marching.in_units_of`; `base` is its base
     motion. No step is longer than `longest` s; the steps at impacts and after events are `short`
-    times their usual length. Raises `ModelFailure` if the motion blows up or needs more than
-    100,000 + 20 end / `longest` steps, `end` the scene's last output time.
+    times their usual length. The march raises `ModelFailure` if the motion blows up or needs more
+    than 100,000 + 20 end / `longest` steps, `end` the scene's last output time.
     """
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of
@@ -61,22 +62,27 @@ def march_adaptively(
         base.velocity(0.0),
         len(course.corners),
     )
-    rows, count = np.empty((_ROOM, stepping.COLUMNS)), 1
-    rows[0, :7] = 0.0, *run.state[:6]
-    step = for_types_of(stepping.step, run, course, limits, (0.0, 0.0, 0.0), rows[0])
-    going = stepping.plan(run, course, limits)
-    while going:
-        x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
-        kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
-        if count == len(rows):
-            rows = np.concatenate([rows, np.empty_like(rows)])
-        going = step(run, course, limits, kicked, rows[count])
-        count += 1
-        if count % 512 == 0:
-            tell(rows[count - 1, 0], course.end)
-        if going == stepping.LOST or count > most_steps:
-            raise ModelFailure(
-                f"no end to the events, or a motion that blew up, after {count} steps at t ="
-                f" {rows[count - 1, 0]:g} s"
-            )
-    return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()
+    first = np.empty((_ROOM, stepping.COLUMNS))
+    first[0, :7] = 0.0, *run.state[:6]
+    step = for_types_of(stepping.step, run, course, limits, (0.0, 0.0, 0.0), first[0])
+    planned = stepping.plan(run, course, limits)
+
+    def march() -> Marched:
+        rows, count, going = first, 1, planned
+        while going:
+            x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
+            kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
+            if count == len(rows):
+                rows = np.concatenate([rows, np.empty_like(rows)])
+            going = step(run, course, limits, kicked, rows[count])
+            count += 1
+            if count % 512 == 0:
+                tell(rows[count - 1, 0], course.end)
+            if going == stepping.LOST or count > most_steps:
+                raise ModelFailure(
+                    f"no end to the events, or a motion that blew up, after {count} steps at t ="
+                    f" {rows[count - 1, 0]:g} s"
+                )
+        return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()
+
+    return march

@@ -5,11 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Contact, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.mujoco_world import FloatArray, MuJoCoWorld, model_of, plane_of, stock_model
-from rockcheck.engines.world import World
+from rockcheck.engines.world import Vector, World
 from rockcheck.scenes import Floor, Scene
 
 # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane

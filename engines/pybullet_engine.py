@@ -5,10 +5,9 @@ import os
 from functools import cache
 from typing import Any, ClassVar
 
-from rockcheck.engines.adaptive import Vector
 from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import FloatArray, State, World
+from rockcheck.engines.world import FloatArray, State, Vector, World
 from rockcheck.scenes import Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane

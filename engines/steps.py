@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rockcheck.engines.adaptive import march_adaptively
+from rockcheck.engines.adaptive import adaptive_march
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.marching import Marched, march_fixed
 from rockcheck.engines.world import World
@@ -52,4 +52,4 @@ class AdaptiveStep:
 
     def ready(self, world: World, scene: Scene, base: BaseMotion) -> Callable[[], Marched]:
         """The march of a world through a scene, which is still to be called."""
-        return partial(march_adaptively, scene, base, world.push, self.largest, self.short)
+        return adaptive_march(scene, base, world.push, self.largest, self.short)

@@ -4,8 +4,9 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from rockcheck.engines.adaptive import FloatArray, Vector
+from rockcheck.engines.base_motion import FloatArray
 
+Vector = tuple[float, float, float]  # along x, y and theta
 State = tuple[float, float, float, float, float, float]
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import Drake, MuJoCo, PyBullet
+from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep, FixedStep
 from rockcheck.scenes import (
@@ -22,6 +23,7 @@ from rockcheck.scenes import (
     Scene,
     Sine,
     Wall,
+    compiled,
     load_scene,
 )
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -365,6 +367,23 @@ class Scripted(Engine):
 def test_a_motion_that_cannot_be_is_a_failure(free_rocking, step, answers, words):
     with pytest.raises(ModelFailure, match=words):
         Scripted(time_step=step, answers=answers).simulate(free_rocking(0.0))
+
+
+def test_a_march_loads_its_compiled_step_before_its_clock_starts(monkeypatch, free_rocking):
+    loads = []
+    load = compiled.for_types_of
+    monkeypatch.setattr(
+        compiled,
+        "for_types_of",
+        lambda kernel, *given: loads.append(kernel) or load(kernel, *given),
+    )
+    scene = free_rocking(0.0).replace(duration=0.01)
+    world = SimpleNamespace(push=lambda *asked: (0.0, 0.0, 0.0))
+    march = AdaptiveStep().ready(world, scene, BaseMotion(scene))
+    assert len(loads) == 1
+    times, states, _ = march()
+    assert len(loads) == 1
+    assert len(times) == len(states) > 1
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
