@@ -5,6 +5,7 @@ Each block is rendered from one description. All pages have one look, made of th
 """
 
 import math
+from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from pydantic import TypeAdapter
 from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
@@ -27,8 +29,19 @@ from rockcheck.reports.show.words import (
     unit,
     window,
 )
-from rockcheck.reports.style import BY_KEY, FORMATS, LOOKS, label_of, looks, save, stamp_of, undrawn
-from rockcheck.scenes.errors import inert
+from rockcheck.reports.style import (
+    BY_KEY,
+    LOOKS,
+    kind_of,
+    label_of,
+    looks,
+    save,
+    save_as,
+    stamp_in,
+    stamp_of,
+)
+from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
+from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import (
     finite,
     json_text,
@@ -38,13 +51,15 @@ from rockcheck.scenes.writing import (
     table_text,
     write_whole,
 )
-from rockcheck.validation.execute.pool import Call
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The sign of a verdict, beside its colour.
 SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
 #: The folder of a page's figures.
 FIGURES = "figures"
+#: The data of a figure, and limits of drawing it anew: s, and MB.
+PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
 #: The folder of the scenes that show a failure.
 FAILING = "failures"
 COLOURS = {
@@ -183,14 +198,36 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return title + table + (f"\n\n{block.note}" if block.note else "")
 
 
-def _draw(plot: Plot, stem: Path, formats: Sequence[str], stamp: str) -> None:
-    save(figure_of(plot), stem, formats, stamp=stamp)
+def _draw(plot: Plot, stem: Path, stamp: str) -> None:
+    save(figure_of(plot), stem, ["svg"], stamp=stamp)
 
 
-def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -> Path:
+def _draw_again(data: Path, path: Path) -> None:
+    save_as(figure_of(PLOT.validate_python(read_json(data))), path)
+
+
+def write_figure(folder: Path, name: str, path: Path) -> Path:
+    """Draw a figure of a study anew, from the data in its `folder`, into the file `path`.
+
+    Returns the path; its ending is one of `style.FORMATS`. Raises `InputError` where the study has
+    no such figure, or its data cannot be drawn within `DRAWING` s.
+    """
+    kind_of(path)
+    known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
+    if name not in known:
+        raise unknown_name("figure", name, known)
+    with Pool(1, DRAWING_MB) as pool:
+        (ended,) = pool.run(deque([Call(_draw_again, (known[name], path), DRAWING)]))
+    if ended.error is not None:
+        raise InputError(f"{printable(known[name])}: no data of a figure: {ended.fault}")
+    return path
+
+
+def publish(found: Finding, folder: Path) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
-    The scenes of failures are written beside them.
+    The scenes of failures are written beside them. Figures are written as the page shows them, and
+    as the data that `write_figure` draws.
     """
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
@@ -203,9 +240,12 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
     figures = made(folder, FIGURES)
     calls = []
     for plot in plots:
-        stamp, stem = stamp_of(json_text(asdict(plot))), figures / plot.name
-        if missing := undrawn(stem, stamp, formats):
-            calls.append(Call(_draw, (plot, stem, missing, stamp)))
+        drawn = replace(plot, played=None)
+        data, stem = json_text(asdict(drawn)), figures / plot.name
+        write_whole(stem.with_suffix(".json"), data)
+        stamp = stamp_of(data)
+        if stamp_in(stem.with_suffix(".svg")) != stamp:
+            calls.append(Call(_draw, (drawn, stem, stamp)))
     list(side_by_side(calls))
     above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
     site = Site(folder, f"rockcheck: {found.title}", above)
@@ -221,7 +261,7 @@ def publish(found: Finding, folder: Path, *, formats: Sequence[str] = FORMATS) -
         looks=looks(LOOKS),
         row_cells=row_cells,
         figures=FIGURES,
-        formats=formats,
+        formats=(),
     )
 
 

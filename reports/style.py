@@ -12,7 +12,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -225,19 +225,6 @@ def save(
             written.append(write_whole(path, content.getvalue(), named=named))
             figure.set_layout_engine(None)  # the other formats are laid out alike
     return written
-
-
-def undrawn(stem: Path, stamp: str, formats: Sequence[str]) -> list[str]:
-    """The `formats` in which no `<stem>` shows what `stamp` says.
-
-    A file of any format is removed where it shows something else.
-    """
-    paths = {kind: stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS}
-    if stamp_in(paths["svg"]) == stamp:
-        return [kind for kind in formats if not paths[kind].is_file()]
-    for path in paths.values():
-        path.unlink(missing_ok=True)
-    return list(formats)
 
 
 def stamp_of(shown: object) -> str:

@@ -167,7 +167,8 @@ class Plot:
     `kind` "lines" draws `panels`; any other kind is drawn from `data` by its drawer in
     `rockcheck.reports.drawers`. On the page, a `live` plot of one panel shows its values under the
     pointer. Panels have common scales if `shared`. `data` of "lines" may give the x axis in another
-    unit, too: `per_unit`, `other_unit`, `other_label`.
+    unit, too: `per_unit`, `other_unit`, `other_label`. `played` is what only the page shows, at a
+    click.
     """
 
     name: str
@@ -179,6 +180,7 @@ class Plot:
     note: str = ""
     live: bool = False
     data: Any = None
+    played: Any = None
     shared: bool = True
     on: Literal["all", "page"] = "page"
     folded: bool = False

@@ -111,7 +111,7 @@ def on_files(files: Any, config: Any, **_: Any) -> Any:
 
     for path in sorted(RUNS.glob("*.json")):
         (BUILD / path.stem).mkdir(parents=True, exist_ok=True)
-        document.publish(load(path.stem), BUILD / path.stem, formats=("svg",))
+        document.publish(load(path.stem), BUILD / path.stem)
     for name, command in COMMANDS.items():
         words = [sys.executable, "-m", "rockcheck", *command, "--out", str(BUILD / name), "-q"]
         done = subprocess.run(words, capture_output=True, text=True, check=False)

@@ -114,36 +114,74 @@ def figure(plot: Plot) -> Figure:
     data = plot.data
     panels = data["panels"]
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
-    columns = 1 + max(panel["place"][2] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
     with figure_style():
-        size = PAGE if len(panels) > 1 else PAGE / 1.6, data["height"]
-        figure = Figure(figsize=size, layout="constrained")
-        grid = figure.add_gridspec(rows, columns)
+        figure = Figure(figsize=(PAGE if len(panels) > 1 else PAGE / 1.6, data["height"]))
         x, y = data["frequencies"], data["amplitudes"]
-        for panel in panels:
+        for panel, place in zip(panels, _places(data, rows, bool(plot.title)), strict=True):
             row, high, column = panel["place"]
-            axes = figure.add_subplot(grid[row : row + high, column])
+            axes = figure.add_axes(place)
             letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            # Where panels are two grid rows high, column 0 holds the panel without a wall, midway
-            # between the rows of the others: it is labelled below, and column 1 beside, too.
-            below, beside = row + high == rows or column < high - 1, column < high
+            below, beside = row + high == rows or column < high - 1, _beside(panel)
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=not data["record"])
             axes.spines[["top", "right"]].set_visible(True)
             of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)
             axes.set_ylabel(of if beside else "", fontsize=7.0)
-        if len(panels) == 1 and data["pulse"]:
-            if own := data["pulse"].get("own"):
+        if units := data["pulse"] if len(panels) == 1 else None:
+            if own := units.get("own"):
                 axes.plot(*own, **OWN_MARK)
             _units(axes, data)
-        _legend(figure, data)
-        figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
+        handles, columns = _legend(data)
+        figure.legend(handles=handles, loc="lower center", ncols=columns, fontsize=7)
+        figure.suptitle(
+            plot.title, fontsize=9, x=0.01, y=1.0 - 0.06 / data["height"], ha="left", va="top"
+        )
     return figure
+
+
+def _beside(panel: Any) -> bool:
+    """Whether a panel's vertical axis is labelled.
+
+    Where panels are two grid rows high, column 0 holds the panel without a wall, midway between the
+    rows of the others: it is labelled below, and column 1 beside, too.
+    """
+    _, high, column = panel["place"]
+    return bool(column < high)
+
+
+def _places(data: Any, rows: int, title: bool) -> list[tuple[float, float, float, float]]:
+    """Where each panel's axes are: left, bottom, width and height, in shares of the figure.
+
+    Margins in inches: a layout engine would need longer than the drawing.
+    """
+    panels, height = data["panels"], data["height"]
+    width = PAGE if len(panels) > 1 else PAGE / 1.6
+    units = 0.4 if len(panels) == 1 and data["pulse"] else 0.0
+    wide = {column: 0.1 for *_, column in (panel["place"] for panel in panels)}
+    for panel in filter(_beside, panels):
+        wide[panel["place"][2]] = 0.53 if "row" in panel else 0.45
+    across = (width - 0.1 - units - sum(wide.values())) / len(wide)
+    lines = max(panel["title"].count("\n") for panel in panels)
+    above = (0.27 if title else 0.03) + 0.22 + 0.13 * lines + units
+    handles, columns = _legend(data)
+    below = 0.5 + 0.15 * -(-len(handles) // columns)
+    lower = any(panel["title"] for panel in panels if panel["place"][0] > 0)
+    between = 0.3 if lower else 0.12
+    row_height = (height - above - below + between) / rows
+    return [
+        (
+            (sum(wide[k] for k in range(column + 1)) + column * across) / width,
+            (height - above - (row + high) * row_height + between) / height,
+            across / width,
+            (high * row_height - between) / height,
+        )
+        for row, high, column in (panel["place"] for panel in panels)
+    ]
 
 
 def _units(axes: Any, data: Any) -> None:
@@ -167,7 +205,8 @@ def outcome_key(panels: Any) -> dict[str, str]:
     return key | {"undecided": "undecided"}
 
 
-def _legend(figure: Figure, data: Any) -> None:
+def _legend(data: Any) -> tuple[list[Any], int]:
+    """The entries of a figure's legend, and how many stand in a row."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -182,8 +221,7 @@ def _legend(figure: Figure, data: Any) -> None:
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
     if (data.get("pulse") or {}).get("own"):
         handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0}))
-    columns = 4 if "key" not in data else 1
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
+    return handles, 4 if "key" not in data else 1
 
 
 def write_scripts(plot: Plot, folder: Path) -> list[str]:
@@ -200,8 +238,7 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
         | {"outcomes": _runs(panel["outcomes"])}
         for panel in panels
     ]
-    played = [panel["motions"] for panel in panels]
-    for what, content in (("Nodes", data), ("Histories", played)):
+    for what, content in (("Nodes", data), ("Histories", plot.played)):
         place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
         write_whole(folder / f"{plot.name}.{what.lower()}.js", script_text(place, content))
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]

@@ -29,7 +29,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
+from rockcheck.reports.style import ENDINGS, kind_of, save_as
 from rockcheck.scenes import InputError, named_scenes
 from rockcheck.scenes.errors import inert, printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, announcing
@@ -219,13 +219,8 @@ def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
         wait = EVERY
 
 
-def studied(
-    study: Study, options: Played, *, formats: Sequence[str] = FORMATS, **how: Any
-) -> NoReturn:
-    """Run a study with progress, write its page, print its finding; ends with its exit code.
-
-    Its figures are drawn in these `formats`.
-    """
+def studied(study: Study, options: Played, **how: Any) -> NoReturn:
+    """Run a study with progress, write its page, print its finding; ends with its exit code."""
     from rockcheck.validation.study import run
 
     folder = usable_folder(options.out)
@@ -238,14 +233,14 @@ def studied(
             on_progress=on_progress,
             **how,
         )
-    told(found, folder, formats)
+    told(found, folder)
 
 
-def told(found: Finding, folder: Path | None = None, formats: Sequence[str] = FORMATS) -> NoReturn:
+def told(found: Finding, folder: Path | None = None) -> NoReturn:
     """Write a finding's page if it has a folder, print the finding, and end with its exit code."""
     from rockcheck.reports.document import publish, show
 
-    page = folder and publish(found, folder, formats=formats)
+    page = folder and publish(found, folder)
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)

@@ -19,7 +19,6 @@ from rockcheck.commands import (
 )
 from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
 from rockcheck.ebm.spectrum import Floats
-from rockcheck.reports.style import FORMATS
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import UncertainScene, load_uncertain_scene
@@ -101,9 +100,6 @@ def run(
     ] = None,
     tried: Tried = Tried(),
     read: ReadOption = None,
-    paper: Annotated[
-        bool, typer.Option("--paper", help="Draw the figures as PNG and PDF, too: a second more.")
-    ] = False,
     played: Played = Played(OUT / "assess"),
 ) -> None:
     """Does it fall, how far does it move, how sure is that?
@@ -155,7 +151,7 @@ def run(
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
-    studied(study, played, formats=FORMATS if paper else FORMATS[:1])
+    studied(study, played)
 
 
 def check_moves(scene: Scene) -> None:

@@ -32,33 +32,33 @@ def run(
         typer.Option(
             "--scene",
             metavar="NAME",
-            help="A scene that gets a page, too (repeatable), or that -o draws.",
+            help="A scene that gets a page, too (repeatable), or what -o draws: a scene, an"
+            " ensemble, or a figure of a study.",
         ),
     ] = None,
     output: Annotated[
         Path | None,
-        typer.Option(
-            "-o", "--output", help="Draw one scene or ensemble, and stop: .svg, .png or .pdf."
-        ),
+        typer.Option("-o", "--output", help="Draw that alone, and stop: .svg, .png or .pdf."),
     ] = None,
 ) -> None:
     """Render the pages of a finished run again.
 
     A run of more than 200 scenes has pages of 200: those that are not within tolerance, then the
     nearest to a limit. With --scene NAME -o FILE.pdf: that figure alone, all models over time with
-    their differences and tolerances.
+    their differences and tolerances; of a study's folder the figure of that name.
     """
-    Run.load(folder)
     if output is not None:
-        from rockcheck.reports.site import write_figure
+        from rockcheck.reports import document, site
 
+        part = document if (folder / document.FIGURES).is_dir() else site
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
         check_file(output, "--output")
-        written = write_figure(folder, scene[0], output)
+        written = part.write_figure(folder, scene[0], output)
         console().print(f"figure: {written}", soft_wrap=True)
         answer({"figure": written})
         return
+    Run.load(folder)
     with progress("pages") as on_progress:
         index = publish(folder, afresh=not scene, wanted=scene or (), on_progress=on_progress)
     console().print(f"report: {index}", soft_wrap=True)

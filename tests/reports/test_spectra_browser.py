@@ -34,7 +34,7 @@ def written(study: Spectra, folder: Path, letters: str) -> Path:
     made = Made(
         created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
     )
-    return publish(replace(study.gather(done), made=made), folder, formats=("svg",))
+    return publish(replace(study.gather(done), made=made), folder)
 
 
 @pytest.fixture(scope="module")
@@ -160,9 +160,7 @@ def page_of(folder: Path, blocks: list[Block]) -> Path:
     made = Made(
         created="2026-11-24T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
     )
-    return publish(
-        Finding("made", "Made up", "20 records.", blocks, made=made), folder, formats=("svg",)
-    )
+    return publish(Finding("made", "Made up", "20 records.", blocks, made=made), folder)
 
 
 def fragility_page(folder: Path) -> Path:

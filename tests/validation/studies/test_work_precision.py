@@ -306,7 +306,7 @@ def test_the_finding_holds_every_table(tmp_path: Path) -> None:
     assert found.table("batch-sizes").records()[0]["runs"] == 20
     lost = [row for row in found.table("runs").records() if row["line"] == "pybullet"]
     assert [row["failure"] for row in lost] == ["it blew up <fast>"]
-    publish(found, tmp_path, formats=("svg",))
+    publish(found, tmp_path)
     for name in ("without-a-wall", "beside-a-wall", "error-over-step", "batches"):
         assert (tmp_path / "figures" / f"{name}.svg").stat().st_size > 1000
 

@@ -258,11 +258,11 @@ class Spectra(Study):
                     "panels": [self._panel(panel, found.spectra[panel], found) for panel in mine],
                     "height": 4.0,
                 },
+                played=[self._played(panel, found) for panel in mine],
             )
 
     def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
-        wall, block = panel.wall, panel.scene.block
-        motions, spread = found.motions.get(panel, tiles.Played()), _spread(self.request.size)
+        wall, spread = panel.wall, _spread(self.request.size)
         place = [0, 4, 0] if panel.figure is None else [1, 2, 0]
         if panel.figure is not None and wall:
             place = [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
@@ -274,15 +274,19 @@ class Spectra(Study):
             "place": place,
             "nodes": [
                 [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
-                for n in motions.played
+                for n in found.played(panel).played
             ],
-            "motions": {
-                "block": [block.half_width, block.half_height],
-                "alpha": block.alpha,
-                "walls": [{"side": one.side, "gap": one.gap} for one in panel.scene.walls],
-                "ends": motions.ends,
-                "rows": motions.rows,
-            },
+        }
+
+    def _played(self, panel: Panel, found: _Found) -> dict[str, Any]:
+        """The motions of a panel's nodes, for the page."""
+        block, motions = panel.scene.block, found.played(panel)
+        return {
+            "block": [block.half_width, block.half_height],
+            "alpha": block.alpha,
+            "walls": [{"side": one.side, "gap": one.gap} for one in panel.scene.walls],
+            "ends": motions.ends,
+            "rows": motions.rows,
         }
 
     def _about(self, panel: Panel, one: Spectrum) -> str:
@@ -314,6 +318,10 @@ class _Found:
     motions: dict[Panel, tiles.Played] = field(default_factory=dict)
     paper: measures.Paper | None = None
     agreement: agreement.Agreement | None = None
+
+    def played(self, panel: Panel) -> tiles.Played:
+        """A panel's motions; none where they are not known."""
+        return self.motions.get(panel, tiles.Played())
 
 
 def _spread(size: int) -> NDArray[np.int64]:
