@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines.contacts import Contact, arm_of, gap_of, rate_of
-from rockcheck.engines.marching import LYING, FloatArray
+from rockcheck.engines.steps import LYING, FloatArray
 from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
 

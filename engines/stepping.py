@@ -1,4 +1,4 @@
-"""The compiled step of `engines.adaptive`: plans the engine's next step and applies its result.
+"""The compiled step of `engines.steps`: plans the engine's next step and applies its result.
 
 Lengths are in R. A contact is a row of `corners`, first the floor's two, then the walls': the
 corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A base motion is its

@@ -1,4 +1,13 @@
-"""How an engine's steps follow each other: all of one length, or as long as the events allow."""
+"""How an engine's steps follow each other: all of one length, or as long as the events allow.
+
+With a fixed step, an engine's error has two sources: the time of its impacts and a drift along the
+arcs of its contacts. Both are of first order in the step. At adaptive steps the engine only turns
+velocities into velocities, at the mean pose of a step (drift, kick, drift): its contact solver is
+part of a third-order integrator with event location. Step ends are placed where gaps close, where
+slip stops and where a block at rest may start to move. An impact has a separate step, so short that
+nothing else happens in it. Between events the acceleration changes smoothly from step to step; that
+change corrects the drift, which is then of third order.
+"""
 
 import math
 from collections.abc import Callable
@@ -8,11 +17,162 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rockcheck.engines.adaptive import adaptive_march
 from rockcheck.engines.base_motion import BaseMotion
-from rockcheck.engines.marching import Marched, march_fixed
-from rockcheck.engines.world import World
-from rockcheck.scenes import Scene
+from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.world import FloatArray, Vector, World
+from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
+from rockcheck.scenes.progress import tell
+
+Marched = tuple[
+    FloatArray, FloatArray, FloatArray
+]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
+STEPS_AT_ONCE = 2048
+#: Where a block lies on its side: contacts stop it a hair before a quarter turn, or after it.
+LYING = math.pi / 2 - 1e-6
+BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
+
+
+def in_units_of(length: float, scene: Scene) -> Scene:
+    """The scene with all lengths in units of `length` m.
+
+    An engine's absolute tolerances then fit any block.
+    """
+    block, (dx, dz) = scene.block, scene.block.offset
+    return scene.replace(
+        block=Block(  # of 1 kg
+            half_width=block.half_width / length,
+            half_height=block.half_height / length,
+            centre_of_mass=(dx / length, dz / length),
+            moment_of_inertia=None
+            if block.moment_of_inertia is None
+            else block.gyration_squared / length**2,
+        ),
+        walls=tuple(wall.replace(gap=wall.gap / length) for wall in scene.walls),
+        excitation=scene.excitation.scaled(1.0 / length),
+        vertical=scene.vertical.scaled(1.0 / length),
+        initial_velocity=scene.initial_velocity / length,
+        initial_height=scene.initial_height / length,
+        gravity=scene.gravity / length,
+    )
+
+
+def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
+    """Times, states of the mass's centre at step ends, felt accelerations, until the block lies.
+
+    The first state in which the block lies is the last one returned. Raises `ModelFailure` if the
+    motion blows up or the block falls through the floor.
+    """
+    dt = float(times[1]) if len(times) > 1 else 0.0
+    pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
+    world.place(*pieces[0][0].tolist())
+    for first in range(0, len(felt), STEPS_AT_ONCE):
+        tell(first, len(felt))
+        states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
+        tipped = np.flatnonzero(np.abs(states[:, 2]) >= LYING)
+        if tipped.size:
+            states = states[: tipped[0] + 1]
+        if not np.all(np.abs(states) < BLOWN_UP):  # catches nan, too
+            raise ModelFailure(
+                f"the motion blew up between t = {times[first]:g} and"
+                f" {times[first + len(states)]:g} s"
+            )
+        if np.any(states[:, 1] < 0.0):
+            raise ModelFailure(
+                f"the block fell through the floor before t = {times[first + len(states)]:g} s: is"
+                " the step too long?"
+            )
+        pieces.append(states)
+        if tipped.size:
+            break
+    marched = np.concatenate(pieces)
+    return times[: len(marched)], marched, felt
+
+
+def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
+    """States on the output grid: positions by cubic Hermite interpolation, velocities linear.
+
+    Velocities jump at impacts, where a cubic would overshoot.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    wanted = scene.output_times
+    wanted = wanted[wanted <= times[-1] * (1.0 + 1e-12) + 1e-12]
+    if len(times) == 1:
+        return states[: len(wanted)]
+    inside = np.minimum(wanted, times[-1])
+    positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
+    velocities = np.column_stack(
+        [np.interp(inside, times, states[:, column]) for column in (3, 4, 5)]
+    )
+    return np.hstack([positions, velocities])
+
+
+#: Rows of the march for which there is room at first.
+_ROOM = 8192
+
+
+#: An engine as a map of velocities: that of the block after a step, from pose and velocity before
+#: it, its length (s) and the felt acceleration (m/s^2), with the contacts closed at that pose. They
+#: take their restitution only where the last argument says so; otherwise they stop what approaches.
+Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
+
+
+def adaptive_march(
+    scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
+) -> Callable[[], Marched]:
+    """The march of a scene until |theta| = pi/2, to be called once; its compiled step is loaded.
+
+    The scene is one of a block with R = 1, see `in_units_of`; `base` is its base
+    motion. No step is longer than `longest` s; the steps at impacts and after events are `short`
+    times their usual length. The march raises `ModelFailure` if the motion blows up or needs more
+    than 100,000 + 20 end / `longest` steps, `end` the scene's last output time.
+    """
+    from rockcheck.engines import stepping
+    from rockcheck.scenes.compiled import for_types_of
+
+    limits = stepping.limits_of(scene, longest, short)
+    across, up = (
+        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
+        for one in (base.across, base.up)
+    )
+    course = stepping.Course(
+        np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
+        np.array([*base.starts, math.inf]),
+        across,
+        up,
+        float(scene.output_times[-1]),
+    )
+    most_steps = 100_000 + 20 * int(course.end / longest)
+
+    run = stepping.begun(
+        np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float),
+        base.velocity(0.0),
+        len(course.corners),
+    )
+    first = np.empty((_ROOM, stepping.COLUMNS))
+    first[0, :7] = 0.0, *run.state[:6]
+    step = for_types_of(stepping.step, run, course, limits, (0.0, 0.0, 0.0), first[0])
+    planned = stepping.plan(run, course, limits)
+
+    def march() -> Marched:
+        rows, count, going = first, 1, planned
+        while going:
+            x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
+            kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
+            if count == len(rows):
+                rows = np.concatenate([rows, np.empty_like(rows)])
+            going = step(run, course, limits, kicked, rows[count])
+            count += 1
+            if count % 512 == 0:
+                tell(rows[count - 1, 0], course.end)
+            if going == stepping.LOST or count > most_steps:
+                raise ModelFailure(
+                    f"no end to the events, or a motion that blew up, after {count} steps at t ="
+                    f" {rows[count - 1, 0]:g} s"
+                )
+        return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()
+
+    return march
 
 
 @dataclass(frozen=True)

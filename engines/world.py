@@ -47,7 +47,7 @@ class World(ABC):
     def push(
         self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
     ) -> Vector:
-        """The engine as a map of velocities, for adaptive steps: `engines.adaptive.Push`."""
+        """The engine as a map of velocities, for adaptive steps: `engines.steps.Push`."""
         self.bounce(bouncing)
         self.place(*pose, *velocity)
         self.step(felt, dt)

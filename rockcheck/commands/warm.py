@@ -33,9 +33,8 @@ def _batches(name: str) -> None:
 
 
 def _engine_steps() -> None:
-    from rockcheck.engines.adaptive import adaptive_march
     from rockcheck.engines.base_motion import BaseMotion
-    from rockcheck.engines.marching import in_units_of
+    from rockcheck.engines.steps import adaptive_march, in_units_of
 
     scene = load_scene("fig5a").replace(duration=0.1)
     scene = in_units_of(scene.block.radius, scene)

@@ -107,7 +107,7 @@ FAULTS = [
     ),
     (
         "dt off by 1e-3",
-        "engines/adaptive.py",
+        "engines/steps.py",
         r"\(vx, vy, w\), dt,",
         "(vx, vy, w), 1.001 * dt,",
         15,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.engines.marching import march_fixed
+from rockcheck.engines.steps import march_fixed
 from rockcheck.scenes import Floor, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.execute.models import build, home
