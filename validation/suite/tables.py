@@ -318,48 +318,48 @@ def junit(run: Run) -> str:
     installed, are failures only in a strict run; a better figure only if the run is strict both
     ways. A check that is not defined is skipped.
     """
-    document = JUnitXml(f"rockcheck {run.suite}")
+    document = JUnitXml(f"rockcheck {inert(run.suite)}")  # XML allows no control characters
     suites = [
         (scene, [case for cell in cells.values() for case in _cases(cell, run.strict)])
         for scene, cells in run.by_scene().items()
     ]
-    faults = [_case("tolerances", fault, Failure(fault)) for fault in run.faults]
+    faults = [_case("tolerances", fault, Failure, fault) for fault in run.faults]
     for name, cases in [*suites, *([("tolerances", faults)] if faults else [])]:
-        suite = TestSuite(name)
+        suite = TestSuite(inert(name))
         suite.extend(cases)
         document.append(suite)  # `add_testsuite` searches all suites added before
     document.update_statistics()
-    return inert(bytes(document.tostring()).decode()) + "\n"  # XML allows no control characters
+    return bytes(document.tostring()).decode() + "\n"
 
 
 def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     place = f"{cell.scene}.{cell.model}"
     ways = {
-        "failed": Error(cell.reason),
-        "absent": Failure(cell.reason) if strict else Skipped(cell.reason),
-        "unavailable": Skipped(cell.reason),
+        "failed": Error,
+        "absent": Failure if strict else Skipped,
+        "unavailable": Skipped,
     }
-    ran = _case(place, "runs", ways.get(cell.status))
+    ran = _case(place, "runs", ways.get(cell.status), cell.reason)
     ran.time = cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
-        yield _case(
-            place,
-            "converged",
-            None if cell.numerical.converged else Skipped("; ".join(cell.numerical.reasons)),
-        )
+        unsure = None if cell.numerical.converged else Skipped
+        yield _case(place, "converged", unsure, "; ".join(cell.numerical.reasons))
     for check in cell.checks:
-        failure = Failure(check.reason, check.verdict) if check.fails(strict) else None
-        yield _case(
-            place,
-            check.figure.title,
-            Skipped(check.reason) if check.verdict == "not defined" else failure,
-        )
+        failure = Failure if check.fails(strict) else None
+        result = Skipped if check.verdict == "not defined" else failure
+        yield _case(place, check.figure.title, result, check.reason, check.verdict)
 
 
-def _case(place: str, name: str, result: Failure | Error | Skipped | None) -> TestCase:
-    case = TestCase(name, place)
-    case.result = [] if result is None else [result]
+def _case(
+    place: str,
+    name: str,
+    result: type[Failure | Error | Skipped] | None,
+    reason: str,
+    verdict: str = "",
+) -> TestCase:
+    case = TestCase(inert(name), inert(place))
+    case.result = [] if result is None else [result(inert(reason), verdict)]
     return case
 
 

@@ -174,8 +174,9 @@ def test_motions_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path):
     assert len(panel["nodes"]) == KEPT_AN_AXIS**2
     assert [0, 0] in panel["nodes"]
     assert [19, 19] in panel["nodes"]
-    rows = np.frombuffer(base64.b64decode(panel["motions"]["rows"]), "<f4").reshape(-1, 4)
-    parts = np.split(rows.astype(float), panel["motions"]["ends"][:-1])
+    (played,) = plot.played
+    rows = np.frombuffer(base64.b64decode(played["rows"]), "<f4").reshape(-1, 4)
+    parts = np.split(rows.astype(float), played["ends"][:-1])
     model = tiles.build("ebm", study.request.settings)
     for number in (0, 1, 100, 255):
         i, j = panel["nodes"][number]
