@@ -264,3 +264,28 @@ def write(folder, excitation):
     head = CABINET.partition("[excitation]")[0]
     path.write_text(f'{head}[excitation]\nkind = "record"\n{excitation}\n', encoding="utf-8")
     return path
+
+
+def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
+    """A record at 1.3 times its intensity does what the record and its vertical one times 1.3 do,
+    but for the rows that the peak is read from."""
+    t = 0.02 * np.arange(200)
+    (folder / "pair").mkdir()
+    for name, gain in (("S1_H", 3.0), ("S2_H", 4.0), ("S1_UP", 9.0), ("S2_UP", 9.0)):
+        text = "".join(f"{a!r}\n" for a in (gain * np.sin((4.0 + gain) * t) * np.exp(-t)).tolist())
+        (folder / "pair" / f"{name}.csv").write_text(f"acceleration_m_s2\n{text}", encoding="utf-8")
+    words = "cabinet.toml pair --read vertical=true --read time_step=0.02"
+    [own, _] = [row["own"] for row in assess(f"{words} --levels pga:1:2:2")["tables"]["motions"]]
+    scaled = assess(f"{words} --levels pga:{own!r}:{1.3 * own!r}:2")["tables"]["ida"][1]
+    ran = assess(f"{words} --read scale=1.3")["tables"]["runs"][0]
+    assert (scaled["record"], scaled["direction"], ran["record"]) == ("S1_H", 1, "S1_H")
+    assert scaled["peak_rotation_alpha"] == pytest.approx(ran["peak_rotation"], rel=1e-2)
+
+
+def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(folder, tmp_path, refused):
+    uncertain = CABINET.replace("amplitude = 5.0", "amplitude = { value = 5.0, sd = 0.1 }")
+    (folder / "pulse.toml").write_text(uncertain, encoding="utf-8")
+    words = ("assess", str(folder / "pulse.toml"), str(folder / "records" / "R00.csv"))
+    assert "besides the excitation that the records replace" in refused(*words, "--samples", "8")
+    assert main([*words, "-q", "--out", str(tmp_path / "out")]) == 0
+    assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")

@@ -860,7 +860,7 @@ def _notes(found: Found) -> list[Block]:
     said = [f"outside of what the suites cover: {line}" for line in outside(study.own.scene)]
     if study.model != study.swift and (found.at_gaps or drawn):
         said.append(f"gaps and draws are played by {study.swift}")
-    if study.own.spreads and not drawn and study.recorded:
-        names = ", ".join(study.own.names)
+    names = ", ".join(next(iter(study.cases.values())).names)
+    if names and not drawn and study.recorded:
         said.append(f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them")
     return [Text(items=said, title="Notes", on="page")] if said else []
