@@ -11,8 +11,10 @@ from dask.distributed import LocalCluster
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Event, Record, load_scene
+from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.motion import motion_of, spread, wall_speeds
+from rockcheck.validation.studies.population.assess import Assessment
 
 CABINET = """
 duration = 12.0
@@ -214,6 +216,15 @@ def test_a_gap_on_a_side_without_a_wall_puts_one_there(assess):
     said = assess("cabinet.toml records/R00.csv --gaps left:0.01,0.5")
     assert [row["gap"] for row in said["gaps"]] == [0.01, 0.5]
     assert said["gaps"][0]["struck"] == 1
+
+
+def test_a_gap_that_was_not_played_is_not_called_safe(folder):
+    """As where Ctrl-C ended the runs, or all of them failed."""
+    own = load_uncertain_scene(folder / "cabinet.toml")
+    study = Assessment(own=own, cases={"cabinet": own}, gaps=(0.05, 0.1), sides=("right",))
+    found = study.gather({task: task.play() for task in study.shown["cabinet"]})
+    assert found.data["gaps"] == []
+    assert "overturn" not in found.answer.partition(".")[2]
 
 
 def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_path, loop):

@@ -292,14 +292,14 @@ def quantities_of(found: Found) -> dict[str, dict[str, Any]]:
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
-    """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
+    """Outcomes at each gap with runs, the clearance that is needed, and the largest safe gap.
 
     `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
     It has the reach of blocks that fall, `free_overturned` of the runs without the wall.
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
     whether a wider gap never lets fewer runs overturn.
     """
-    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items()]
+    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items() if runs]
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
     reaches = (run.reach[side] for run in found.free for side in found.study.sides)
     fallen = [row["overturned"] for row in rows]
@@ -606,7 +606,7 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
     rows = [row | row["wall_speed"] for row in gaps]
     across = [row["gap"] for row in rows]
     shares = [
-        Series(name, across, [row[name] / max(row["runs"], 1) for row in rows])
+        Series(name, across, [row[name] / row["runs"] for row in rows])
         for name in ("struck", "overturned")
     ]
     speeds = [Series(name, across, [row[name] for row in rows]) for name in ("median", "largest")]
