@@ -251,6 +251,20 @@ def test_an_engine_may_play_and_is_compared(assess):
     assert [row["model"] for row in said["tables"]["models"]] == ["ebm-unilateral"]
 
 
+def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(
+    folder, tmp_path, capsys
+):
+    words = "assess new.toml --models mujoco,ebm-unilateral --set time_step=1e-3 --json --out"
+    assert main(["new", str(folder / "new.toml")]) == 0
+    capsys.readouterr()
+    assert main([*words.replace("new", str(folder / "new")).split(), str(tmp_path)]) == 1
+    said = json.loads(capsys.readouterr().out)
+    sure = next(row for row in said["tables"]["answers"] if row["question"].startswith("How sure"))
+    assert sure["answer"] == "Not converged: no figure of it is sure."
+    page = (tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert "numerical error (no run is converged)" in page
+
+
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
     assert spread([]) == {"median": None, "p16": None, "p84": None, "largest": None}
 

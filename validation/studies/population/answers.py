@@ -42,6 +42,8 @@ SWIFT = "ebm-unilateral"
 _SEED = 1
 #: Name of the runs by the other law of impacts, among the models.
 LAW = "impact law"
+#: Name of the error of a step or tolerance, among the sources of uncertainty.
+STEPS = "numerical error"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
 #: Of a probability; and what identifies a hand method.
@@ -55,7 +57,7 @@ POINTS = 400
 CONTRIBUTIONS = {
     "records": ("scatter between the records", "two records or more", "other records"),
     "inputs": ("draws of the scene's uncertain numbers", "--samples", "knowing {} better"),
-    "numerical error": (
+    STEPS: (
         "u_num of the model's own step or tolerance",
         "a model with a step",
         "a smaller step or tolerance",
@@ -221,7 +223,7 @@ def finding_of(found: Found) -> Finding:
         *_strips(found),
         *_gaps(gaps["gaps"]),
         *levels.blocks,
-        _contributions(contributions),
+        _contributions(contributions, found),
         *_models(found),
         *_certainty(own, numerical),
         *(_inputs(own.inputs) if own and own.inputs else ()),
@@ -336,7 +338,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
     squares: dict[str, list[float]] = {
         "records": [float(np.var(list(map(np.mean, peaks)), ddof=1))] if len(peaks) > 1 else [],
         "inputs": _by_inputs(found, peaks),
-        "numerical error": _by_steps(found),
+        STEPS: _by_steps(found),
         LAW: [(0.5 * difference) ** 2 for difference in laws],
         "model form": np.square(list(itertools.chain(*forms.values()))).tolist(),
     }
@@ -516,8 +518,9 @@ def _sure(found: Found, own: Sure | None) -> list[str]:
 
 
 def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What would change the answer."""
-    if not contributions or contributions[0]["sd"] <= MOVED:
+    """What would change the answer; nothing is said where no numerical error is known."""
+    unsure = found.judged and STEPS not in [row["source"] for row in contributions]
+    if unsure or not contributions or contributions[0]["sd"] <= MOVED:
         return []
     own, shares = found.sure.get(""), input_shares(found)
     most = max(shares, key=lambda name: shares[name], default="the uncertain numbers")
@@ -642,13 +645,16 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
     ]
 
 
-def _contributions(contributions: Sequence[Mapping[str, Any]]) -> Table:
+def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
     """Where the uncertainty of the peak rotation comes from."""
     known_of = {row["source"]: row for row in contributions}
+    asked = {STEPS: "no run is converged"} if found.judged else {}
     missing = [
-        f"{name} ({asks})" for name, (_, asks, _) in CONTRIBUTIONS.items() if name not in known_of
+        f"{name} ({asked.get(name, asks)})"
+        for name, (_, asks, _) in CONTRIBUTIONS.items()
+        if name not in known_of
     ]
-    said = f" Not asked for: {', '.join(missing)}." if missing else ""
+    said = f" Not known: {', '.join(missing)}." if missing else ""
     return Table(
         "contributions",
         [
