@@ -26,7 +26,7 @@ SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 class _DrakeWorld(World):
     """A plant with a planar box, floor and walls, with Drake's default parameters.
 
-    The plant is made at the first step, when the step's length is known.
+    The plant is made when the step's length is known.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -43,7 +43,7 @@ class _DrakeWorld(World):
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         if not self.dt:
-            self._make(dt)
+            self.ready(dt)
         self.force.set_value([felt[0], felt[1], 0.0])
         self.steps += 1
         try:
@@ -58,7 +58,7 @@ class _DrakeWorld(World):
         state: State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
         return state
 
-    def _make(self, dt: float) -> None:
+    def ready(self, dt: float) -> None:
         from pydrake.multibody import tree
         from pydrake.systems import analysis, framework
 

@@ -191,6 +191,7 @@ class FixedStep:
         """The march of a world through a scene, which is still to be called."""
         count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
+        world.ready(self.largest)
         return partial(march_fixed, world, scene, times, base.felt_acceleration(times))
 
 

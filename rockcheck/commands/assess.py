@@ -127,9 +127,11 @@ def run(
     cases, left_out = under_records({given.scene.name: given}, sets, Path())
     if not records:
         check_moves(given.scene)
-    if tried.samples is not None and not given.spreads:
+    if tried.samples is not None and not next(iter(cases.values())).spreads:
+        besides = " besides the excitation that the records replace" if given.spreads else ""
         raise InputError(
-            "no number of the scene is uncertain: write one as { value = 0.3, sd = 0.03 }",
+            f"no number of the scene{besides} is uncertain: write one as"
+            " { value = 0.3, sd = 0.03 }",
             "--samples",
         )
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
@@ -170,7 +172,18 @@ def population_of(
     motions = [
         (name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()
     ]
-    return ida(scene, motions, values, measure=measure or "pga", capacities=capacity or CAPACITIES)
+    return ida(
+        scene,
+        motions,
+        values,
+        measure=measure or "pga",
+        capacities=capacity or CAPACITIES,
+        upward={
+            name: one.scene.vertical
+            for name, one in cases.items()
+            if one.scene.vertical != scene.vertical
+        },
+    )
 
 
 def pulses_of(text: str, scene: Scene) -> Population:

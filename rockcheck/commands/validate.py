@@ -124,10 +124,10 @@ def run(
     rockcheck itself.
     """
     asked = _scene if is_scene(what) else _suite
-    if strict and asked is _scene:
-        raise InputError(
-            f"{printable(what)} is a scene, and nothing of it is judged: give a suite", "--strict"
-        )
+    for option, given in (("--strict", strict), ("--history", history)):
+        if given and asked is _scene:
+            said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
+            raise InputError(said, option)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
     how: Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document
@@ -136,7 +136,7 @@ def run(
     page = keep(finished, folder)
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
-    if history is not None and suite.judged:
+    if history is not None:
         moment = moment_of(finished, Path(finished.tolerances_file).parent)
         trend = trend_of(remember(history, moment))
         document.show(trend, console())

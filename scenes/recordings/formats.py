@@ -40,6 +40,7 @@ _UNITS = re.compile(
     r"UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)",
     re.IGNORECASE,
 )
+_OTHER_KIND = re.compile(r"\b(?:VELOCITY|DISPLACEMENT)\s++TIME\s++(?:SERIES|HIST)", re.IGNORECASE)
 _ESM_LINE = re.compile(r"([A-Z][A-Z0-9_^/]*+)\s*+:(.*+)")
 _KNET_SCALE = re.compile(rf"({NUMBER})\s*+\(gal\)\s*+/\s*+({NUMBER})", re.IGNORECASE)
 _KNET_RATE = re.compile(rf"({NUMBER})\s*+(?:Hz)?", re.IGNORECASE)
@@ -73,6 +74,9 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
     if match is None:
         raise fault(path, "no header line with NPTS and DT within the first 20 lines")
+    for n, line in enumerate(lines[:header], 1):
+        if other := _OTHER_KIND.search(line[:_WIDE]):
+            raise fault(path, f"{printable(other[0], 30)!r}; only accelerations can be read", n)
     stated = next(
         filter(
             None,

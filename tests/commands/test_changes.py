@@ -162,7 +162,10 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     assert name in page
     assert head in page
     assert 'href="trend/index.html"' in Path("a/index.html").read_text(encoding="utf-8")
+    whole = Path("runs.jsonl").read_text(encoding="utf-8")
+    Path("runs.jsonl").write_text(whole.rstrip("\n"), encoding="utf-8")  # as some editors do
     ran("a", 0.001, "--history", "runs.jsonl")
+    assert len(read_history(Path("runs.jsonl"))) == 4
     assert f"{name}: " in capsys.readouterr().out
 
 

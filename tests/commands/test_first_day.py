@@ -97,9 +97,11 @@ def test_a_scene_is_no_suite(refused):
         "rockcheck: rack.toml: is a scene, not a suite; `rockcheck validate` plays a scene,"
         " and a suite is a file with scenes = ['rack.toml'], and tables [models.NAME]"
     )
-    assert refused("validate", "rack.toml", "--strict") == (
-        "rockcheck: --strict: rack.toml is a scene, and nothing of it is judged: give a suite"
-    )
+    for option in (["--strict"], ["--history", "runs.jsonl"]):
+        assert refused("validate", "rack.toml", *option) == (
+            f"rockcheck: {option[0]}: rack.toml is a scene, and nothing of it is judged: give a"
+            " suite"
+        )
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from cases import UNAMBIGUOUS, peak_errors
 from rockcheck import engines
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
 
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
@@ -198,3 +199,14 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     assert asleep.peak_rotation < 1e-4 * scene.block.alpha
     assert reference.peak_rotation > 0.2 * scene.block.alpha
     assert apart(awake, reference) < 2e-2 * scene.block.alpha
+
+
+@pytest.mark.needs("drake")
+@pytest.mark.parametrize("settings", ["best", "default"])
+def test_drakes_plant_is_made_before_the_time_is_taken(settings, free_rocking):
+    """It takes as long as some ten to a hundred steps."""
+    scene = free_rocking(0.5).replace(duration=0.1)
+    model = engines.Drake(time_step=1e-2, settings=settings)
+    world = (model.rigid_world if settings == "best" else model.stock_world)(scene)
+    model.steps.ready(world, scene, BaseMotion(scene))
+    assert world.state()[2] == 0.0

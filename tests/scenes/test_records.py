@@ -89,6 +89,10 @@ def test_at2_scaled(tmp_path):
             )
             for word in ("CM/S", "CM", "INCHES")
         ),
+        (
+            NAMED.format(npts=2, dt=0.01).replace("ACCELERATION", "VELOCITY") + "0.1 0.2",
+            "line 3: 'VELOCITY TIME SERIES'; only accelerations can be read",
+        ),
         ("0.1 0.2\n0.3\n", "no header line with NPTS and DT within the first 20 lines"),
         ("", "no header line with NPTS and DT"),
     ],

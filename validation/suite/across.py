@@ -246,8 +246,11 @@ def remember(path: Path, moment: Moment) -> list[Moment]:
     """
     known = read_history(path) if path.exists() else []
     try:
-        with path.open("a", encoding="utf-8") as stream:
-            stream.write(moment.model_dump_json() + "\n")
+        with path.open("a+b") as stream:
+            if stream.tell():  # an editor may have left the last line without its end
+                stream.seek(-1, os.SEEK_END)
+            end = b"" if stream.read(1) in b"\n" else b"\n"
+            stream.write(end + moment.model_dump_json().encode() + b"\n")
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     return [one for one in (*known, moment) if one.suite == moment.suite]

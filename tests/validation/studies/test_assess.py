@@ -11,8 +11,10 @@ from dask.distributed import LocalCluster
 from rockcheck.commands.cli import main
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Event, Record, load_scene
+from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.motion import motion_of, spread, wall_speeds
+from rockcheck.validation.studies.population.assess import Assessment
 
 CABINET = """
 duration = 12.0
@@ -216,6 +218,15 @@ def test_a_gap_on_a_side_without_a_wall_puts_one_there(assess):
     assert said["gaps"][0]["struck"] == 1
 
 
+def test_a_gap_that_was_not_played_is_not_called_safe(folder):
+    """As where Ctrl-C ended the runs, or all of them failed."""
+    own = load_uncertain_scene(folder / "cabinet.toml")
+    study = Assessment(own=own, cases={"cabinet": own}, gaps=(0.05, 0.1), sides=("right",))
+    found = study.gather({task: task.play() for task in study.shown["cabinet"]})
+    assert found.data["gaps"] == []
+    assert "overturn" not in found.answer.partition(".")[2]
+
+
 def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_path, loop):
     assess("cabinet.toml records/R0*.csv --gaps 0.05")
     out = tmp_path / "out"
@@ -238,6 +249,20 @@ def test_an_engine_may_play_and_is_compared(assess):
     assert said["model"] == "mujoco"
     assert said["quantities"][0]["u_num"] != 0.0
     assert [row["model"] for row in said["tables"]["models"]] == ["ebm-unilateral"]
+
+
+def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(
+    folder, tmp_path, capsys
+):
+    words = "assess new.toml --models mujoco,ebm-unilateral --set time_step=1e-3 --json --out"
+    assert main(["new", str(folder / "new.toml")]) == 0
+    capsys.readouterr()
+    assert main([*words.replace("new", str(folder / "new")).split(), str(tmp_path)]) == 1
+    said = json.loads(capsys.readouterr().out)
+    sure = next(row for row in said["tables"]["answers"] if row["question"].startswith("How sure"))
+    assert sure["answer"] == "Not converged: no figure of it is sure."
+    page = (tmp_path / "summary.md").read_text(encoding="utf-8")
+    assert "numerical error (no run is converged)" in page
 
 
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
@@ -264,3 +289,28 @@ def write(folder, excitation):
     head = CABINET.partition("[excitation]")[0]
     path.write_text(f'{head}[excitation]\nkind = "record"\n{excitation}\n', encoding="utf-8")
     return path
+
+
+def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
+    """A record at 1.3 times its intensity does what the record and its vertical one times 1.3 do,
+    but for the rows that the peak is read from."""
+    t = 0.02 * np.arange(200)
+    (folder / "pair").mkdir()
+    for name, gain in (("S1_H", 3.0), ("S2_H", 4.0), ("S1_UP", 9.0), ("S2_UP", 9.0)):
+        text = "".join(f"{a!r}\n" for a in (gain * np.sin((4.0 + gain) * t) * np.exp(-t)).tolist())
+        (folder / "pair" / f"{name}.csv").write_text(f"acceleration_m_s2\n{text}", encoding="utf-8")
+    words = "cabinet.toml pair --read vertical=true --read time_step=0.02"
+    [own, _] = [row["own"] for row in assess(f"{words} --levels pga:1:2:2")["tables"]["motions"]]
+    scaled = assess(f"{words} --levels pga:{own!r}:{1.3 * own!r}:2")["tables"]["ida"][1]
+    ran = assess(f"{words} --read scale=1.3")["tables"]["runs"][0]
+    assert (scaled["record"], scaled["direction"], ran["record"]) == ("S1_H", 1, "S1_H")
+    assert scaled["peak_rotation_alpha"] == pytest.approx(ran["peak_rotation"], rel=1e-2)
+
+
+def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(folder, tmp_path, refused):
+    uncertain = CABINET.replace("amplitude = 5.0", "amplitude = { value = 5.0, sd = 0.1 }")
+    (folder / "pulse.toml").write_text(uncertain, encoding="utf-8")
+    words = ("assess", str(folder / "pulse.toml"), str(folder / "records" / "R00.csv"))
+    assert "besides the excitation that the records replace" in refused(*words, "--samples", "8")
+    assert main([*words, "-q", "--out", str(tmp_path / "out")]) == 0
+    assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")

@@ -42,6 +42,8 @@ SWIFT = "ebm-unilateral"
 _SEED = 1
 #: Name of the runs by the other law of impacts, among the models.
 LAW = "impact law"
+#: Name of the error of a step or tolerance, among the sources of uncertainty.
+STEPS = "numerical error"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
 #: Of a probability; and what identifies a hand method.
@@ -55,7 +57,7 @@ POINTS = 400
 CONTRIBUTIONS = {
     "records": ("scatter between the records", "two records or more", "other records"),
     "inputs": ("draws of the scene's uncertain numbers", "--samples", "knowing {} better"),
-    "numerical error": (
+    STEPS: (
         "u_num of the model's own step or tolerance",
         "a model with a step",
         "a smaller step or tolerance",
@@ -221,7 +223,7 @@ def finding_of(found: Found) -> Finding:
         *_strips(found),
         *_gaps(gaps["gaps"]),
         *levels.blocks,
-        _contributions(contributions),
+        _contributions(contributions, found),
         *_models(found),
         *_certainty(own, numerical),
         *(_inputs(own.inputs) if own and own.inputs else ()),
@@ -292,14 +294,14 @@ def quantities_of(found: Found) -> dict[str, dict[str, Any]]:
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
-    """Outcomes at each gap, the clearance that is needed, and the largest safe gap.
+    """Outcomes at each gap with runs, the clearance that is needed, and the largest safe gap.
 
     `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
     It has the reach of blocks that fall, `free_overturned` of the runs without the wall.
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
     whether a wider gap never lets fewer runs overturn.
     """
-    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items()]
+    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items() if runs]
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
     reaches = (run.reach[side] for run in found.free for side in found.study.sides)
     fallen = [row["overturned"] for row in rows]
@@ -336,7 +338,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
     squares: dict[str, list[float]] = {
         "records": [float(np.var(list(map(np.mean, peaks)), ddof=1))] if len(peaks) > 1 else [],
         "inputs": _by_inputs(found, peaks),
-        "numerical error": _by_steps(found),
+        STEPS: _by_steps(found),
         LAW: [(0.5 * difference) ** 2 for difference in laws],
         "model form": np.square(list(itertools.chain(*forms.values()))).tolist(),
     }
@@ -516,8 +518,9 @@ def _sure(found: Found, own: Sure | None) -> list[str]:
 
 
 def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What would change the answer."""
-    if not contributions or contributions[0]["sd"] <= MOVED:
+    """What would change the answer; nothing is said where no numerical error is known."""
+    unsure = found.judged and STEPS not in [row["source"] for row in contributions]
+    if unsure or not contributions or contributions[0]["sd"] <= MOVED:
         return []
     own, shares = found.sure.get(""), input_shares(found)
     most = max(shares, key=lambda name: shares[name], default="the uncertain numbers")
@@ -606,7 +609,7 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
     rows = [row | row["wall_speed"] for row in gaps]
     across = [row["gap"] for row in rows]
     shares = [
-        Series(name, across, [row[name] / max(row["runs"], 1) for row in rows])
+        Series(name, across, [row[name] / row["runs"] for row in rows])
         for name in ("struck", "overturned")
     ]
     speeds = [Series(name, across, [row[name] for row in rows]) for name in ("median", "largest")]
@@ -642,13 +645,16 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
     ]
 
 
-def _contributions(contributions: Sequence[Mapping[str, Any]]) -> Table:
+def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
     """Where the uncertainty of the peak rotation comes from."""
     known_of = {row["source"]: row for row in contributions}
+    asked = {STEPS: "no run is converged"} if found.judged else {}
     missing = [
-        f"{name} ({asks})" for name, (_, asks, _) in CONTRIBUTIONS.items() if name not in known_of
+        f"{name} ({asked.get(name, asks)})"
+        for name, (_, asks, _) in CONTRIBUTIONS.items()
+        if name not in known_of
     ]
-    said = f" Not asked for: {', '.join(missing)}." if missing else ""
+    said = f" Not known: {', '.join(missing)}." if missing else ""
     return Table(
         "contributions",
         [
@@ -860,7 +866,7 @@ def _notes(found: Found) -> list[Block]:
     said = [f"outside of what the suites cover: {line}" for line in outside(study.own.scene)]
     if study.model != study.swift and (found.at_gaps or drawn):
         said.append(f"gaps and draws are played by {study.swift}")
-    if study.own.spreads and not drawn and study.recorded:
-        names = ", ".join(study.own.names)
+    names = ", ".join(next(iter(study.cases.values())).names)
+    if names and not drawn and study.recorded:
         said.append(f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them")
     return [Text(items=said, title="Notes", on="page")] if said else []

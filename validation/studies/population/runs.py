@@ -113,14 +113,24 @@ def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]
 
 @dataclass(frozen=True)
 class Batch(OneScene):
-    """Runs of a population that are played together: a scene at factors of its base motion."""
+    """Runs of a population that are played together: a scene at factors of its base motion.
+
+    `both`: the vertical motion is scaled too, and not mirrored.
+    """
 
     factors: tuple[float, ...] = field(default=(), repr=False)
+    both: bool = False
 
     def play(self) -> Runs:
         """The runs."""
-        motions = map(self.scene.excitation.scaled, self.factors)
-        scenes = [self.scene.replace(excitation=motion) for motion in motions]
+        across, upward = self.scene.excitation, self.scene.vertical
+        scenes = [
+            self.scene.replace(
+                excitation=across.scaled(factor),
+                vertical=upward.scaled(abs(factor)) if self.both else upward,
+            )
+            for factor in self.factors
+        ]
         return play(scenes, build(self.model, dict(self.settings)))
 
 

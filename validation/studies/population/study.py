@@ -7,7 +7,7 @@ of its motion, so the factor of a motion is the wanted intensity over the motion
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.scenes.errors import unknown_name
+from rockcheck.scenes.excitations import Excitation
 from rockcheck.scenes.recordings import Recording, intensity
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.validation.execute.models import build
@@ -54,9 +55,10 @@ DRAWS = 200
 class Population(Study):
     """Scenes, each under all motions at all `levels` of intensity, in both directions.
 
-    `cases` are the scenes by name. A motion has a name and its own intensity. `limits` are the
-    events that have a curve: peaks (alpha) by name. `across` is the intensity, `other` its axis in
-    another unit; `data` is added to the data of the finding.
+    `cases` are the scenes by name. A motion has a name and its own intensity; `upward` has the
+    vertical ones that are scaled with it, by its name. `limits` are the events that have a curve:
+    peaks (alpha) by name. `across` is the intensity, `other` its axis in another unit; `data` is
+    added to the data of the finding.
     """
 
     name: str
@@ -70,6 +72,7 @@ class Population(Study):
     settings: Mapping[str, Any]
     data: Mapping[str, Any]
     other: dict[str, Any] | None = None
+    upward: Mapping[str, Excitation] = field(default_factory=dict)
     record = Runs
 
     @cached_property
@@ -85,10 +88,13 @@ class Population(Study):
             case: [
                 Batch(
                     (case, name),
-                    scene.replace(excitation=motion),
+                    scene.replace(
+                        excitation=motion, vertical=self.upward.get(name, scene.vertical)
+                    ),
                     self.model,
                     tuple(self.settings.items()),
                     (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
+                    name in self.upward,
                     where="here" if soon else "worker",
                     **how,
                 )
@@ -319,10 +325,12 @@ def ida(
     measure: str = "",
     capacities: Sequence[float] = CAPACITIES,
     model: str = "ebm-unilateral",
+    upward: Mapping[str, Excitation] | None = None,
 ) -> Population:
     """Peak rotation of the scene's block under each record, scaled to each intensity.
 
-    Raises `InputError` for an unknown measure, fewer than two motions, or one without motion.
+    The vertical motion `upward`, by the record's name, is scaled with it. Raises `InputError` for
+    an unknown measure, fewer than two motions, or one without motion.
     """
     label, unit, of = measure_of(measure or "pga")
     return Population(
@@ -337,6 +345,7 @@ def ida(
             for limit in capacities
         },
         model=model,
+        upward=upward or {},
         settings={"tolerance": 1e-8},
         data={
             "scene": scene.name,
