@@ -77,10 +77,16 @@ class Measured(Frozen):
                 f" {scene.duration:g} s",
                 "offset",
             )
+        channels = {key: column[inside] for key, column in history.channels.items()}
+        ends = t[-1] > scene.duration + 1e-9  # what the block does later is not of this scene
         return dataclasses.replace(
             history,
             name=scene.name,
-            channels={key: column[inside] for key, column in history.channels.items()},
+            channels=channels,
+            event_list=tuple(
+                e for e in history.event_list if -1e-9 <= e.t <= scene.duration + 1e-9
+            ),
+            outcome=outcome_of(channels) if ends else history.outcome,
             **block_fields(scene.block),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
@@ -122,11 +128,9 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
         for name, factor in columns.values()
         if name in history.channels
     }
-    channels["t"] = channels["t"] + offset
     si = all(factor == 1.0 for _, factor in columns.values())
-    return dataclasses.replace(
-        history, channels=channels, outcome=history.outcome if si else outcome_of(channels)
-    )
+    outcome = history.outcome if si else outcome_of(channels)
+    return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
 
 
 def _heading(path: Path, shown: str) -> list[str]:

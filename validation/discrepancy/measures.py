@@ -91,7 +91,7 @@ def _impact_time(pair: Pair) -> tuple[float, str]:
 
 def _overturning_time(pair: Pair) -> float:
     first, second = (
-        next((e.t for e in h.event_list if e.kind in TURNS), math.inf)
+        math.inf if h.overturned_at is None else h.overturned_at
         for h in (pair.reference, pair.candidate)
     )
     return 0.0 if first == second else abs(second - first)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import InputError, load_scene
+from rockcheck.scenes import Event, InputError, load_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.discrepancy.measured import (
     Measured,
@@ -135,6 +135,19 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
             "compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"
         )[0]
     )
+
+
+def test_events_move_with_the_offset_and_end_with_the_scene(tmp_path):
+    scene = load_scene("bookcase").replace(duration=3.0, output_step=0.01)
+    state = np.zeros((301, 6))
+    state[:, 2] = np.linspace(0.0, 1.5, 301)
+    events = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
+    observe(scene, "measured", state, events=events).save(tmp_path / "a.csv")
+    assert [e.t for e in read_measured(tmp_path / "a.csv", offset=-0.5).event_list] == [-0.3, 2.495]
+    table = Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5)
+    fallen, stands = (table.simulate(scene.replace(duration=t)) for t in (3.0, 1.0))
+    assert (fallen.outcome, fallen.overturned_at) == ("overturned left", 2.495)
+    assert (stands.outcome, stands.overturned_at, stands.event_list) == ("moving", None, ())
 
 
 def test_a_scene_without_a_file_is_bad_input(tmp_path):

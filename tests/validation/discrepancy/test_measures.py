@@ -199,6 +199,14 @@ def test_both_fell_the_same_way_is_whole(made):
     assert compare(fallen[0], other)["outcome_agrees"] == 0.0
 
 
+def test_falls_without_events_are_timed_by_their_rotation(made):
+    slow, fast = (
+        made(np.minimum(rate * T, 6.4), T, outcome="overturned left") for rate in (0.8, 1.6)
+    )
+    assert compare(slow, fast)["overturning_time"] == pytest.approx(3.8, abs=0.01)
+    assert compare(slow, made(WAVE, T)).figure("overturning_time").note == "infinite"
+
+
 def test_events_agree_until_the_first_without_counterpart(made):
     reference = made(
         WAVE, T, model="r", events=[impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)]
