@@ -265,6 +265,24 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
     assert "numerical error (no run is converged)" in page
 
 
+@pytest.mark.parametrize(
+    "words", ["--models ebm", "--models ebm-unilateral,ebm", "records/R00.csv --models cm,ebm"]
+)
+def test_a_model_that_fails_ends_with_3(folder, tmp_path, words):
+    """The paper's model knows no floor that bounces."""
+    bouncy = CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 0.5")
+    (folder / "bouncy.toml").write_text(bouncy, encoding="utf-8")
+    path, *records = [str(folder / one) for one in ("bouncy.toml", *words.split()[:-2])]
+    asked = ["assess", path, *records, *words.split()[-2:], "-q"]
+    assert main([*asked, "--out", str(tmp_path)]) == 3
+
+
+def test_a_run_that_was_interrupted_is_not_called_unsure(folder):
+    own = load_uncertain_scene(folder / "cabinet.toml")
+    study = Assessment(own=own, cases={"cabinet": own})
+    assert study.gather({}).exit_code == 0
+
+
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
     assert spread([]) == {"median": None, "p16": None, "p84": None, "largest": None}
 

@@ -257,7 +257,13 @@ def finding_of(found: Found) -> Finding:
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
     failures = {case: why for case, one in found.shown.items() if (why := one.runs[0].reason)}
-    unsure = not (study.recorded or numerical["converged"] or found.levels)
+    failures |= {
+        f"{case}, {model}": run.reason
+        for model, runs in found.others.items()
+        for case, run in runs.items()
+        if run.reason
+    }
+    unsure = own is not None and not (study.recorded or numerical["converged"] or found.levels)
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
