@@ -69,8 +69,8 @@ class Measured(Frozen):
         given = self.files[scene.name]
         paths = (given,) if isinstance(given, str) else given
         history = self._mean(paths)
-        t = history.channels["t"]
-        inside = (t >= -1e-9) & (t <= scene.duration + 1e-9)
+        t, ends = history.channels["t"], (-1e-9, scene.duration + 1e-9)
+        inside = (t >= ends[0]) & (t <= ends[1])
         if not np.any(inside):
             raise InputError(
                 f"nothing of {', '.join(map(printable, paths))} lies within the scene's 0 to"
@@ -81,6 +81,7 @@ class Measured(Frozen):
             history,
             name=scene.name,
             channels={key: column[inside] for key, column in history.channels.items()},
+            event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             **block_fields(scene.block),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
@@ -122,11 +123,9 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
         for name, factor in columns.values()
         if name in history.channels
     }
-    channels["t"] = channels["t"] + offset
     si = all(factor == 1.0 for _, factor in columns.values())
-    return dataclasses.replace(
-        history, channels=channels, outcome=history.outcome if si else outcome_of(channels)
-    )
+    outcome = history.outcome if si else outcome_of(channels)
+    return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
 
 
 def _heading(path: Path, shown: str) -> list[str]:

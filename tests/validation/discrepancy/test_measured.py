@@ -181,3 +181,18 @@ def test_repeats_that_end_differently_have_no_mean():
     fallen = replace(fallen, channels={**fallen.channels, "theta": np.linspace(0.0, 1.57, 401)})
     with pytest.raises(InputError, match="1 of 2 tests overturn"):
         mean_history([swing(), fallen])
+
+
+def test_an_offset_shifts_the_events_with_the_motion(tmp_path):
+    """Those before the scene's beginning are none of the scene's."""
+    scene = load_scene("bookcase")
+    history = EventBasedModel().simulate(scene)
+    path = tmp_path / "late.csv"
+    shifted(history, 0.5).save(path)
+    times = [event.t for event in history.event_list]
+    read = read_measured(path, offset=-0.5)
+    assert [event.t for event in read.event_list] == pytest.approx(times)
+    early = Measured(files={scene.name: str(path)}, offset=-0.5 - times[1]).simulate(scene)
+    assert [event.t for event in early.event_list] == pytest.approx(
+        [t - times[1] for t in times[1:]]
+    )
