@@ -16,6 +16,7 @@ from rockcheck.validation.discrepancy.measured import (
     shifted,
     time_shift,
 )
+from rockcheck.validation.execute.provenance import cell_key
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -196,3 +197,12 @@ def test_an_offset_shifts_the_events_with_the_motion(tmp_path):
     assert [event.t for event in early.event_list] == pytest.approx(
         [t - times[1] for t in times[1:]]
     )
+
+
+def test_other_events_beside_a_measured_history_make_another_cell(tmp_path):
+    scene, path = load_scene("bookcase"), tmp_path / "table.csv"
+    EventBasedModel().simulate(scene).save(path)
+    given = {"files": {scene.name: str(path)}}
+    key, events = cell_key(scene, "measured", given), tmp_path / "table.events.csv"
+    events.write_text(events.read_text(encoding="utf-8").replace("floor", "wall"), encoding="utf-8")
+    assert cell_key(scene, "measured", given) != key
