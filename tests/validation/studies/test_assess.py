@@ -265,6 +265,16 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
     assert "numerical error (no run is converged)" in page
 
 
+def test_the_numerical_error_of_a_block_that_falls_is_none(folder, assess):
+    """It falls with a finer tolerance, too, and counts as 1 alpha."""
+    text = CABINET.replace("amplitude = 5.0", "amplitude = 15.0")
+    (folder / "falls.toml").write_text(text, encoding="utf-8")
+    said = assess("falls.toml")
+    assert said["tables"]["outcomes"][0]["outcome"].startswith("overturned")
+    sources = {row["source"]: row["sd"] for row in said["contributions"]}
+    assert sources["numerical error"] == 0.0
+
+
 @pytest.mark.parametrize(
     "words", ["--models ebm", "--models ebm-unilateral,ebm", "records/R00.csv --models cm,ebm"]
 )

@@ -367,9 +367,10 @@ def _by_inputs(found: Found, peaks: Sequence[Sequence[float]]) -> list[float]:
 
 def _by_steps(found: Found) -> list[float]:
     """Variances of the peak by the step or tolerance; a block that falls has the peak 1."""
-    fallen = {case for case, run in found.nominal.items() if run.fell}
+    recorded = found.study.recorded
+    fallen = {case if recorded else "" for case, run in found.nominal.items() if run.fell}
     errors = [
-        0.0 if case in fallen else numerical.u_num("peak_rotation")
+        0.0 if case in fallen and numerical.converged else numerical.u_num("peak_rotation")
         for case, numerical in found.judged.items()
     ]
     return [(error / WIDTH) ** 2 for error in errors if error is not None]
