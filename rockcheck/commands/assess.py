@@ -134,6 +134,8 @@ def run(
             " { value = 0.3, sd = 0.03 }",
             "--samples",
         )
+    if tried.capacity and not (records and tried.levels):
+        raise InputError("needs records and --levels", "--capacity")
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
     study = Assessment(

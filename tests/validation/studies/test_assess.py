@@ -342,3 +342,10 @@ def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(folder, tmp
     assert "besides the excitation that the records replace" in refused(*words, "--samples", "8")
     assert main([*words, "-q", "--out", str(tmp_path / "out")]) == 0
     assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("words", ["records/R00.csv", "--levels 1:2:3", ""])
+def test_a_capacity_of_which_no_curve_is_asked_for_is_refused(folder, refused, words):
+    given = [str(folder / one) if one.endswith("csv") else one for one in words.split()]
+    said = refused("assess", str(folder / "cabinet.toml"), *given, "--capacity", "0.5")
+    assert said == "rockcheck: --capacity: needs records and --levels"
