@@ -161,6 +161,17 @@ class Found:
         """By case, the run as it is, where it has a motion."""
         return {case: one.runs[0] for case, one in self.shown.items() if not one.runs[0].reason}
 
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why a run as it is failed, by case, and by the other model."""
+        runs = {case: one.runs[0] for case, one in self.shown.items()}
+        runs |= {
+            f"{case}, {model}": run
+            for model, others in self.others.items()
+            for case, run in others.items()
+        }
+        return {where: run.reason for where, run in runs.items() if run.reason}
+
     @cached_property
     def judged(self) -> dict[str, Numerical]:
         """By case, the numerical uncertainty; without records, by "", that of the scene's own."""
@@ -256,13 +267,7 @@ def finding_of(found: Found) -> Finding:
     }
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
-    failures = {case: why for case, one in found.shown.items() if (why := one.runs[0].reason)}
-    failures |= {
-        f"{case}, {model}": run.reason
-        for model, runs in found.others.items()
-        for case, run in runs.items()
-        if run.reason
-    }
+    failures = found.failures
     unsure = own is not None and not (study.recorded or numerical["converged"] or found.levels)
     return Finding(
         "assess",

@@ -174,8 +174,13 @@ class Assessment(Asked, Study):
                 levels=self.levels.gather(done) if self.levels else None,
             )
         )
-        failed = any(isinstance(one, Failure) for one in done.values())
-        return replace(found, exit_code=3) if failed else found
+        return _failed(found, done)
+
+
+def _failed(found: Finding, done: Mapping[Any, Any]) -> Finding:
+    """The finding, with the exit code of a model that failed where a task did."""
+    failed = any(isinstance(one, Failure) for one in done.values())
+    return replace(found, exit_code=3) if failed else found
 
 
 def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
