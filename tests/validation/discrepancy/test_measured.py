@@ -130,12 +130,10 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
         is False
     )
     truth.save(tmp_path / "truth.csv")
-    assert (
-        "measured against ebm, 0 to 0.5 s"
-        in typed(
-            "compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"
-        )[0]
-    )
+    files = str(tmp_path / "truth.csv"), str(tmp_path / "table.csv")
+    said = typed("compare", *files, "--align", "-0.4")[0]
+    assert "measured against ebm, 0 to 0.5 s" in said
+    assert "the candidate is shifted by -0.4 s" in said
 
 
 def test_a_scene_without_a_file_is_bad_input(tmp_path):
