@@ -90,10 +90,8 @@ def _impact_time(pair: Pair) -> tuple[float, str]:
 
 
 def _overturning_time(pair: Pair) -> float:
-    first, second = (
-        next((e.t for e in h.event_list if e.kind in TURNS), math.inf)
-        for h in (pair.reference, pair.candidate)
-    )
+    falls = (one.overturned_at for one in (pair.reference, pair.candidate))
+    first, second = (math.inf if at is None else at for at in falls)
     return 0.0 if first == second else abs(second - first)
 
 
