@@ -77,10 +77,12 @@ class Measured(Frozen):
                 f" {scene.duration:g} s",
                 "offset",
             )
+        channels = {key: column[inside] for key, column in history.channels.items()}
         return dataclasses.replace(
             history,
             name=scene.name,
-            channels={key: column[inside] for key, column in history.channels.items()},
+            channels=channels,
+            outcome=history.outcome if inside[-1] else outcome_of(channels),
             event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             **block_fields(scene.block),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},

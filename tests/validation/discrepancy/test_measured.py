@@ -204,3 +204,11 @@ def test_other_events_beside_a_measured_history_make_another_cell(tmp_path):
     key, events = cell_key(scene, "measured", given), tmp_path / "table.events.csv"
     events.write_text(events.read_text(encoding="utf-8").replace("floor", "wall"), encoding="utf-8")
     assert cell_key(scene, "measured", given) != key
+
+
+def test_what_happens_after_the_end_of_the_scene_does_not_count(tmp_path):
+    scene = load_scene("bookcase").replace(duration=2.0)
+    t = np.linspace(0.0, 4.0, 401)
+    path = write(tmp_path / "falls.csv", "t_s,theta_rad", t, np.where(t > 3.0, 1.57, 0.01))
+    assert read_measured(path).outcome == "overturned left"
+    assert Measured(files={scene.name: str(path)}).simulate(scene).outcome == "moving"
