@@ -231,6 +231,7 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_
     assess("cabinet.toml records/R0*.csv --gaps 0.05")
     out = tmp_path / "out"
     page = (out / "index.html").read_text(encoding="utf-8")
+    assert "as CSV, in at most 2000 rows" in page
     for name in ("R00", "R09"):
         assert f'href="histories/{name}.csv"' in page
         text = (out / "histories" / f"{name}.csv").read_text(encoding="utf-8")

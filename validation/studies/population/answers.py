@@ -32,7 +32,14 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.studies.population.runs import Numbers, Played, Ran, Side, Sure
+from rockcheck.validation.studies.population.runs import (
+    MOST_ROWS,
+    Numbers,
+    Played,
+    Ran,
+    Side,
+    Sure,
+)
 from rockcheck.validation.studies.population.study import Population
 from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs, share_of
@@ -767,7 +774,7 @@ def _runs(found: Found) -> Table:
         ],
         "Each run",
         on="page",
-        note="Each name leads to the run's history as CSV.",
+        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows.",
     )
 
 
