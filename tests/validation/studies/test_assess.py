@@ -245,6 +245,14 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_
     assert (out / "summary.md").read_text(encoding="utf-8").startswith("# Assessment: cabinet")
 
 
+def test_each_record_has_a_file_of_its_own(folder, assess, tmp_path):
+    (folder / "alike").mkdir()
+    for name, record in (("a b.csv", "R00.csv"), ("a-b.csv", "R01.csv")):
+        (folder / "alike" / name).write_bytes((folder / "records" / record).read_bytes())
+    assess("cabinet.toml alike")
+    assert len(list((tmp_path / "out" / "histories").iterdir())) == 2
+
+
 def test_an_engine_may_play_and_is_compared(assess):
     said = assess("cabinet.toml --models mujoco,ebm-unilateral --set time_step=4e-3")
     assert said["model"] == "mujoco"

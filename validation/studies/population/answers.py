@@ -875,8 +875,8 @@ def _histories(found: Found) -> list[Block]:
 
 
 def file_of(case: str) -> str:
-    """The file of a case's history."""
-    return f"histories/{case.replace(' ', '-')}.csv"
+    """The file of a case's history; no name of a record has a tilde."""
+    return f"histories/{case.replace(' ', '~')}.csv"
 
 
 def _notes(found: Found) -> list[Block]:
