@@ -6,7 +6,8 @@ Each block is rendered from one description. All pages have one look, made of th
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import resources
@@ -41,7 +42,7 @@ from rockcheck.reports.style import (
     stamp_of,
 )
 from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
-from rockcheck.scenes.reading import read_json
+from rockcheck.scenes.reading import read_json, within
 from rockcheck.scenes.writing import (
     finite,
     json_text,
@@ -223,16 +224,33 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     return path
 
 
+def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
+    """Tables and figures of the run that was in the folder, which this one does not have."""
+    before: Any = None
+    with suppress(InputError):
+        before = read_json(within(folder, "run.json"))
+    named = before.get("tables") if isinstance(before, dict) else None
+    for name in {*named} - {one.name for one in found.tables()} if isinstance(named, dict) else ():
+        path = folder / f"{name}.csv"
+        if path.parent == folder and path.is_file():
+            yield path
+    drawn = {plot.name for plot in found.plots()}
+    for data in (folder / FIGURES).glob("*.json"):
+        if data.stem not in drawn:
+            yield from (one for one in (data, data.with_suffix(".svg")) if one.is_file())
+
+
 def publish(found: Finding, folder: Path) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
-    The scenes of failures are written beside them. Figures are written as the page shows them, and
+    The scenes of failures are written beside them. The folder holds one run: tables and figures of
+    another are removed. Figures are written as the page shows them, and
     as the data that `write_figure` draws.
     """
-    write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
-    for old in (folder / FAILING).glob("*.toml"):
+    for old in (*_left_by_another(folder, found), *(folder / FAILING).glob("*.toml")):
         old.unlink()
+    write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
         *parts, last = name.split("/")
         write_whole(made(folder, *parts) / last, content)

@@ -127,13 +127,7 @@ def run(
     cases, left_out = under_records({given.scene.name: given}, sets, Path())
     if not records:
         check_moves(given.scene)
-    if tried.samples is not None and not next(iter(cases.values())).spreads:
-        besides = " besides the excitation that the records replace" if given.spreads else ""
-        raise InputError(
-            f"no number of the scene{besides} is uncertain: write one as"
-            " { value = 0.3, sd = 0.03 }",
-            "--samples",
-        )
+    check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
     study = Assessment(
@@ -154,6 +148,21 @@ def run(
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
     studied(study, played)
+
+
+def check_tried(
+    tried: Tried, drawn: UncertainScene, given: UncertainScene, *, recorded: bool
+) -> None:
+    """Raises `InputError` for an option without an effect; `drawn` is the scene to be drawn."""
+    if tried.samples is not None and not drawn.spreads:
+        besides = " besides the excitation that the records replace" if given.spreads else ""
+        raise InputError(
+            f"no number of the scene{besides} is uncertain: write one as"
+            " { value = 0.3, sd = 0.03 }",
+            "--samples",
+        )
+    if tried.capacity and not (recorded and tried.levels):
+        raise InputError("needs records and --levels", "--capacity")
 
 
 def check_moves(scene: Scene) -> None:

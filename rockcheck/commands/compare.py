@@ -85,9 +85,9 @@ def run(
         offset = 0.0 if align == BEST else float(align or 0.0)
     except ValueError:
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
-    given, other = read_measured(reference), read_measured(candidate, offset=offset)
-    shift = time_shift(given, other) if align == BEST else None
-    found = compare(given, shifted(other, shift or 0.0), until=until, scene=what)
+    given, other = read_measured(reference), read_measured(candidate)
+    shift = time_shift(given, other) if align == BEST else offset
+    found = compare(given, shifted(other, shift), until=until, scene=what)
     finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
     document.show(finding, console())
     if plot is not None:
@@ -96,9 +96,9 @@ def run(
 
 
 def _finding(
-    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float | None
+    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
 ) -> Finding:
-    """The finding on a comparison; `shift` (s): of the candidate, where the best one was found."""
+    """The finding on a comparison; `shift` (s) is that of the candidate."""
     motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [
@@ -121,7 +121,7 @@ def _finding(
             [text("measure"), Column("value"), text("unit"), text("note", " ")],
             rows,
         ),
-        Text("" if shift is None else f"the candidate is shifted by {shift:+.4g} s"),
+        Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]
@@ -130,7 +130,7 @@ def _finding(
         "candidate": found.candidate,
         "start": found.start,
         "end": found.end,
-        "shift": shift or 0.0,
+        "shift": shift,
         "gap": found.gap,
         "headline": headline(found),
         "motion": {role: motion.model_dump() for role, motion in motions.items()},

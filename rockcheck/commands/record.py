@@ -158,7 +158,7 @@ def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
     given = dict(setting_of(word, "--read") for word in read)
     if not records:
         if given:
-            raise InputError("needs --records", "--read")
+            raise InputError("needs records", "--read")
         return []
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
     reading = {name: value for name, value in Reading(**given) if value is not None}

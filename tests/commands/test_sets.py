@@ -270,7 +270,7 @@ def test_a_suite_has_tables_of_records():
             ("validate", "rack.toml", "--models", "ebm", "--set", "ebm.tol=1"),
             "ebm.tol: unknown key",
         ),
-        (("validate", "rack.toml", "--read", "unit=g"), "--read: needs --records"),
+        (("validate", "rack.toml", "--read", "unit=g"), "--read: needs records"),
         (("validate", "rack.toml", "--records", "records/X*.AT2"), "X*.AT2: no such files"),
         (
             (

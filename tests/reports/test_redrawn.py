@@ -7,7 +7,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import FIGURES, publish
-from rockcheck.validation.finding import Axis, Finding, Panel, Plot, Series
+from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table
 
 PLOTS = [
     Plot(
@@ -70,3 +70,18 @@ def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
     monkeypatch.setattr("rockcheck.reports.document.DRAWING", 1e-3)
     said = refused("report", str(study), "--scene", "curves", "-o", "a.svg")
     assert "did not end within 0.001 s" in said
+
+
+def test_the_folder_holds_one_run(tmp_path):
+    """Tables and figures of the run before are gone; files of the user's stay."""
+    (tmp_path / "mine.csv").write_text("a\n", encoding="utf-8")
+    first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
+    publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)
+    publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs"}
+    assert {path.stem for path in (tmp_path / FIGURES).iterdir()} == {"strips"}
+    said = {"tables": {"../mine": [], "sub/mine": []}}  # as nobody but a stranger writes it
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "run.json").write_text(json.dumps(said), encoding="utf-8")
+    publish(Finding("made", "Made up", ""), tmp_path / "sub")
+    assert (tmp_path / "mine.csv").exists()

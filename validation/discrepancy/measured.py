@@ -69,8 +69,8 @@ class Measured(Frozen):
         given = self.files[scene.name]
         paths = (given,) if isinstance(given, str) else given
         history = self._mean(paths)
-        t = history.channels["t"]
-        inside = (t >= -1e-9) & (t <= scene.duration + 1e-9)
+        t, ends = history.channels["t"], (-1e-9, scene.duration + 1e-9)
+        inside = (t >= ends[0]) & (t <= ends[1])
         if not np.any(inside):
             raise InputError(
                 f"nothing of {', '.join(map(printable, paths))} lies within the scene's 0 to"
@@ -78,15 +78,12 @@ class Measured(Frozen):
                 "offset",
             )
         channels = {key: column[inside] for key, column in history.channels.items()}
-        ends = t[-1] > scene.duration + 1e-9  # what the block does later is not of this scene
         return dataclasses.replace(
             history,
             name=scene.name,
             channels=channels,
-            event_list=tuple(
-                e for e in history.event_list if -1e-9 <= e.t <= scene.duration + 1e-9
-            ),
-            outcome=outcome_of(channels) if ends else history.outcome,
+            outcome=history.outcome if inside[-1] else outcome_of(channels),
+            event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             **block_fields(scene.block),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )

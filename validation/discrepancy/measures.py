@@ -90,10 +90,8 @@ def _impact_time(pair: Pair) -> tuple[float, str]:
 
 
 def _overturning_time(pair: Pair) -> float:
-    first, second = (
-        math.inf if h.overturned_at is None else h.overturned_at
-        for h in (pair.reference, pair.candidate)
-    )
+    falls = (one.overturned_at for one in (pair.reference, pair.candidate))
+    first, second = (math.inf if at is None else at for at in falls)
     return 0.0 if first == second else abs(second - first)
 
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.scenes import Scene
+from rockcheck.scenes.history import events_path
 from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.execute.models import FAMILIES, family, home
@@ -45,7 +46,7 @@ def cell_key(
         "model": name,
         "settings": dict(settings),
         "files": [
-            hashlib.sha256(Path(file).read_bytes()).hexdigest() for file in _files(settings, scene)
+            hashlib.sha256(file.read_bytes()).hexdigest() for file in _files(settings, scene)
         ],
         "code": code_digest(home(name), search_path),
         "libraries": {library: version_of(library) for library in family(name).libraries},
@@ -55,10 +56,11 @@ def cell_key(
     return digest(json.dumps(depends, sort_keys=True, default=str))
 
 
-def _files(settings: Mapping[str, Any], scene: Scene) -> list[str]:
-    """The existing files that a measured history of this scene is read from."""
+def _files(settings: Mapping[str, Any], scene: Scene) -> list[Path]:
+    """The existing files that a measured history of this scene, and its events, are read from."""
     given = settings.get("files", {}).get(scene.name, [])
-    return [file for file in ([given] if isinstance(given, str) else given) if Path(file).is_file()]
+    tables = [Path(file) for file in ([given] if isinstance(given, str) else given)]
+    return [file for table in tables for file in (table, events_path(table)) if file.is_file()]
 
 
 def digest(text: str) -> str:

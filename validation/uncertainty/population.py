@@ -250,10 +250,10 @@ class Inputs(Stored):
     """A scene's figures with their intervals from the spread of its inputs.
 
     `figures`: peak rotation (alpha; a block that falls counts as 1, the balance point) and last
-    slip (m; of the blocks that stand) at the scene's own numbers, between the 2.5 and 97.5 %
-    quantiles of the draws. `overturns`: the share of the draws that fall, with its interval (Wilson
-    1927). `sensitivities` of the peak, largest total index first; empty where inputs are correlated
-    (the indices are for independent ones) or the peak does not vary.
+    slip (m; of the blocks that stand, if the scene's own does) at the scene's own numbers, between
+    the 2.5 and 97.5 % quantiles of the draws. `overturns`: the share of the draws that fall, with
+    its interval (Wilson 1927). `sensitivities` of the peak, largest total index first; empty where
+    inputs are correlated (the indices are for independent ones) or the peak does not vary.
     """
 
     samples: int
@@ -321,7 +321,7 @@ def propagate(
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
     one = np.minimum(own.peak / own.alpha, 1.0)
     figures = [_interval("peak_rotation", "alpha", one, peaks)]
-    if np.any(~fallen):
+    if np.any(~fallen) and not own.side[0]:
         figures.append(_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen]))
     bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")

@@ -16,6 +16,7 @@ from rockcheck.validation.discrepancy.measured import (
     shifted,
     time_shift,
 )
+from rockcheck.validation.execute.provenance import cell_key
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -129,12 +130,10 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
         is False
     )
     truth.save(tmp_path / "truth.csv")
-    assert (
-        "measured against ebm, 0 to 0.5 s"
-        in typed(
-            "compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"
-        )[0]
-    )
+    files = str(tmp_path / "truth.csv"), str(tmp_path / "table.csv")
+    said = typed("compare", *files, "--align", "-0.4")[0]
+    assert "measured against ebm, 0 to 0.5 s" in said
+    assert "the candidate is shifted by -0.4 s" in said
 
 
 def test_events_move_with_the_offset_and_end_with_the_scene(tmp_path):
@@ -194,3 +193,35 @@ def test_repeats_that_end_differently_have_no_mean():
     fallen = replace(fallen, channels={**fallen.channels, "theta": np.linspace(0.0, 1.57, 401)})
     with pytest.raises(InputError, match="1 of 2 tests overturn"):
         mean_history([swing(), fallen])
+
+
+def test_an_offset_shifts_the_events_with_the_motion(tmp_path):
+    """Those before the scene's beginning are none of the scene's."""
+    scene = load_scene("bookcase")
+    history = EventBasedModel().simulate(scene)
+    path = tmp_path / "late.csv"
+    shifted(history, 0.5).save(path)
+    times = [event.t for event in history.event_list]
+    read = read_measured(path, offset=-0.5)
+    assert [event.t for event in read.event_list] == pytest.approx(times)
+    early = Measured(files={scene.name: str(path)}, offset=-0.5 - times[1]).simulate(scene)
+    assert [event.t for event in early.event_list] == pytest.approx(
+        [t - times[1] for t in times[1:]]
+    )
+
+
+def test_other_events_beside_a_measured_history_make_another_cell(tmp_path):
+    scene, path = load_scene("bookcase"), tmp_path / "table.csv"
+    EventBasedModel().simulate(scene).save(path)
+    given = {"files": {scene.name: str(path)}}
+    key, events = cell_key(scene, "measured", given), tmp_path / "table.events.csv"
+    events.write_text(events.read_text(encoding="utf-8").replace("floor", "wall"), encoding="utf-8")
+    assert cell_key(scene, "measured", given) != key
+
+
+def test_what_happens_after_the_end_of_the_scene_does_not_count(tmp_path):
+    scene = load_scene("bookcase").replace(duration=2.0)
+    t = np.linspace(0.0, 4.0, 401)
+    path = write(tmp_path / "falls.csv", "t_s,theta_rad", t, np.where(t > 3.0, 1.57, 0.01))
+    assert read_measured(path).outcome == "overturned left"
+    assert Measured(files={scene.name: str(path)}).simulate(scene).outcome == "moving"

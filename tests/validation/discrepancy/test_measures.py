@@ -194,6 +194,8 @@ def test_both_fell_the_same_way_is_whole(made):
     assert found.gap == ""
     assert found["overturning_time"] == pytest.approx(0.01)
     assert found["outcome_agrees"] == 1.0
+    measured = dataclasses.replace(fallen[1], event_list=())  # as a table of a test: its end
+    assert compare(fallen[0], measured)["overturning_time"] == pytest.approx(T[2003] - T[2000])
     other = dataclasses.replace(fallen[1], outcome="overturned right")
     assert compare(fallen[0], other).gap
     assert compare(fallen[0], other)["outcome_agrees"] == 0.0

@@ -231,6 +231,7 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_
     assess("cabinet.toml records/R0*.csv --gaps 0.05")
     out = tmp_path / "out"
     page = (out / "index.html").read_text(encoding="utf-8")
+    assert "as CSV, in at most 2000 rows" in page
     for name in ("R00", "R09"):
         assert f'href="histories/{name}.csv"' in page
         text = (out / "histories" / f"{name}.csv").read_text(encoding="utf-8")
@@ -242,6 +243,14 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_
     for table in ("outcomes", "quantities", "gaps", "contributions", "criteria", "runs"):
         assert (out / f"{table}.csv").is_file()
     assert (out / "summary.md").read_text(encoding="utf-8").startswith("# Assessment: cabinet")
+
+
+def test_each_record_has_a_file_of_its_own(folder, assess, tmp_path):
+    (folder / "alike").mkdir()
+    for name, record in (("a b.csv", "R00.csv"), ("a-b.csv", "R01.csv")):
+        (folder / "alike" / name).write_bytes((folder / "records" / record).read_bytes())
+    assess("cabinet.toml alike")
+    assert len(list((tmp_path / "out" / "histories").iterdir())) == 2
 
 
 def test_an_engine_may_play_and_is_compared(assess):
@@ -263,6 +272,34 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
     assert sure["answer"] == "Not converged: no figure of it is sure."
     page = (tmp_path / "summary.md").read_text(encoding="utf-8")
     assert "numerical error (no run is converged)" in page
+
+
+def test_the_numerical_error_of_a_block_that_falls_is_none(folder, assess):
+    """It falls with a finer tolerance, too, and counts as 1 alpha."""
+    text = CABINET.replace("amplitude = 5.0", "amplitude = 15.0")
+    (folder / "falls.toml").write_text(text, encoding="utf-8")
+    said = assess("falls.toml")
+    assert said["tables"]["outcomes"][0]["outcome"].startswith("overturned")
+    sources = {row["source"]: row["sd"] for row in said["contributions"]}
+    assert sources["numerical error"] == 0.0
+
+
+@pytest.mark.parametrize(
+    "words", ["--models ebm", "--models ebm-unilateral,ebm", "records/R00.csv --models cm,ebm"]
+)
+def test_a_model_that_fails_ends_with_3(folder, tmp_path, words):
+    """The paper's model knows no floor that bounces."""
+    bouncy = CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 0.5")
+    (folder / "bouncy.toml").write_text(bouncy, encoding="utf-8")
+    path, *records = [str(folder / one) for one in ("bouncy.toml", *words.split()[:-2])]
+    asked = ["assess", path, *records, *words.split()[-2:], "-q"]
+    assert main([*asked, "--out", str(tmp_path)]) == 3
+
+
+def test_a_run_that_was_interrupted_is_not_called_unsure(folder):
+    own = load_uncertain_scene(folder / "cabinet.toml")
+    study = Assessment(own=own, cases={"cabinet": own})
+    assert study.gather({}).exit_code == 0
 
 
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
@@ -314,3 +351,10 @@ def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(folder, tmp
     assert "besides the excitation that the records replace" in refused(*words, "--samples", "8")
     assert main([*words, "-q", "--out", str(tmp_path / "out")]) == 0
     assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("words", ["records/R00.csv", "--levels 1:2:3", ""])
+def test_a_capacity_of_which_no_curve_is_asked_for_is_refused(folder, refused, words):
+    given = [str(folder / one) if one.endswith("csv") else one for one in words.split()]
+    said = refused("assess", str(folder / "cabinet.toml"), *given, "--capacity", "0.5")
+    assert said == "rockcheck: --capacity: needs records and --levels"

@@ -32,7 +32,14 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.studies.population.runs import Numbers, Played, Ran, Side, Sure
+from rockcheck.validation.studies.population.runs import (
+    MOST_ROWS,
+    Numbers,
+    Played,
+    Ran,
+    Side,
+    Sure,
+)
 from rockcheck.validation.studies.population.study import Population
 from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs, share_of
@@ -161,6 +168,17 @@ class Found:
         """By case, the run as it is, where it has a motion."""
         return {case: one.runs[0] for case, one in self.shown.items() if not one.runs[0].reason}
 
+    @property
+    def failures(self) -> dict[str, str]:
+        """Why a run as it is failed, by case, and by the other model."""
+        runs = {case: one.runs[0] for case, one in self.shown.items()}
+        runs |= {
+            f"{case}, {model}": run
+            for model, others in self.others.items()
+            for case, run in others.items()
+        }
+        return {where: run.reason for where, run in runs.items() if run.reason}
+
     @cached_property
     def judged(self) -> dict[str, Numerical]:
         """By case, the numerical uncertainty; without records, by "", that of the scene's own."""
@@ -256,8 +274,8 @@ def finding_of(found: Found) -> Finding:
     }
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
-    failures = {case: why for case, one in found.shown.items() if (why := one.runs[0].reason)}
-    unsure = not (study.recorded or numerical["converged"] or found.levels)
+    failures = found.failures
+    unsure = own is not None and not (study.recorded or numerical["converged"] or found.levels)
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
@@ -361,9 +379,10 @@ def _by_inputs(found: Found, peaks: Sequence[Sequence[float]]) -> list[float]:
 
 def _by_steps(found: Found) -> list[float]:
     """Variances of the peak by the step or tolerance; a block that falls has the peak 1."""
-    fallen = {case for case, run in found.nominal.items() if run.fell}
+    recorded = found.study.recorded
+    fallen = {case if recorded else "" for case, run in found.nominal.items() if run.fell}
     errors = [
-        0.0 if case in fallen else numerical.u_num("peak_rotation")
+        0.0 if case in fallen and numerical.converged else numerical.u_num("peak_rotation")
         for case, numerical in found.judged.items()
     ]
     return [(error / WIDTH) ** 2 for error in errors if error is not None]
@@ -755,7 +774,7 @@ def _runs(found: Found) -> Table:
         ],
         "Each run",
         on="page",
-        note="Each name leads to the run's history as CSV.",
+        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows.",
     )
 
 
@@ -856,8 +875,8 @@ def _histories(found: Found) -> list[Block]:
 
 
 def file_of(case: str) -> str:
-    """The file of a case's history."""
-    return f"histories/{case.replace(' ', '-')}.csv"
+    """The file of a case's history; no name of a record has a tilde."""
+    return f"histories/{case.replace(' ', '~')}.csv"
 
 
 def _notes(found: Found) -> list[Block]:

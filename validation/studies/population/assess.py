@@ -7,7 +7,7 @@ gaps, by other models.
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from rockcheck.scenes import InputError, Scene, Wall
 from rockcheck.validation.execute.models import family
+from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.population.answers import LAW, SWIFT, Asked, Found, finding_of
 from rockcheck.validation.studies.population.runs import (
@@ -156,7 +157,7 @@ class Assessment(Asked, Study):
         at_gaps: dict[float, list[Ran]] = {gap: [] for _, gap in self.at_gaps}
         for (_, gap), tasks in self.at_gaps.items():
             at_gaps[gap] += [run for run in runs(tasks) if not run.reason]
-        return finding_of(
+        found = finding_of(
             Found(
                 study=self,
                 shown=first(self.shown),
@@ -173,6 +174,13 @@ class Assessment(Asked, Study):
                 levels=self.levels.gather(done) if self.levels else None,
             )
         )
+        return _failed(found, done)
+
+
+def _failed(found: Finding, done: Mapping[Any, Any]) -> Finding:
+    """The finding, with the exit code of a model that failed where a task did."""
+    failed = any(isinstance(one, Failure) for one in done.values())
+    return replace(found, exit_code=3) if failed else found
 
 
 def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
