@@ -301,7 +301,7 @@ def _tracks(ax: Axes, view: SceneView) -> None:
     shown = [model for model in known if model in view.histories]
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:
-            times = [e.t for e in view.histories[model].event_list if e.kind == kind]
+            times = [e.t for e in WindowedHistory(view.histories[model]).events(kind)]
             ax.plot(
                 times,
                 [row] * len(times),
