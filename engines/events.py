@@ -98,16 +98,17 @@ class _Motion:
         return np.asarray(gap_of(*contact.normal, contact.distance, x, y, arm))
 
     def _touches(self, contact: Contact) -> Flags:
-        """Whether the contact touches at each step end, or has bounced in the step before it.
+        """Whether the contact touches at each step end, or has struck in the step before it.
 
-        An engine that looks ahead turns a block round up to two steps before it arrives.
+        An engine that looks ahead stops a block, or turns it round, up to two steps before it
+        arrives.
         """
         gap, (x_dot, y_dot, theta_dot) = self.gap(contact), self.states[:, 3:].T
         arm = arm_of(*contact.corner, np.cos(self.states[:, 2]), np.sin(self.states[:, 2]))
         rate = rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
         arrives = gap[:-1] + 2.0 * np.diff(self.t) * rate[:-1] < self.near
-        bounces = arrives & (rate[:-1] < -HOLD * self.scene.gravity) & (rate[1:] > 0.0)
-        return (gap < self.near) | np.concatenate([[False], bounces])
+        struck = (rate[:-1] < -HOLD * self.scene.gravity) & (rate[1:] > 0.5 * rate[:-1])
+        return (gap < self.near) | np.concatenate([[False], arrives & struck])
 
     def closed(self, contact: Contact) -> Flags:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
