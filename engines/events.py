@@ -83,7 +83,9 @@ class _Motion:
             CLOSED * scene.block.radius
             + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
         )
-        #: The same of the box's centre.
+        #: Whether each contact touches at each step end.
+        self.touching = {contact: self._touches(contact) for contact in contacts}
+        #: The states of the box's centre.
         self.box = kinematics.of_box(scene.block, states)
         self.slip_rate = kinematics.slip_rate(
             scene.block, states[:, 2], self.box[:, 3], states[:, 5]
@@ -95,9 +97,22 @@ class _Motion:
         arm = arm_of(*contact.corner, np.cos(theta), np.sin(theta))
         return np.asarray(gap_of(*contact.normal, contact.distance, x, y, arm))
 
+    def _touches(self, contact: Contact) -> Flags:
+        """Whether the contact touches at each step end, or has struck in the step before it.
+
+        An engine that looks ahead stops a block, or turns it round, up to two steps before it
+        arrives.
+        """
+        gap, (x_dot, y_dot, theta_dot) = self.gap(contact), self.states[:, 3:].T
+        arm = arm_of(*contact.corner, np.cos(self.states[:, 2]), np.sin(self.states[:, 2]))
+        rate = rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
+        arrives = gap[:-1] + 2.0 * np.diff(self.t) * rate[:-1] < self.near
+        struck = (rate[:-1] < -HOLD * self.scene.gravity) & (rate[1:] > 0.5 * rate[:-1])
+        return (gap < self.near) | np.concatenate([[False], arrives & struck])
+
     def closed(self, contact: Contact) -> Flags:
         """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
-        return _held(self.gap(contact) < self.near, self.t)
+        return _held(self.touching[contact], self.t)
 
     def onset(self, contact: Contact, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
@@ -164,7 +179,7 @@ class _Motion:
         along_x, along_y, turning = np.eye(3)  # an impulse acts on what a contact sees move
         columns, owners = [], []
         for other in self.contacts:
-            if other is contact or np.any(self.gap(other, slice(first, last + 1)) < self.near):
+            if other is contact or np.any(self.touching[other][first : last + 1]):
                 arm = arm_of(*other.corner, cos, sin)
                 normal = rate_of(*other.normal, along_x, along_y, turning, arm)
                 friction = (

@@ -139,6 +139,8 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         self.friction = corrected_friction
         self.stiffness, self.damping = self.model.pair_solref.T
         self.stiffness[:] = 0.0
+        # Friction stops a slip, whatever the restitution: MuJoCo would turn it round, too.
+        self.slowing = self.model.pair_solreffriction[:, 1]
         restitutions = np.array([contact.restitution for contact in contacts])
         self.stopping, self.bouncing = np.full(len(contacts), -1.0), -1.0 - restitutions
         self.tuned: tuple[float, bool] | None = (
@@ -155,7 +157,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
     def march(self, felt: FloatArray, dt: float) -> FloatArray:
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
         self.stiffness[:] = self.pushing_out / dt**2
-        self.damping[:] = self.bouncing / dt
+        self.damping[:], self.slowing[:] = self.bouncing / dt, self.stopping / dt
         self.tuned = None
         return super().march(felt, dt)
 
@@ -179,6 +181,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         self.force[:] = felt
         if (dt, bouncing) != self.tuned:
             self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE / dt)
+            self.slowing[:] = self.stopping * (IMPEDANCE / dt)
             self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
         data.efc_D.fill(

@@ -16,6 +16,7 @@ from rockcheck.reports.show.words import SUPERSCRIPTS, number
 from rockcheck.reports.style import PAGE, Look, figure_style, looks, save
 from rockcheck.reports.view import PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.validation.discrepancy.figures import IMPACTS, WindowedHistory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -149,7 +150,7 @@ def summary(view: SceneView) -> str:
     """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
     said = []
     for model, history in view.histories.items():
-        impacts = sum(event.kind in ("floor impact", "wall impact") for event in history.event_list)
+        impacts = len(WindowedHistory(history).events(*IMPACTS))
         peak = number(history.peak_rotation / view.scene.block.alpha)
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
@@ -300,7 +301,7 @@ def _tracks(ax: Axes, view: SceneView) -> None:
     shown = [model for model in known if model in view.histories]
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:
-            times = [e.t for e in view.histories[model].event_list if e.kind == kind]
+            times = [e.t for e in WindowedHistory(view.histories[model]).events(kind)]
             ax.plot(
                 times,
                 [row] * len(times),

@@ -256,13 +256,15 @@ class History(Shown):
         """Read a file that `save` wrote, or any CSV with columns `t` and `theta` (SI units).
 
         Other columns of `COLUMNS` are optional. `columns` maps the file's names of columns to those
-        of a history, where they differ. Raises `InputError` for a file that is missing, lacks those
-        columns, is not numeric, not finite or not ordered in time.
+        of a history, where they differ. Raises `InputError` for a file that is missing, no CSV,
+        lacks those columns, is not numeric, not finite or not ordered in time.
         """
         import pandas as pd
 
         path = Path(path)
         shown = printable(path)
+        if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
+            raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
         frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()

@@ -11,7 +11,7 @@ kinetic friction. SI units, frequencies in Hz.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -124,9 +124,12 @@ class Base:
 
 
 def base_of(scene: Scene) -> Base:
-    """The base motion of a scene."""
-    upward = sampled(scene.vertical, scene.duration).samples
-    return Base(sampled(scene.excitation, scene.duration), float(np.max(np.abs(upward))))
+    """The base motion of a scene, up to the scene's end."""
+    across, up = (
+        replace(one, samples=one.samples[: int(scene.duration / one.time_step * (1 + 1e-12)) + 1])
+        for one in (sampled(each, scene.duration) for each in (scene.excitation, scene.vertical))
+    )
+    return Base(across, float(np.max(np.abs(up.samples))))
 
 
 def sampled(motion: Excitation, duration: float) -> Recording:

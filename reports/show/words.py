@@ -14,7 +14,7 @@ from rockcheck.reports.style import Look
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
 from rockcheck.scenes.errors import inert
 from rockcheck.validation.discrepancy import Discrepancy
-from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.figures import IMPACTS, Figure, WindowedHistory
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -124,7 +124,7 @@ def history_html(history: History) -> str:
     """
     time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
     peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
-    kinds = Counter(event.kind for event in history.event_list)
+    kinds = Counter(event.kind for event in WindowedHistory(history).events(*IMPACTS))
     settings = ", ".join(f"{key} {value}" for key, value in history.settings.items())
     facts = {
         "outcome": history.fate,

@@ -6,6 +6,7 @@ import math
 import re
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import Entry, accuracy, entry, glance, overrun, times_table
 from rockcheck.reports.view import FALL, scene_views, slugs_of
-from rockcheck.scenes import Block, Floor, InputError, Record, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import Block, Event, Floor, InputError, Record, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure, Pair
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
@@ -378,3 +379,11 @@ def test_index_shows_peaks_against_the_reference_s(site: Path) -> None:
 def test_a_folder_without_run_is_bad_input(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no finished run here"):
         write_site(tmp_path)
+
+
+def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(run_folder: Path) -> None:
+    [view, *_] = scene_views(Run.load(run_folder), run_folder)
+    landing = Event(t=0.5, kind="landing", impulse=1.0)
+    view.histories["ebm"] = replace(view.histories["ebm"], event_list=(landing,))
+    tracks = histories_figure(view).axes[-1].get_lines()
+    assert [0.5] in [list(line.get_xdata()) for line in tracks if line.get_marker() == "|"]

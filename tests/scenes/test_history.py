@@ -147,6 +147,9 @@ def test_another_compressed_file_is_refused(history, tmp_path):
         InputError, match=r"written as \.csv, \.csv\.gz, \.json, \.mat or \.parquet"
     ):
         history.save(tmp_path / "run.json.gz")
+    history.save(tmp_path / "run.json")
+    with pytest.raises(InputError, match=r"read from \.csv or \.csv\.gz, not from \.json"):
+        History.load(tmp_path / "run.json")
 
 
 def test_tables(history):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, overturning_spectrum
-from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall
+from rockcheck.scenes import Block, Floor, History, Rest, Ricker, Scene, Wall
 from rockcheck.validation import compare
 
 NASTY = "<img src=x onerror=alert(1)>&\"'"
@@ -122,6 +122,12 @@ def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():
     assert axes.get_title() == "a, m: overturned left at 1.53 s"
     assert axes.get_ylim()[1] == pytest.approx(1.3)
     assert compare(fallen, fallen).plot().axes[0].get_ylim()[1] == pytest.approx(1.3)
+
+
+def test_a_flat_landing_counts_as_an_impact_on_the_floor(scene):
+    drop = scene.replace(excitation=Rest(), initial_height=0.05, duration=0.5)
+    shown = Tags(EventBasedModel(pivot="unilateral").simulate(drop)._repr_html_())
+    assert "1 on the floor, 0 on walls" in shown.text
 
 
 def test_a_loaded_block_says_where_its_mass_is():

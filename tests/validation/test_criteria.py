@@ -111,6 +111,15 @@ def shaken():
     return played(0.3, 1.0, motion, friction=0.35)
 
 
+def test_what_comes_after_the_scenes_end_counts_for_nothing(shaken):
+    late = Record.from_samples([0.0, 1.0, -1.0, 9.0], 0.5)
+    scene = shaken[0].replace(excitation=late, vertical=late, duration=1.2)
+    base = criteria.base_of(scene)
+    assert (base.acceleration, base.vertical) == (pytest.approx(1.0), 1.0)
+    whole = criteria.base_of(scene.replace(duration=1.5))
+    assert (whole.acceleration, whole.vertical) == (pytest.approx(9.0), 9.0)
+
+
 @pytest.mark.parametrize("vertical", [0.0, 0.5 * G])
 def test_the_sliding_estimate_is_the_displacement_of_its_oscillator(shaken, vertical):
     scene, _ = shaken

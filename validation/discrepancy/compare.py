@@ -81,8 +81,8 @@ def compare(
     `measures` are names from `validation.discrepancy.measures`; by default all but those that are
     `on_request`. The candidate is interpolated linearly onto the reference's times. Both are
     measured with `scene`, which also gives the gravity (9.81 m/s^2 otherwise). A measure that
-    cannot be computed is NaN, and its note says why. Raises `InputError` if the histories have no
-    time in common, or, without a `scene`, two different blocks.
+    cannot be computed is NaN, and its note says why. Raises `InputError` if a measure is unknown,
+    the histories have no time in common, or, without a `scene`, two different blocks.
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
         check_kind(history, History, "simulate or History.load", key)
@@ -140,6 +140,8 @@ def _chosen(known: Mapping[str, Measure], names: Collection[str] | None) -> list
     """The measures of these names; None: all but those that are `on_request`."""
     if names is None:
         return [measure for measure in known.values() if not measure.on_request]
+    if unknown := [name for name in names if name not in known]:
+        raise InputError(f"{unknown[0]!r} is not allowed: {', '.join(known)}", "measures")
     return [known[name] for name in names]
 
 

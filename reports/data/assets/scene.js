@@ -19,6 +19,7 @@
   for (const model of data.models) {
     model.columns = Object.fromEntries(Object.entries(model.values).map(([name, line]) => [name, floats(line)]));
     model.values = null;
+    for (const event of model.events) if (event[1] === "landing" && event[2]) event[1] = "floor impact";  // as the measures count it
     model.end = data.step * Math.max(0, model.columns.theta.findLastIndex(v => v !== null));
     // What is drawn: up to the fall; of a measured history only its samples.
     const last = model.fell === null ? data.rows : Math.round(model.fell / data.step), samples = model.samples && new Set(model.samples);

@@ -270,6 +270,11 @@ def test_a_measured_history_may_lack_columns(made):
     assert in_radians.figure("theta_rms").unit == "rad"
 
 
+def test_an_unknown_measure_is_bad_input(made):
+    with pytest.raises(InputError, match="'rms' is not allowed: theta_rms, "):
+        compare(made(WAVE, T), made(WAVE, T), measures=["rms"])
+
+
 def test_nothing_in_common_is_bad_input(made):
     with pytest.raises(InputError, match="no time in common"):
         compare(made(WAVE, T), made(WAVE, T + 100.0))
