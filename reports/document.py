@@ -42,7 +42,7 @@ from rockcheck.reports.style import (
     stamp_of,
 )
 from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
-from rockcheck.scenes.reading import read_json, within
+from rockcheck.scenes.reading import MOST_BYTES, head_of, read_json, within
 from rockcheck.scenes.writing import (
     finite,
     json_text,
@@ -225,27 +225,39 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
 
 
 def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
-    """Tables and figures of the run that was in the folder, which this one does not have."""
+    """Tables and figures of the run that was in the folder, which this one does not have.
+
+    No other file is taken for one: a table has the columns that its run.json says, and a figure's
+    stamp is that of the data beside it.
+    """
     before: Any = None
     with suppress(InputError):
         before = read_json(within(folder, "run.json"))
-    named = before.get("tables") if isinstance(before, dict) else None
-    for name in {*named} - {one.name for one in found.tables()} if isinstance(named, dict) else ():
-        path = folder / f"{name}.csv"
-        if path.parent == folder and path.is_file():
+    tables = before.get("tables") if isinstance(before, dict) else None
+    for name, rows in tables.items() if isinstance(tables, dict) else ():
+        path, mine = folder / f"{name}.csv", name in {one.name for one in found.tables()}
+        if not mine and path.parent == folder and _holds(path, rows):
             yield path
     drawn = {plot.name for plot in found.plots()}
     for data in (folder / FIGURES).glob("*.json"):
-        if data.stem not in drawn:
-            yield from (one for one in (data, data.with_suffix(".svg")) if one.is_file())
+        svg = data.with_suffix(".svg")
+        ours = stamp_in(svg).split()[:1] == stamp_of(head_of(data, MOST_BYTES)).split()[:1]
+        if data.stem not in drawn and ours:
+            yield from (data, svg)
+
+
+def _holds(path: Path, rows: Any) -> bool:
+    """Whether a CSV begins with the columns of these records."""
+    first = rows[0] if isinstance(rows, list) and rows else None
+    return isinstance(first, dict) and head_of(path, 10_000).startswith(table_text([*first], []))
 
 
 def publish(found: Finding, folder: Path) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
     The scenes of failures are written beside them. The folder holds one run: tables and figures of
-    another are removed. Figures are written as the page shows them, and
-    as the data that `write_figure` draws.
+    another are removed. Figures are written as the page shows them, and as the data that
+    `write_figure` draws.
     """
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for old in (*_left_by_another(folder, found), *(folder / FAILING).glob("*.toml")):

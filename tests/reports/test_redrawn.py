@@ -80,8 +80,19 @@ def test_the_folder_holds_one_run(tmp_path):
     publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
     assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs"}
     assert {path.stem for path in (tmp_path / FIGURES).iterdir()} == {"strips"}
-    said = {"tables": {"../mine": [], "sub/mine": []}}  # as nobody but a stranger writes it
-    (tmp_path / "sub").mkdir()
-    (tmp_path / "sub" / "run.json").write_text(json.dumps(said), encoding="utf-8")
-    publish(Finding("made", "Made up", ""), tmp_path / "sub")
-    assert (tmp_path / "mine.csv").exists()
+
+
+def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
+    """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
+    folder = tmp_path / "sub"
+    (folder / FIGURES).mkdir(parents=True)
+    rows = [{"a": 1.0}]
+    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
+    (folder / "run.json").write_text(json.dumps(said), encoding="utf-8")
+    mine = [tmp_path / "mine.csv", *(folder / f"{name}.csv" for name in ("empty", "odd"))]
+    mine += [folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")]
+    for path in mine:
+        path.write_text("a\n", encoding="utf-8")
+    (folder / "own.csv").write_text("b,a\n", encoding="utf-8")
+    publish(Finding("made", "Made up", ""), folder)
+    assert all(path.exists() for path in (*mine, folder / "own.csv"))
