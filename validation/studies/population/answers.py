@@ -600,7 +600,7 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         Column("largest", "largest" if several else "value", digits=4),
         text("unit"),
         text("record", "its record", brief=several),
-        Column("of", "of runs", help="Runs that stand and have the figure.", brief=several),
+        Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
     shown = {q.label: quantities[q.name] | {"unit": _unit(q.unit)} for q in QUANTITIES}
     rows = [[label, *(one[c.name] for c in columns[1:])] for label, one in shown.items()]
@@ -774,7 +774,8 @@ def _runs(found: Found) -> Table:
         ],
         "Each run",
         on="page",
-        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows.",
+        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows. Of a block"
+        " that falls only the speed at the wall is given.",
     )
 
 
