@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes.experience import WIDTH, known, outside
+from rockcheck.scenes.experience import WIDTH, outside, trust_of
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.scenes.writing import finite
 from rockcheck.validation.criteria import CRITERIA, Criterion
@@ -692,7 +692,7 @@ def _models(found: Found) -> list[Block]:
     """How far the other models are from the first, and what the suites know of them."""
     rows = []
     for model, apart in found.apart.items():
-        trust = known().trust.get(model, {}).get("peak_rotation")
+        trust = trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
         rows.append(
             [
                 "floor-first law of impacts" if model == LAW else model,
