@@ -127,3 +127,8 @@ class Dart(Engine):
     def stock_world(self, scene: Scene) -> World:
         """The scene as DART holds it: a box among boxes."""
         return _DartWorld(scene)
+
+    def notes(self, scene: Scene) -> list[str]:
+        """Also that a flat landing may not stay flat on a floor that bounces."""
+        tips = "dart does not keep a bouncing block flat: it may tip at its second landing"
+        return [*super().notes(scene), *([tips] if scene.floor.restitution > 0.0 else [])]

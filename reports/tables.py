@@ -14,7 +14,7 @@ from typing import Any
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import label_of, looks
 from rockcheck.reports.view import FALL, SceneView, all_figures
-from rockcheck.scenes.experience import Trust, known
+from rockcheck.scenes.experience import Trust, trust_of
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.finding import (
@@ -463,9 +463,10 @@ def accuracy(run: Run) -> list[Block]:
 
     Nothing where neither is known.
     """
-    pairs, everywhere, styles = pairs_of([run]), known().trust, looks(run.models)
+    pairs, styles = pairs_of([run]), looks(run.models)
+    settings = {cell.model: cell.settings for cell in run.cells}
     trusts = {
-        model: (trust_in(pairs[model]), everywhere.get(model, {}).get(QUANTITY))
+        model: (trust_in(pairs[model]), trust_of(model, settings.get(model, {})).get(QUANTITY))
         for model in run.models
         if model in pairs
     }

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from functools import cache
 from importlib import resources
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,10 +35,14 @@ class Range(Frozen):
 
 
 class Experience(Frozen):
-    """The suites that were run, each model's `Trust` by figure, and the domain of the scenes."""
+    """The suites that were run, each model's `Trust` by figure, and the domain of the scenes.
+
+    `settings` are those that each model had in them: by name, the values.
+    """
 
     suites: tuple[str, ...] = ()
     trust: Mapping[str, Mapping[str, Trust]] = {}
+    settings: Mapping[str, Mapping[str, tuple[Any, ...]]] = {}
     domain: Mapping[str, Range] = {}
 
 
@@ -59,6 +63,27 @@ def known() -> Experience:
         if path.is_file()
         else Experience()
     )
+
+
+def trust_of(model: str, settings: Mapping[str, Any]) -> Mapping[str, Trust]:
+    """A model's `Trust` by figure; empty with settings that it had in no suite.
+
+    Steps and tolerances may be finer than there.
+    """
+    found = known()
+    held = all(
+        any(_within(settings[name], value) for value in values)
+        for name, values in found.settings.get(model, {}).items()
+        if name in settings
+    )
+    return found.trust.get(model, {}) if held else {}
+
+
+def _within(own: object, value: object) -> bool:
+    """Whether a setting is this value, or a number below it."""
+    if isinstance(own, float) and isinstance(value, float):
+        return own <= value * (1.0 + 1e-9)
+    return own == value
 
 
 def expected(trust: Trust, value: float) -> Expected:

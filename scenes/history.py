@@ -20,7 +20,7 @@ from pydantic import ConfigDict
 from rockcheck.scenes.base import MOST, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.experience import Expected, expected, known
+from rockcheck.scenes.experience import Expected, expected, trust_of
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.writing import columns_text, json_text, write_together
 
@@ -170,13 +170,13 @@ class History(Shown):
     def expected(self, quantity: str = "peak_rotation") -> Expected:
         """A figure corrected by the model's bias in the suites, with its 95 % interval (rad).
 
-        See `scenes.experience`. Raises `InputError` where nothing is known of the model, or of the
-        figure.
+        See `scenes.experience`. Raises `InputError` where nothing is known of the model with its
+        settings, or of the figure.
         """
-        known_of = known().trust.get(self.model, {})
+        known_of = trust_of(self.model, self.settings)
         if quantity not in known_of:
             raise InputError(
-                f"the suites say nothing of {quantity} by {self.model}; known:"
+                f"the suites say nothing of {quantity} by {self.model} with its settings; known:"
                 f" {', '.join(known_of) or 'nothing'}",
                 "quantity",
             )

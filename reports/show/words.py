@@ -14,7 +14,12 @@ from rockcheck.reports.style import Look
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
 from rockcheck.scenes.errors import inert
 from rockcheck.validation.discrepancy import Discrepancy
-from rockcheck.validation.discrepancy.figures import IMPACTS, Figure, WindowedHistory
+from rockcheck.validation.discrepancy.figures import (
+    IMPACTS,
+    STANDARD_GRAVITY,
+    Figure,
+    WindowedHistory,
+)
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -68,6 +73,7 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     """(label, text) of a scene's block, floor, walls, excitation and duration."""
     block, tilt = scene.block, scene.initial_rotation
+    g = "" if scene.gravity == STANDARD_GRAVITY else f", gravity {number(scene.gravity)} m/s²"
     mu, mu_s, e = scene.floor.friction, scene.floor.mu_s, scene.floor.restitution
     floor = f"μ {number(mu)}{f' (static {number(mu_s)})' if mu_s != mu else ''}"
     floor += f", restitution {number(e)}" if e else ""
@@ -75,6 +81,16 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}"
         for wall in scene.walls
     )
+    starts = [f"θ = {number(tilt / block.alpha)} α"] if tilt else []
+    starts += [
+        f"{what} {number(value)} {of}"
+        for what, value, of in (
+            ("velocity", scene.initial_velocity, "m/s"),
+            ("angular velocity", scene.initial_angular_velocity, "rad/s"),
+            ("height", scene.initial_height, "m"),
+        )
+        if value
+    ]
     facts = [
         (
             "block",
@@ -82,7 +98,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
             f" {number(block.alpha)} rad",
         ),
         *mass_facts(block),
-        ("p", f"{number(scene.frequency_parameter)} rad/s"),
+        ("p", f"{number(scene.frequency_parameter)} rad/s{g}"),
         ("floor", floor),
         ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
         ("base", excitation_words(scene.excitation)),
@@ -91,7 +107,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
             "duration",
             f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms",
         ),
-        ("starts at", f"θ = {number(tilt / block.alpha)} α" if tilt else ""),
+        ("starts at", ", ".join(starts)),
     ]
     return [fact for fact in facts if fact[1]]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.engines import Drake, MuJoCo, PyBullet
+from rockcheck.engines import Dart, Drake, MuJoCo, PyBullet
 from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep, FixedStep
@@ -186,6 +186,14 @@ def test_what_an_engine_cannot_do_is_noted(engine, free_rocking):
         "kinetic 0.5 is used for static 0.7" in note
         for note in engine(time_step=1e-3).simulate(scene).notes
     )
+
+
+@pytest.mark.parametrize("settings", ["best", "default"])
+@pytest.mark.parametrize(("restitution", "tips"), [(0.5, True), (0.0, False)])
+def test_dart_says_that_a_block_that_bounces_may_tip(settings, restitution, tips, free_rocking):
+    scene = free_rocking(0.5).replace(floor=Floor(friction=0.5, restitution=restitution))
+    notes = Dart(settings=settings).notes(scene)
+    assert any("tip at its second landing" in note for note in notes) == tips
 
 
 @pytest.mark.parametrize("settings", ["best", "default"])

@@ -184,3 +184,15 @@ def test_nothing_heavy_is_imported_to_show_a_table():
         ).stdout
         == "[]\n"
     )
+
+
+def test_a_scene_shows_how_it_starts_and_its_gravity_where_they_are_not_as_usual(scene):
+    usual = scene._repr_html_()
+    assert "starts at" not in usual
+    assert "gravity" not in usual
+    moving = scene.replace(
+        gravity=1.62, initial_velocity=-0.5, initial_angular_velocity=0.25, initial_height=0.125
+    )
+    shown = Tags(moving._repr_html_()).text
+    assert "gravity 1.62 m/s²" in shown
+    assert "velocity −0.5 m/s, angular velocity 0.25 rad/s, height 0.125 m" in shown

@@ -19,6 +19,7 @@ from rockcheck.validation.discrepancy.figures import (
     Measure,
     Pair,
     Unavailable,
+    Undefined,
     Value,
     WindowedHistory,
     by_name,
@@ -388,6 +389,7 @@ FIGURES = by_name(
 
 def _sliding_distance(motion: WindowedHistory) -> float:
     scene = _flat_start(motion, "a block that starts sliding flat", walls=0)
+    _stopped(motion, scene, abs(scene.initial_velocity))
     x = motion.channel("x")
     return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / _braking(scene)
 
@@ -397,6 +399,8 @@ def _wall_rebound(motion: WindowedHistory) -> float:
     wall = scene.walls[0]
     speed2 = scene.initial_velocity**2 - _braking(scene) * wall.gap
     _need(speed2 > 0.0, "a block that reaches the wall")
+    lost = (1.0 - wall.restitution) * math.sqrt(speed2)
+    _stopped(motion, scene, abs(scene.initial_velocity) - lost)
     from_wall = wall.gap - abs(float(motion.channel("x")[-1]))
     return from_wall - wall.restitution**2 * speed2 / _braking(scene)
 
@@ -466,6 +470,13 @@ def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> Scene:
     slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
     _need(slides and len(scene.walls) == walls, what)
     return scene
+
+
+def _stopped(motion: WindowedHistory, scene: Scene, speed: float) -> None:
+    """Raises `Undefined` if the window ends before friction has taken `speed` (m/s)."""
+    reached = scene.floor.friction * scene.gravity * float(motion.channel("t")[-1])
+    if motion.history.overturned_at is None and reached <= speed:
+        raise Undefined("the window ends before the block has stopped")
 
 
 def _braking(scene: Scene) -> float:

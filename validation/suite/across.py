@@ -31,6 +31,7 @@ from rockcheck.scenes.errors import from_validation, printable
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
 from rockcheck.scenes.reading import read_text
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.execute.models import FAMILIES, build
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -358,6 +359,8 @@ def _panel(trend: Trend, moments: Sequence[Moment]) -> Panel:
 #: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
 #: scatter is computed.
 LEAST, FEWEST = 1e-3, 5
+#: Settings that change no motion.
+LIMITS = {"estimate_error", "most_steps", "most_events"}
 
 
 def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
@@ -409,7 +412,20 @@ def experience_of(runs: Sequence[Run]) -> Experience:
     for axis in dict.fromkeys(axis for one in scenes for axis in one):
         numbers = [number for one in scenes for number in one.get(axis, ())]
         domain[axis] = Range(low=min(numbers), high=max(numbers))
-    return Experience(suites=tuple(run.suite for run in runs), trust=trust, domain=domain)
+    settings = {model: _settings_of(model, runs) for model in trust if model in FAMILIES}
+    return Experience(
+        suites=tuple(run.suite for run in runs), trust=trust, settings=settings, domain=domain
+    )
+
+
+def _settings_of(model: str, runs: Iterable[Run]) -> dict[str, tuple[Any, ...]]:
+    """The values of each setting that a model had, but for those that change no motion."""
+    values: defaultdict[str, dict[Any, None]] = defaultdict(dict)
+    for given in [cell.settings for run in runs for cell in run.cells if cell.model == model]:
+        had: Any = build(model, given)
+        for name, value in had.model_dump(exclude=LIMITS, exclude_none=True).items():
+            values[name][value] = None
+    return {name: tuple(found) for name, found in values.items()}
 
 
 def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:

@@ -344,6 +344,17 @@ def test_the_event_based_model_meets_them(name):
             assert "needed" in found[form].note
 
 
+@pytest.mark.parametrize("name", ["sliding", "rebound"])
+@pytest.mark.parametrize(("friction", "duration"), [(0.2, 0.2), (0.0, 1.0)])
+def test_a_block_that_still_slides_has_no_place_where_it_stops(name, friction, duration):
+    scene = load_suite("engines").scenes[name]
+    scene = scene.replace(floor=Floor(friction=friction), duration=duration)
+    history = EventBasedModel(pivot="unilateral").simulate(scene)
+    (figure,) = describe(history, scene=scene, measures=FORMS[name])
+    assert figure.undefined
+    assert "before the block has stopped" in figure.note
+
+
 def test_a_wrong_history_is_seen():
     scene = load_suite("engines").scenes["rocking"]
     heavier = EventBasedModel(pivot="unilateral").simulate(scene.replace(gravity=9.8))

@@ -1,6 +1,7 @@
 """How sure a figure is: draws of inputs, repeats, verdicts."""
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 from rockcheck import (
     Block,
+    ContinuousModel,
     EventBasedModel,
     Floor,
     InputError,
@@ -16,6 +18,7 @@ from rockcheck import (
     Wall,
 )
 from rockcheck.ebm.batch import pack, run_batch
+from rockcheck.engines import MuJoCo
 from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
 from rockcheck.validation.suite.across import bias_and_scatter
@@ -258,6 +261,26 @@ def test_bias_and_scatter_are_recovered_and_cover():
     found = [expected(trust, m) for m in model[2000:]]
     inside = [one.low <= e <= one.high for e, one in zip(truth[2000:], found, strict=True)]
     assert 0.93 <= np.mean(inside) <= 0.97
+
+
+@pytest.mark.parametrize(
+    ("model", "claims"),
+    [
+        (MuJoCo(), True),
+        (MuJoCo(time_step=2e-4), True),
+        (ContinuousModel(), True),
+        (EventBasedModel(estimate_error=True), True),
+        (MuJoCo(settings="default"), False),
+        (MuJoCo(time_step=2e-3), False),
+        (MuJoCo(cone_correction=False), False),
+        (ContinuousModel(damping_rule="paper"), False),
+        (EventBasedModel(impacts="floor-first"), False),
+    ],
+)
+def test_nothing_is_claimed_for_settings_that_the_suites_do_not_have(model, claims):
+    history = model.simulate(BOOKCASE.replace(duration=0.1))
+    with nullcontext() if claims else pytest.raises(InputError, match="with its settings"):
+        history.expected()
 
 
 def test_the_domain_names_the_axis_that_leaves_it():

@@ -245,6 +245,15 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, folder, tmp_
     assert (out / "summary.md").read_text(encoding="utf-8").startswith("# Assessment: cabinet")
 
 
+def test_the_page_says_whose_figures_are_those_of_a_block_that_falls(folder, assess, tmp_path):
+    text = CABINET.replace("amplitude = 5.0", "amplitude = 15.0")
+    (folder / "falls.toml").write_text(text, encoding="utf-8")
+    assess("falls.toml")
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert "of runs that stand" in page
+    assert "Of a block that falls only the speed at the wall is given." in page
+
+
 def test_each_record_has_a_file_of_its_own(folder, assess, tmp_path):
     (folder / "alike").mkdir()
     for name, record in (("a b.csv", "R00.csv"), ("a-b.csv", "R01.csv")):

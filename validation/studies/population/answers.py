@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes.experience import WIDTH, known, outside
+from rockcheck.scenes.experience import WIDTH, outside, trust_of
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.scenes.writing import finite
 from rockcheck.validation.criteria import CRITERIA, Criterion
@@ -600,7 +600,7 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         Column("largest", "largest" if several else "value", digits=4),
         text("unit"),
         text("record", "its record", brief=several),
-        Column("of", "of runs", help="Runs that stand and have the figure.", brief=several),
+        Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
     shown = {q.label: quantities[q.name] | {"unit": _unit(q.unit)} for q in QUANTITIES}
     rows = [[label, *(one[c.name] for c in columns[1:])] for label, one in shown.items()]
@@ -692,7 +692,7 @@ def _models(found: Found) -> list[Block]:
     """How far the other models are from the first, and what the suites know of them."""
     rows = []
     for model, apart in found.apart.items():
-        trust = known().trust.get(model, {}).get("peak_rotation")
+        trust = trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
         rows.append(
             [
                 "floor-first law of impacts" if model == LAW else model,
@@ -774,7 +774,8 @@ def _runs(found: Found) -> Table:
         ],
         "Each run",
         on="page",
-        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows.",
+        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows. Of a block"
+        " that falls only the speed at the wall is given.",
     )
 
 
