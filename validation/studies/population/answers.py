@@ -882,7 +882,15 @@ def file_of(case: str) -> str:
 def _notes(found: Found) -> list[Block]:
     """What else a reader should know."""
     study, drawn = found.study, any(found.drawn.values())
-    said = [f"outside of what the suites cover: {line}" for line in outside(study.own.scene)]
+    beyond: dict[str, list[str]] = {}
+    for case, one in study.cases.items():
+        for line in outside(one.scene):
+            beyond.setdefault(line, []).append(case)
+    said = [
+        f"outside of what the suites cover: {line}"
+        + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
+        for line, cases in beyond.items()
+    ]
     if study.model != study.swift and (found.at_gaps or drawn):
         said.append(f"gaps and draws are played by {study.swift}")
     names = ", ".join(next(iter(study.cases.values())).names)
