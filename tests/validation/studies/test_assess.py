@@ -317,6 +317,18 @@ def test_the_records_are_judged_by_what_the_suites_cover_and_not_what_they_repla
     assert len([one for one in notes if "cover: alpha is" in one]) == 1
 
 
+def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monkeypatch):
+    monkeypatch.setattr(f"{Assessment.__module__}.MOST_RUNS", 4)
+    own = load_uncertain_scene(folder / "uncertain.toml")
+    study = Assessment(own=own, cases=dict.fromkeys("abc", own), samples=8, recorded=True)
+    done = {task: task.play() for case in study.cases for task in study.shown[case]}
+    assert study.gather(done).data["runs"] == 3, "no draws: each as it is"
+    found = study.gather(done | {t: t.play() for t in [*study.drawn["a"], study.drawn["b"][0]]})
+    assert found.data["runs"] == 8
+    notes = [line for block in found.blocks if isinstance(block, Text) for line in block.items]
+    assert any(line.startswith("left out") and line.endswith(": b, c") for line in notes)
+
+
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():
     assert spread([]) == {"median": None, "p16": None, "p84": None, "largest": None}
 
