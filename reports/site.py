@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -109,12 +109,23 @@ def write_site(
     }
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting) + 1)
-    current = {f"{view.slug}.html" for view in pages.views.values()}
+    _remove_pages(folder, {f"{view.slug}.html" for view in pages.views.values()})
+    return folder / INDEX
+
+
+def remove_site(folder: Path) -> None:
+    """Remove the pages of an earlier run, with their figures and data; by their stamps."""
+    _remove_pages(folder)
+    if stamp_in(folder / INDEX):
+        for path in (folder / INDEX, folder / PAGES / FIGURES / f"{PEAKS}.svg"):
+            path.unlink(missing_ok=True)
+
+
+def _remove_pages(folder: Path, current: Set[str] = frozenset()) -> None:
     for page in (folder / PAGES).glob("*.html"):
         if page.name not in current and stamp_in(page):
             for name in (page.name, *_belongings(page)):
                 (folder / PAGES / name).unlink(missing_ok=True)
-    return folder / INDEX
 
 
 def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:

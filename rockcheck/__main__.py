@@ -15,7 +15,8 @@ atexit.register(gc.freeze)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    from rockcheck.commands.cli import INTERRUPTED, main as run
+    from rockcheck.commands.cli import main as run
+    from rockcheck.scenes.progress import INTERRUPTED
 
     code = run(arguments, began=BEGAN)
     if code == INTERRUPTED:  # compiled code may still run in threads, which Python would wait for

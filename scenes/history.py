@@ -262,9 +262,8 @@ class History(Shown):
         import pandas as pd
 
         path = Path(path)
+        check_readable(path)
         shown = printable(path)
-        if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
-            raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
         frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()
@@ -303,6 +302,14 @@ class History(Shown):
             notes=tuple(printable(note, 1000) for note in about.notes),
             uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
             **block,
+        )
+
+
+def check_readable(path: Path) -> None:
+    """Raise `InputError` for a file of an ending that `save` writes and `load` does not read."""
+    if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
+        raise InputError(
+            f"{printable(path)}: a history is read from .csv or .csv.gz, not from {kind}"
         )
 
 

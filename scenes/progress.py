@@ -20,6 +20,8 @@ from threading import Lock
 from typing import Any, Protocol, TypeVar
 
 Result = TypeVar("Result")
+#: Exit code of a run that Ctrl-C ended.
+INTERRUPTED = 130
 
 
 class OnProgress(Protocol):

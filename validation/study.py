@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from rockcheck.scenes.progress import OnProgress, announce, unheard
+from rockcheck.scenes.progress import INTERRUPTED, OnProgress, announce, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.pool import (
@@ -146,7 +146,8 @@ def run(
 
     `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`.
     Tasks that have not begun after `minutes` are left out. Ctrl-C ends the tasks, and what was
-    played is gathered. Raises `InputError` where the folder cannot be used or no cluster answers.
+    played is gathered; the exit code is then `INTERRUPTED`, unless the finding has another. Raises
+    `InputError` where the folder cannot be used or no cluster answers.
     """
     if scheduler is not None:
         check_scheduler(scheduler)
@@ -179,13 +180,16 @@ class _Run:
 
     def finding(self, minutes: float | None) -> Finding:
         until = self.began + 60.0 * minutes if minutes else math.inf
-        complete = True
+        ended = 0
         with self.stack:
             self.stack.callback(THREADS.reset, THREADS.set(self.jobs))
             try:
                 self._play(until)
             except KeyboardInterrupt:
-                complete = False
+                ended = INTERRUPTED
+        complete = not ended and len(self.done) == len(self.known)
+        if minutes and not (ended or complete):
+            announce(f"{self.study.name}: its {minutes:g} minutes are over")
         # In the order of the tasks: a finding must not depend on which ended first.
         found = self.study.gather(
             {task: self.done[task] for task in self.known if task in self.done}
@@ -197,7 +201,8 @@ class _Run:
         return replace(
             found,
             failures={**failed, **found.failures},
-            complete=complete and found.complete and len(self.done) == len(self.known),
+            exit_code=found.exit_code or ended,
+            complete=complete and found.complete,
             made=Made(
                 created=datetime.now(UTC).isoformat(timespec="seconds"),
                 jobs=self.jobs,

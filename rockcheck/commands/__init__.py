@@ -245,8 +245,6 @@ def told(found: Finding, folder: Path | None = None) -> NoReturn:
     if page:
         console().print(f"report: {page}", soft_wrap=True)
     answer(found.as_dict() | {"report": page})
-    if not found.complete and not found.exit_code:
-        raise KeyboardInterrupt
     raise typer.Exit(found.exit_code)
 
 

@@ -25,6 +25,7 @@ import typer.core
 from rockcheck.commands import console, report_file, speaking
 from rockcheck.scenes import InputError, ModelFailure
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.progress import INTERRUPTED
 from rockcheck.validation.suite.results import FAULT
 
 #: The commands, in the order of the help: where each is below this package, a module with
@@ -78,8 +79,6 @@ AT_ONCE = ("scenes", "new", "record", "compare")
 #: Options whose value may be left out: the default, and the pattern of a value.
 BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
-#: Exit code of a run that Ctrl-C ended.
-INTERRUPTED = 130
 EXIT_CODES = {
     0: "done; of a verdict: within tolerance",
     1: "out of tolerance, or an invariant is broken",
@@ -284,7 +283,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
                 f" {where}",
                 FAULT,
             )
-        if code == INTERRUPTED:  # Typer has caught it
+        if code == INTERRUPTED:  # a study has gathered what there is, or Typer has caught it
             return _told("interrupted; what was finished is kept", INTERRUPTED)
         return code if isinstance(code, int) else 0
 

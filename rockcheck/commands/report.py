@@ -138,3 +138,11 @@ def publish(
             wanted=wanted,
             on_progress=on_progress,
         )
+
+
+def withdraw(folder: Path) -> None:
+    """Remove the pages of an earlier run in `folder`: they show other numbers than its run.json."""
+    from rockcheck.reports.site import remove_site
+
+    with _turn(folder):
+        remove_site(folder)

@@ -27,7 +27,7 @@ from rockcheck.commands import (
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.commands.report import keep, publish
+from rockcheck.commands.report import keep, publish, withdraw
 from rockcheck.scenes import InputError
 from rockcheck.scenes.errors import printable
 from rockcheck.validation.finding import Finding, Text
@@ -146,6 +146,8 @@ def run(
     if report:
         with progress("pages") as on_progress:
             page = publish(folder, jobs=played.jobs, on_progress=on_progress)
+    else:
+        withdraw(folder)
     console().print(f"report: {page}", soft_wrap=True)
     more = {} if suite.judged else {"left_out": suite.left_out}
     answer(summary(finished) | more | {"report": page})

@@ -11,9 +11,10 @@ from rockcheck.scenes.recordings import Reading, Recording, read_components
 #: Where the records lie that come with the package.
 RECORDS = Path(str(resources.files("rockcheck.scenes"))) / "data" / "records"
 #: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net)
-#: are vertical, too.
+#: are vertical, too. No network calls a horizontal component V or Z.
 _VERTICAL = re.compile(
-    r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z)", re.IGNORECASE
+    r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z|[VZ])",
+    re.IGNORECASE,
 )
 _KIKNET = ("3", "6")
 #: The part of a file's name that marks a vertical component, with the separator before it.
@@ -175,4 +176,4 @@ def is_vertical(path: Path, recording: Recording) -> bool:
     if recording.form.startswith("K-NET") and recording.component in _KIKNET:
         return True
     channel = "" if recording.form in ("CSV", "table") else recording.component
-    return channel in ("V", "Z") or bool(_VERTICAL.fullmatch(channel or path.stem))
+    return bool(_VERTICAL.fullmatch(channel or path.stem))

@@ -180,3 +180,18 @@ def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
         "rockcheck: runs.jsonl, line 2: not a run of a history"
     )
     assert Path("runs.jsonl").read_text(encoding="utf-8") == f"\n{line}\n"
+
+
+def test_without_a_report_the_pages_of_the_run_before_are_gone():
+    """They would show other numbers than run.json. Files of the user's stay."""
+    assert main(["report", "a"]) == 0
+    mine = Path("a/pages/mine.html")
+    mine.write_text("my own", encoding="utf-8")
+    assert Path("a/pages/short.html").is_file()
+    ran("a", 0.0012)
+    assert not Path("a/index.html").exists()
+    left = [path for path in Path("a/pages").rglob("*") if path.is_file()]
+    assert [path for path in left if path.parent.name != "assets"] == [mine]
+    Path("a/index.html").write_text("my own", encoding="utf-8")
+    ran("a", 0.001)
+    assert Path("a/index.html").is_file()

@@ -61,6 +61,15 @@ def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
         assert f"\n| {code} | " in page, code
 
 
+def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monkeypatch, typed):
+    """What is missing is played by the next call."""
+    monkeypatch.setattr("rockcheck.commands.studies.MINUTES", 1e-9)
+    out, err = typed("benchmark", "skipping", "--quick", "--jobs", "1", "--out", str(tmp_path))
+    assert "benchmark: its 1e-09 minutes are over" in err
+    assert "not complete: the same command goes on where it ended" in out
+    assert "interrupted" not in out + err
+
+
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
     ("words", "expected"),

@@ -151,6 +151,10 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(folde
         ("station.V2", "V2", "90 deg", False),
         ("table-up.csv", "CSV", "acceleration_g", True),
         ("cup.csv", "CSV", "acceleration_g", False),
+        ("S1_V.csv", "CSV", "acceleration_g", True),
+        ("S1-Z.txt", "table", "column 2", True),
+        ("S1_V2.csv", "CSV", "acceleration_g", False),
+        ("topaz.csv", "CSV", "acceleration_g", False),
         ("setup.txt", "table", "column 2", False),
     ],
 )

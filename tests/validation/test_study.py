@@ -102,7 +102,7 @@ def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> N
 
 def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path: Path, log: Path) -> None:
     found = run(squares([2.0, 16.0, 3.0], log), tmp_path / "out", jobs=0)
-    assert not found.complete
+    assert (found.complete, found.exit_code) == (False, 130)
     assert found.data == {"count": 1}
     assert run(squares([2.0, 3.0], log), tmp_path / "out", jobs=0).data == {"count": 2}
     assert played(log) == [2.0, 3.0, 16.0]
@@ -110,7 +110,7 @@ def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path: Path, lo
 
 def test_what_there_is_no_time_for_is_left_out(tmp_path: Path, log: Path) -> None:
     found = run(squares([2.0], log), tmp_path / "out", jobs=0, minutes=1e-9)
-    assert not found.complete
+    assert (found.complete, found.exit_code) == (False, 0)
     assert played(log) == []
 
 

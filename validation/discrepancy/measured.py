@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.history import block_fields, outcome_of
+from rockcheck.scenes.history import block_fields, check_readable, outcome_of
 from rockcheck.scenes.reading import read_table
 
 Floats = NDArray[np.float64]
@@ -110,6 +110,7 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     `offset` (s) is added to its times. Raises `InputError`, naming file and column, for whatever is
     missing, unknown, doubled or not finite.
     """
+    check_readable(Path(path))
     shown = printable(path)
     columns: dict[str, tuple[str, float]] = {}
     for column in _heading(Path(path), shown):

@@ -340,7 +340,7 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
         "unavailable": Skipped,
     }
     ran = _case(place, "runs", ways.get(cell.status), cell.reason)
-    ran.time = cell.cost.worker_seconds
+    ran.time = 0.0 if cell.read_back else cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
         unsure = None if cell.numerical.converged else Skipped

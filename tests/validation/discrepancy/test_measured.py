@@ -101,6 +101,15 @@ def test_faults_are_named(tmp_path, head, fault):
         )
 
 
+@pytest.mark.parametrize("kind", [".json", ".mat", ".parquet"])
+def test_an_ending_that_is_written_and_not_read_is_named(tmp_path, kind):
+    """Whatever the file holds: Parquet is no text at all."""
+    path = tmp_path / f"run{kind}"
+    path.write_bytes(b'PAR1\n"')
+    with pytest.raises(InputError, match=rf"from \.csv or \.csv\.gz, not from \{kind}"):
+        read_measured(path)
+
+
 def test_a_measured_history_is_judged_like_a_model(tmp_path, typed):
     path = tmp_path / "mine.toml"
     path.write_text(SUITE, encoding="utf-8")

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from rockcheck.scenes import Event, Record, load_scene
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.motion import motion_of, spread, wall_speeds
+from rockcheck.validation.finding import Text
 from rockcheck.validation.studies.population.assess import Assessment
 
 CABINET = """
@@ -309,6 +311,31 @@ def test_a_run_that_was_interrupted_is_not_called_unsure(folder):
     own = load_uncertain_scene(folder / "cabinet.toml")
     study = Assessment(own=own, cases={"cabinet": own})
     assert study.gather({}).exit_code == 0
+
+
+def test_the_records_are_judged_by_what_the_suites_cover_and_not_what_they_replace(folder):
+    own = load_uncertain_scene(folder / "cabinet.toml")
+    record = noise(0)
+    shaken = {
+        name: replace(own, scene=own.scene.replace(excitation=record.scaled(most / record.peak)))
+        for name, most in (("weak", 0.2), ("strong", 0.6))
+    }
+    found = Assessment(own=own, cases=shaken, recorded=True).gather({})
+    notes = [line for block in found.blocks if isinstance(block, Text) for line in block.items]
+    assert [one.endswith("(weak)") for one in notes if "peak acceleration" in one] == [True]
+    assert len([one for one in notes if "cover: alpha is" in one]) == 1
+
+
+def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monkeypatch):
+    monkeypatch.setattr(f"{Assessment.__module__}.MOST_RUNS", 4)
+    own = load_uncertain_scene(folder / "uncertain.toml")
+    study = Assessment(own=own, cases=dict.fromkeys("abc", own), samples=8, recorded=True)
+    done = {task: task.play() for case in study.cases for task in study.shown[case]}
+    assert study.gather(done).data["runs"] == 3, "no draws: each as it is"
+    found = study.gather(done | {t: t.play() for t in [*study.drawn["a"], study.drawn["b"][0]]})
+    assert found.data["runs"] == 8
+    notes = [line for block in found.blocks if isinstance(block, Text) for line in block.items]
+    assert any(line.startswith("left out") and line.endswith(": b, c") for line in notes)
 
 
 def test_a_scene_in_which_nothing_is_known_of_a_figure_has_none():

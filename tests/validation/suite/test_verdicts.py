@@ -97,6 +97,13 @@ def test_a_run_without_a_fault_is_green():
     assert totals(root) == {"tests": 2, "failures": 0, "errors": 0}
 
 
+def test_a_cell_that_was_read_back_took_no_time():
+    ran = cell("a", "m", check(0.25)).model_copy(update={"cost": CostRecord(worker_seconds=7.5)})
+    for read_back, seconds in ((False, 7.5), (True, 0.0)):
+        root = ET.fromstring(junit(run_of(ran.model_copy(update={"read_back": read_back}))))
+        assert float(root.find("testsuite").get("time")) == seconds
+
+
 def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
     """A case of its own, beside the run's: green where the run has converged, none where nothing
     was asked for."""

@@ -136,7 +136,7 @@ class Asked:
 class Found:
     """The runs of an assessment, by the case: the scene under each of its motions.
 
-    `drawn` has the draws of each case (empty: none were asked for); `at_gaps` the runs at each gap
+    `drawn` has the draws of each case with all of them; `at_gaps` the runs at each gap
     (m) and `free` those without the wall that have a motion; `others` the runs by other models;
     `sure` how sure a run is, "" the scene's own.
     """
@@ -152,11 +152,9 @@ class Found:
 
     @cached_property
     def runs(self) -> dict[str, list[Ran]]:
-        """By case, the runs that count: its draws, or itself."""
-        return {
-            case: [run for run in self.drawn.get(case) or played.runs[:1] if not run.reason]
-            for case, played in self.shown.items()
-        }
+        """By case, the runs that count: its draws, or, where no case has all, itself."""
+        counted = self.drawn or {case: played.runs[:1] for case, played in self.shown.items()}
+        return {case: [run for run in runs if not run.reason] for case, runs in counted.items()}
 
     @cached_property
     def each(self) -> list[tuple[str, Ran]]:
@@ -370,7 +368,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
 
 def _by_inputs(found: Found, peaks: Sequence[Sequence[float]]) -> list[float]:
     """Variances of the peak by the draws of each case, or by those of the single run."""
-    if any(found.drawn.values()):
+    if found.drawn:
         return [float(np.var(some)) for some in peaks]
     own = found.sure.get("")
     drawn = own.inputs.figures[:1] if own and own.inputs else []
@@ -474,8 +472,8 @@ def _fall(found: Found, overturning: Mapping[str, Any]) -> str:
     if count == 1:
         outcome = found.each[0][1].outcome
         return f"{name} {FATES.get(outcome, outcome.replace('overturned ', 'overturns to the '))}."
-    under = f"{len(found.shown)} records" if study.recorded else "its own base motion"
-    draws = f", {count} runs," if count > len(found.shown) else ""
+    under = f"{len(found.runs)} records" if study.recorded else "its own base motion"
+    draws = f", {count} runs," if count > len(found.runs) else ""
     share, low, high = (f"{100.0 * overturning[key]:.3g} %" for key in INTERVAL)
     return (
         f"{name} under {under}{draws} overturns in {overturning['count']} of {count}"
@@ -552,7 +550,7 @@ def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[st
 
 def input_shares(found: Found) -> dict[str, float]:
     """Squared correlation of the peak with each number that was drawn, within the cases."""
-    whole = [runs for runs in found.drawn.values() if runs and not any(run.reason for run in runs)]
+    whole = [runs for runs in found.drawn.values() if not any(run.reason for run in runs)]
     if not whole:
         return {}
     peaks = np.array([[run.peak for run in runs] for runs in whole])
@@ -590,7 +588,7 @@ def _outcomes(found: Found, overturning: Mapping[str, Any]) -> Table:
 
 
 def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
-    several = len(found.shown) > 1 or any(found.drawn.values())
+    several = len(found.shown) > 1 or bool(found.drawn)
     columns = [
         text("quantity", "how far it moves"),
         *(
@@ -882,8 +880,18 @@ def file_of(case: str) -> str:
 
 def _notes(found: Found) -> list[Block]:
     """What else a reader should know."""
-    study, drawn = found.study, any(found.drawn.values())
-    said = [f"outside of what the suites cover: {line}" for line in outside(study.own.scene)]
+    study, drawn = found.study, found.drawn
+    beyond: dict[str, list[str]] = {}
+    for case, one in study.cases.items():
+        for line in outside(one.scene):
+            beyond.setdefault(line, []).append(case)
+    said = [
+        f"outside of what the suites cover: {line}"
+        + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
+        for line, cases in beyond.items()
+    ]
+    if drawn and (without := [case for case in study.cases if case not in drawn]):
+        said.append(f"left out, since not all of its draws were played: {', '.join(without)}")
     if study.model != study.swift and (found.at_gaps or drawn):
         said.append(f"gaps and draws are played by {study.swift}")
     names = ", ".join(next(iter(study.cases.values())).names)

@@ -161,7 +161,11 @@ class Assessment(Asked, Study):
             Found(
                 study=self,
                 shown=first(self.shown),
-                drawn={case: runs(tasks) for case, tasks in self.drawn.items()},
+                drawn={
+                    case: some
+                    for case, tasks in self.drawn.items()
+                    if len(some := runs(tasks)) == len(self.draws) > 0
+                },
                 free=at_gaps.pop(np.inf, []),
                 at_gaps=at_gaps,
                 others={
