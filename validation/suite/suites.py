@@ -410,6 +410,8 @@ def _check_names(
         (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
     ]
     faults += [(one in scenes, "ensemble.name", f"{one!r} is a scene, too") for one in ensembles]
+    count = Counter(one.name for one in given.ensemble)
+    faults += [(n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()]
     for wrong, key, said in faults:
         if wrong:
             raise InputError(said, key)
