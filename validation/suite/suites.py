@@ -205,10 +205,9 @@ class Suite:
     def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
         """All ensembles with the scene that they are drawn from, model by model."""
         return (
-            (ensemble, base, model)
+            (*suite.ensembles[name], suite.models[model])
             for suite in self.parts
-            for ensemble, base in suite.ensembles.values()
-            for model in suite.models.values()
+            for name, model in _played(suite.ensembles, suite.models)
         )
 
     def only(self, scene: str, model: str) -> Suite:

@@ -141,6 +141,13 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
     assert type(run).load(tmp_path / "out") == run
 
 
+def test_a_measured_history_takes_no_part_in_an_ensemble(suite_file):
+    table = '[models.table]\nmodel = "measured"\nfiles = { shelf = "run1.csv" }\n[require]'
+    suite_file.write_text(SUITE.replace("[require]", table), encoding="utf-8")
+    suite = load_suite(suite_file, allow_code=OWN)
+    assert [work.label for *_, work in suite.ensemble_cells()] == ["still", "near", "broken"]
+
+
 def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
     suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
     first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
