@@ -114,14 +114,11 @@ def test_a_planted_fault_fails_just_what_it_should(planted, play, failing):
     assert verdicts(planted(play), "fail", "error") == failing
 
 
-@pytest.mark.parametrize(
-    ("id", "value", "said"),
-    [("RC-05", 1.00003, "1.00003, 1 ± 1e-05"), ("RC-02", math.nan, "never")],
-)
-def test_a_wrong_value_is_not_shown_as_the_right_one(id, value, said):
-    verdict, reason = PHENOMENA[id].judge(value)
-    assert verdict == "fail"
-    assert reason.startswith(said)
+def test_a_wrong_value_is_not_shown_as_the_right_one():
+    for id, value, said in (("RC-05", 1.00003, "1.00003, 1 ± 1e-05"), ("RC-02", math.nan, "never")):
+        verdict, reason = PHENOMENA[id].judge(value)
+        assert verdict == "fail"
+        assert reason.startswith(said)
 
 
 def test_an_engine_at_its_best_conforms(right):
