@@ -303,10 +303,9 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
-        text = str(error)
-        raise InputError(
-            text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}"
-        ) from None
+        text, shown = str(error), printable(path)
+        told = text.startswith((printable(path.parent), f"{shown}: "))
+        raise InputError(text if told else f"{shown}: {text}") from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
@@ -408,8 +407,7 @@ def _check_names(
         (not models, "models", "no model; at least the reference is needed"),
         (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
     ]
-    faults += [(one in scenes, "ensemble.name", f"{one!r} is a scene, too") for one in ensembles]
-    count = Counter(one.name for one in given.ensemble)
+    count = Counter((*scenes, *(one.name for one in given.ensemble)))
     faults += [(n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()]
     for wrong, key, said in faults:
         if wrong:
