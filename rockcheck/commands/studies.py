@@ -88,12 +88,14 @@ def stress(
     Exit 1 where an event-based model breaks an invariant.
     """
     from rockcheck.validation.studies.stress.players import PLAYERS
-    from rockcheck.validation.studies.stress.study import Stress, What
+    from rockcheck.validation.studies.stress.study import Stress, What, places
 
     part: What = one_of("stress", what, get_args(What))
     for name in model or ():
         if missing := models.not_installed(one_of("model", name, PLAYERS).split()[0]):
             raise NotInstalled(missing, name)
+    if part == "maps" and not places(quick, model or ()):
+        raise InputError("maps are of engines and cm: an event-based model has no step", "--model")
     tell_missing()
     studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
 

@@ -203,6 +203,8 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     study = Stress("maps", quick=True)
     work = study.tasks({})
     assert work == places(quick=True)
+    only = Stress("all", quick=True, runs=1, models=("ebm", "cm")).tasks({})
+    assert {one.line for one in only if isinstance(one, Place)} == {"cm", "cm paper"}
     done: dict = {
         task: Still(task.line, task.at, 5.0, 5e-3, {"creep": 1e-3})
         if task.at in CASES
@@ -216,6 +218,7 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     assert list(found.table("steps-shaking").records()[-1].values())[-1] is None
     assert {row["creep"] for row in found.table("stand-still").records()} == {1e-3}
     assert (tmp_path / "figures" / "stable-steps.svg").exists()
+    assert "(0.001, with adaptive steps 0.01)" in (tmp_path / "index.html").read_text()
     with (tmp_path / "stable-steps.csv").open() as stream:
         assert len(list(csv.reader(stream))) == 1 + sum(
             isinstance(one, Stable) for one in done.values()

@@ -43,7 +43,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, StringConstraints, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from rockcheck.scenes import InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive
@@ -160,6 +160,8 @@ class Distribution(Frozen):
     def _one(self) -> Distribution:
         if (self.uniform is None) == (self.lognormal is None):
             raise InputError("give exactly one of uniform, lognormal")
+        if self.uniform is not None and self.uniform[0] > self.uniform[1]:
+            raise InputError("the lower end comes first", "uniform")
         return self
 
     def draw(self, chance: np.random.Generator) -> float:
@@ -170,10 +172,22 @@ class Distribution(Frozen):
         return float(self.lognormal[0] * np.exp(self.lognormal[1] * chance.standard_normal()))
 
 
+def _never_negative(given: Distribution | None) -> Distribution | None:
+    if given is not None and given.uniform is not None and given.uniform[0] < 0.0:
+        raise InputError("the lower end must be 0 or more", "uniform")
+    return given
+
+
+def _positive(given: Distribution) -> Distribution:
+    if given.uniform is not None and given.uniform[0] <= 0.0:
+        raise InputError("the lower end must be more than 0", "uniform")
+    return given
+
+
 class Pulse(Frozen):
     """A Ricker pulse of random phase: `period` (s) and `amplitude` (m/s^2)."""
 
-    period: Distribution
+    period: Annotated[Distribution, AfterValidator(_positive)]
     amplitude: Distribution
 
     def draw(self, chance: np.random.Generator) -> Record:
@@ -224,8 +238,8 @@ class Ensemble(Frozen):
     #: Scenes that one worker plays in one go.
     batch: Annotated[int, Field(ge=1)] = 25
     scene: dict[str, Any]
-    friction: Distribution | None = None
-    gap: Distribution | None = None
+    friction: Annotated[Distribution | None, AfterValidator(_never_negative)] = None
+    gap: Annotated[Distribution | None, AfterValidator(_never_negative)] = None
     pulse: Pulse | None = None
     noise: Noise | None = None
 

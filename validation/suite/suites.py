@@ -205,10 +205,9 @@ class Suite:
     def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
         """All ensembles with the scene that they are drawn from, model by model."""
         return (
-            (ensemble, base, model)
+            (*suite.ensembles[name], suite.models[model])
             for suite in self.parts
-            for ensemble, base in suite.ensembles.values()
-            for model in suite.models.values()
+            for name, model in _played(suite.ensembles, suite.models)
         )
 
     def only(self, scene: str, model: str) -> Suite:
@@ -304,10 +303,9 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
-        text = str(error)
-        raise InputError(
-            text if text.startswith(printable(path.parent)) else f"{printable(path)}: {text}"
-        ) from None
+        text, shown = str(error), printable(path)
+        told = text.startswith((printable(path.parent), f"{shown}: "))
+        raise InputError(text if told else f"{shown}: {text}") from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
@@ -409,7 +407,8 @@ def _check_names(
         (not models, "models", "no model; at least the reference is needed"),
         (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
     ]
-    faults += [(one in scenes, "ensemble.name", f"{one!r} is a scene, too") for one in ensembles]
+    count = Counter((*scenes, *(one.name for one in given.ensemble)))
+    faults += [(n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()]
     for wrong, key, said in faults:
         if wrong:
             raise InputError(said, key)

@@ -1,10 +1,14 @@
 """The same spectra by the other models."""
 
+import dataclasses
 import json
 
 import numpy as np
+import pytest
 
 from rockcheck.ebm import Spectrum
+from rockcheck.scenes import Floor
+from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
@@ -130,6 +134,15 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(monkeypa
     table = list(agreement.blocks(found, list(spectra), came=False))[1]
     nodes = [row["nodes"] for row in table.records()]
     assert nodes == [80, 80, 16, 8]
+
+
+@pytest.mark.skipif(bool(not_installed("drake")), reason="drake is not installed")
+def test_an_engine_without_restitution_does_not_play_a_floor_that_bounces():
+    engine = Request(model="drake")
+    free = next(panel for panel in paper_panels() if panel.wall is None)
+    bouncy = free.scene.replace(floor=Floor(friction=0.3, restitution=0.5))
+    assert agreement.plays(engine, free)
+    assert not agreement.plays(engine, dataclasses.replace(free, scene=bouncy))
 
 
 def test_the_command_compares_models(tmp_path, monkeypatch, told):

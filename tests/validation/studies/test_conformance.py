@@ -114,6 +114,13 @@ def test_a_planted_fault_fails_just_what_it_should(planted, play, failing):
     assert verdicts(planted(play), "fail", "error") == failing
 
 
+def test_a_wrong_value_is_not_shown_as_the_right_one():
+    for id, value, said in (("RC-05", 1.00003, "1.00003, 1 ± 1e-05"), ("RC-02", math.nan, "never")):
+        verdict, reason = PHENOMENA[id].judge(value)
+        assert verdict == "fail"
+        assert reason.startswith(said)
+
+
 def test_an_engine_at_its_best_conforms(right):
     assert (right.exit_code, verdicts(right, "fail", "error")) == (0, set())
     assert verdicts(right, "reported") == {"RC-18"}

@@ -141,6 +141,13 @@ def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
     assert type(run).load(tmp_path / "out") == run
 
 
+def test_a_measured_history_takes_no_part_in_an_ensemble(suite_file):
+    table = '[models.table]\nmodel = "measured"\nfiles = { shelf = "run1.csv" }\n[require]'
+    suite_file.write_text(SUITE.replace("[require]", table), encoding="utf-8")
+    suite = load_suite(suite_file, allow_code=OWN)
+    assert [work.label for *_, work in suite.ensemble_cells()] == ["still", "near", "broken"]
+
+
 def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
     suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
     first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
@@ -169,6 +176,33 @@ def samples(
     safe = ("at rest",) * len(reference)
     ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
     return Samples(Sample(np.array(reference), safe), Sample(np.array(candidate), ends))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[0.3, 0.8]", "[0.8, 0.3]", "friction.uniform: the lower end comes first"),
+        ("[0.3, 0.8]", "[-0.3, 0.8]", "friction.uniform: the lower end must be 0 or more"),
+        ("lognormal = [0.05", "uniform = [-0.05", "gap.uniform: the lower end must be 0 or more"),
+        (
+            "noise = { amplitude = { uniform = [4.0, 5.0] }, frequency = 2.5, damping = 0.6,"
+            " strong = 0.5 }",
+            "pulse = { period = { uniform = [0, 1] }, amplitude = { uniform = [4, 5] } }",
+            "period.uniform: the lower end must be more than 0",
+        ),
+        (
+            "[tolerances.crowd.near.still]",
+            '[[ensemble]]\nname = "crowd"\nscene = { block = { half_width = 0.4,'
+            " half_height = 1.5 }, floor = { friction = 0.5 }, duration = 1 }\n"
+            "[tolerances.crowd.near.still]",
+            "ensemble.name: 'crowd' is named twice",
+        ),
+    ],
+)
+def test_what_no_scene_can_have_is_refused_at_once(suite_file, old, new, said):
+    suite_file.write_text(SUITE.replace(old, new), encoding="utf-8")
+    with pytest.raises(InputError, match=re.escape(said)):
+        load_suite(suite_file, allow_code=OWN)
 
 
 def test_the_fallen_are_beyond_all_others():

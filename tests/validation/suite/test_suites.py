@@ -1,5 +1,7 @@
 """Suite files: combinations of scenes, variants of models, and faults told in one line."""
 
+from pathlib import Path
+
 import pytest
 
 from rockcheck.scenes import InputError
@@ -114,3 +116,12 @@ def test_faults_are_one_line_with_the_file(tmp_path, text, fault):
 def test_an_unknown_suite_suggests_the_nearest():
     with pytest.raises(InputError, match="did you mean 'paper'"):
         load_suite("papre")
+
+
+def test_the_file_is_named_once(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = MODELS + SHELF + "[tolerances.shelf.ebm.figures]\nhighest_hop = { limit = -1 }\n"
+    Path("mine.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError) as told:
+        load_suite("mine.toml")
+    assert str(told.value).count("mine.toml") == 1

@@ -70,8 +70,10 @@ class Phenomenon:
             return "reported", "reported, not judged"
         if abs(value - self.target) <= self.limit:
             return "pass", ""
-        right = f"{value:.4g}, {self.target:g} ± {self.limit:g} {self.unit} is right"
-        return "fail", f"{right}. {self.means} Look at: {self.cure}."
+        digits = 6 if 0.0 < self.limit < 1e-3 else 4
+        seen = "never seen" if math.isnan(value) else f"{value:.{digits}g}"
+        right = f"{self.target:g} ± {self.limit:g} {self.unit} is right"
+        return "fail", f"{seen}, {right}. {self.means} Look at: {self.cure}."
 
 
 def _when(t: FloatArray, values: FloatArray, level: float) -> float:

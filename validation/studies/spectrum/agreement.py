@@ -83,11 +83,12 @@ def candidates() -> tuple[str, ...]:
 def plays(request: Request, panel: Panel) -> bool:
     """Whether the model can play the contacts of the panel.
 
-    An engine without restitution does not play walls that bounce.
+    An engine without restitution does not play walls or a floor that bounce.
     """
     model = build(request.model, request.settings)
     lacks = model.lacks() if isinstance(model, Engine) else ()
-    return "restitution" not in lacks or panel.wall is None or panel.wall.restitution == 0.0
+    struck = [panel.scene.floor.restitution, *(wall.restitution for wall in panel.scene.walls)]
+    return "restitution" not in lacks or not any(struck)
 
 
 def agree(

@@ -276,12 +276,17 @@ class Place(Task):
         return Stable(self.line, self.at, self.value, best, fault)
 
 
-def places(quick: bool = False) -> list[Place]:
+def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
     """The maps of all `SETUPS` that are installed, the longest tasks first.
 
-    `quick` has fewer values, steps and seconds.
+    `quick` has fewer values, steps and seconds; with `models` only theirs.
     """
-    lines = [label for label, setup in SETUPS.items() if not not_installed(setup.family)]
+    wanted = {model.split()[0] for model in models}
+    lines = [
+        label
+        for label, setup in SETUPS.items()
+        if not not_installed(setup.family) and (not wanted or setup.family in wanted)
+    ]
     how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
     still = [
         Place(
@@ -331,7 +336,7 @@ class Stress(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """Chunks and places; smaller tasks for those that are lost; then failures are shrunk."""
         lost = [task for task, one in done.items() if isinstance(one, Failure)]
-        work: list[Task] = [*self._chunks(), *(places(self.quick) if self.what != "runs" else ())]
+        work: list[Task] = [*self._chunks(), *(self._places() if self.what != "runs" else ())]
         work += [part for task in lost for part in parts(task)]
         if any(task not in done for task in work):
             return work
@@ -362,6 +367,9 @@ class Stress(Study):
             ]
         return sorted(found, key=lambda one: PLAYERS[one.model].event_based)
 
+    def _places(self) -> list[Place]:
+        return places(self.quick, self.models)
+
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """Totals of the models; a run whose process was lost counts as one that does not end."""
         found = {label: RunTotals(model=label) for label in PLAYERS}
@@ -377,7 +385,7 @@ class Stress(Study):
         """The tables, the maps, and the scenes of failures."""
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
-        at = [done[place] for place in places(self.quick) if place in done]
+        at = [done[place] for place in self._places() if place in done]
         stable = [one for one in at if isinstance(one, Stable)]
         still = [one for one in at if isinstance(one, Still)]
         runs = sum(one.counts["runs"] for one in totals)
@@ -390,7 +398,7 @@ class Stress(Study):
             f" {said if broken else 'no failure of an event-based model'}",
             [
                 *(_runs(totals) if totals else ()),
-                *(_maps(stable) if stable else ()),
+                *(_maps(stable, self.quick) if stable else ()),
                 *([_stood(still)] if still else ()),
             ],
             data={
@@ -523,7 +531,9 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     ]
 
 
-def _maps(found: Sequence[Stable]) -> list[Plot | Table]:
+def _maps(found: Sequence[Stable], quick: bool) -> list[Plot | Table]:
+    steps = QUICK_STEPS if quick else STEPS
+    adaptive = min(one for one in steps if one >= ADAPTIVE_FINEST)
     lines = list(dict.fromkeys(one.line for one in found))
     drawn = [
         _by_axis(axis, lines, [one for one in found if one.axis == axis]) for axis in AXIS_WORDS
@@ -537,7 +547,8 @@ def _maps(found: Sequence[Stable]) -> list[Plot | Table]:
         " wall, R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of 3 g tan α, one thing"
         " changed. A run is stable if it does not blow up, no corner sinks deeper than 0.02 R and"
         " the distance of a step, and the energy gained without a source is below a tenth of all"
-        " work. “none”: not even the finest step is stable (3e-4, with adaptive steps 3e-3).",
+        f" work. “none”: not even the finest step is stable ({steps[-1]:g}, with adaptive steps"
+        f" {adaptive:g}).",
     )
     return [plot, *(table for _, table in drawn), table_of("stable-steps", Stable, found)]
 
