@@ -201,6 +201,7 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     assert apart(awake, reference) < 2e-2 * scene.block.alpha
 
 
+@pytest.mark.slow
 @pytest.mark.needs("drake")
 @pytest.mark.parametrize("settings", ["best", "default"])
 def test_drakes_plant_is_made_before_the_time_is_taken(settings, free_rocking):

@@ -357,7 +357,8 @@ class Scripted(Engine):
     answers: dict[str, object]
 
     def rigid_world(self, scene):
-        return SimpleNamespace(place=lambda *state: None, close=lambda: None, **self.answers)
+        nothing = dict.fromkeys(("place", "close", "ready"), lambda *given: None)
+        return SimpleNamespace(**nothing, **self.answers)
 
     stock_world = rigid_world
 
