@@ -4,11 +4,9 @@ import dataclasses
 import json
 
 import numpy as np
-import pytest
 
 from rockcheck.ebm import Spectrum
 from rockcheck.scenes import Floor
-from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
@@ -136,9 +134,8 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(monkeypa
     assert nodes == [80, 80, 16, 8]
 
 
-@pytest.mark.skipif(bool(not_installed("drake")), reason="drake is not installed")
 def test_an_engine_without_restitution_does_not_play_a_floor_that_bounces():
-    engine = Request(model="drake")
+    engine = Request(model="mujoco", settings={"settings": "default", "time_step": 1e-3})
     free = next(panel for panel in paper_panels() if panel.wall is None)
     bouncy = free.scene.replace(floor=Floor(friction=0.3, restitution=0.5))
     assert agreement.plays(engine, free)
