@@ -122,7 +122,9 @@ def _grazes(block, base, run):
         return False
     back = slope(a, Row.OMEGA, order - 1, tau)
     past = 2.0 * abs(motion.w) / back
-    energy = swing_error(state.tolerance_rad) * state.swing
+    # A wall's strike moves the block onto the wall: its time is known to an instant.
+    struck = INSTANT * back if block.walls else 0.0
+    energy = (swing_error(state.tolerance_rad) + struck) * state.swing
     little = 0.5 * motion.w * motion.w < energy * min(1.0, 10.0 * back)
     if not (little and 0.0 < past <= state.length - tau):
         return False
