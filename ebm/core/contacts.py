@@ -86,10 +86,9 @@ def closed_wall(block, motion, side, bottom):
     """
     if not abs(wall_gap(block, motion, side)) < CLOSED:
         return False
-    phi, faces = (
-        side * motion.theta,
-        side_of(block, side),
-    )  # positive: tips toward that wall, top corner
+    # Positive: tips toward that wall, top corner.
+    phi = side * motion.theta
+    faces = side_of(block, side)
     if phi < 0.0 or (phi == 0.0 and bottom):
         arm = -faces.radius * math.cos(faces.alpha + abs(phi))
     else:
@@ -107,10 +106,9 @@ def floor_gap(block, motion):
 @inner_kernel
 def closed_floor(block, motion):
     """Whether the lower corner rests on the floor."""
-    turns, side = (
-        motion.w if motion.theta > 0.0 or (motion.theta == 0.0 and motion.w > 0.0) else -motion.w,
-        lower(block, motion),
-    )
+    tips_left = motion.theta > 0.0 or (motion.theta == 0.0 and motion.w > 0.0)
+    turns = motion.w if tips_left else -motion.w
+    side = lower(block, motion)
     rate = motion.vy - side.radius * math.sin(side.alpha - abs(motion.theta)) * turns
     return abs(floor_gap(block, motion)) < CLOSED and abs(rate) < slowest(motion.w)
 

@@ -54,9 +54,8 @@ def expand(block, base, run, reach):
         if not free:
             last = max(last, series.size_of(a, Row.XI, Row.Y, order))
             before = max(before, series.size_of(a, Row.XI, Row.Y, order - 1))
-        if (
-            not free or base.vertical.form.kind != Shape.STILL
-        ):  # forces follow the base acceleration
+        # Forces follow the base acceleration.
+        if not free or base.vertical.form.kind != Shape.STILL:
             last = max(last, series.size_of(a, Row.U, Row.G, order))
             before = max(before, series.size_of(a, Row.U, Row.G, order - 1))
         state.length = series.longest_step(last, before, order, state.last_term_rad, reach)

@@ -124,23 +124,15 @@ def _fill_gaussian(g, t, sign, n, a, row):
     q1 = size * (g.form.c1 + tau * (2.0 * g.form.c2 + 3.0 * tau * g.form.c3))
     q2 = size * (g.form.c2 + 3.0 * tau * g.form.c3)
     q3 = size * g.form.c3
-    bell, e1, e2, e3 = (
-        1.0,
-        0.0,
-        0.0,
-        0.0,
-    )  # coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell
+    # Coefficients k to k-3 of the bell by its value, which obeys bell' = -2 rate tau bell.
+    bell, e1, e2, e3 = 1.0, 0.0, 0.0, 0.0
     spread = -2.0 * g.form.rate
     fall = spread * tau
     for k in range(n + 1):
         a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
         r = _RECIPROCAL[k + 1]
-        bell, e1, e2, e3 = (
-            (fall * r) * bell + (spread * r) * e1,
-            bell,
-            e1,
-            e2,
-        )  # two operations from one coefficient to the next
+        # Two operations from one coefficient to the next.
+        bell, e1, e2, e3 = (fall * r) * bell + (spread * r) * e1, bell, e1, e2
 
 
 @inner_kernel
@@ -225,9 +217,8 @@ def _next_extremum_of_pulse(f, t):
     # for ever.
     past = t - f.centre + _SAME / math.sqrt(f.rate)
     best = NEVER
-    if (
-        f.c1 == 0.0 and f.c3 == 0.0
-    ):  # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2)
+    # (c0 + c2 tau^2) bell: at 0 and where c2 = rate (c0 + c2 tau^2).
+    if f.c1 == 0.0 and f.c3 == 0.0:
         a, b, c = 0.0, -f.rate * f.c2, f.c2 - f.rate * f.c0
         if past < 0.0:
             best = 0.0
@@ -293,13 +284,11 @@ def impulse_ahead(g, t):
     if t > g.form.quiet or g.form.kind == Shape.STILL:
         return 0.0
     tau = t - g.form.centre
-    if (
-        g.form.kind != Shape.GAUSSIAN or tau < 0.0 or g.form.rate * tau * tau < 1.5
-    ):  # the last zero, which a symmetric pulse has before it
+    # The last zero, which a symmetric pulse has before it.
+    if g.form.kind != Shape.GAUSSIAN or tau < 0.0 or g.form.rate * tau * tau < 1.5:
         return NEVER
-    v2 = -g.form.c3 / (
-        2.0 * g.form.rate
-    )  # the velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2)
+    # The velocity of the base is (v0 + v1 tau + v2 tau^2) exp(-rate tau^2).
+    v2 = -g.form.c3 / (2.0 * g.form.rate)
     v0 = (2.0 * v2 - g.form.c1) / (2.0 * g.form.rate)
     return abs(v0 + tau * (g.form.c0 + tau * v2)) * math.exp(-g.form.rate * tau * tau)
 

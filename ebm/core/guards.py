@@ -279,12 +279,8 @@ def seen(kind, smooth):
 @inner_kernel
 def _coefficient(which, k, a):
     """Coefficient k of a guard of the table that is no rate, without its constant."""
-    row, one, two, three = (
-        Row.TABLE + which,
-        _COMBINES[which, 0],
-        _COMBINES[which, 1],
-        _COMBINES[which, 2],
-    )
+    row = Row.TABLE + which
+    one, two, three = _COMBINES[which, 0], _COMBINES[which, 1], _COMBINES[which, 2]
     return a[row, one] * a[one, k] + a[row, two] * a[two, k] + a[row, three] * a[three, k]
 
 
@@ -346,12 +342,9 @@ def _past_a_touch(which, degree, times, noise, a):
     root, h = times
     if KIND[which] != Kind.FORCE or not 0.0 < root <= _NEARBY * h:
         return root
-    begin, fall, half_bend, power = (
-        series.value(a, Row.GUARD, degree, root),
-        series.slope(a, Row.GUARD, degree, root),
-        0.0,
-        1.0,
-    )
+    begin = series.value(a, Row.GUARD, degree, root)
+    fall = series.slope(a, Row.GUARD, degree, root)
+    half_bend, power = 0.0, 1.0
     for k in range(2, degree + 1):
         half_bend += 0.5 * k * (k - 1) * a[Row.GUARD, k] * power
         power *= root

@@ -204,11 +204,8 @@ def _write(number, first, mode):
     """Writes candidate `number` into m."""
     family, sense, walls = _CANDIDATES[number, 0], _CANDIDATES[number, 1], _CANDIDATES[number, 5]
     mode.family, mode.sense = family, 1 if family == Family.FLAT else sense * first
-    mode.pivot, mode.slip, mode.pull = (
-        _CANDIDATES[number, 2],
-        _CANDIDATES[number, 3],
-        _CANDIDATES[number, 4],
-    )
+    mode.pivot, mode.slip = _CANDIDATES[number, 2], _CANDIDATES[number, 3]
+    mode.pull = _CANDIDATES[number, 4]
     mode.tip, mode.far = walls & 1, walls >> 1
     if family == Family.FLAT and first < 0:
         mode.slip = -mode.slip
@@ -282,10 +279,8 @@ def _clean(block, motion, floor):
     if not floor or not block.walls or (motion.theta == 0.0 and motion.w == 0.0):
         return
     side = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
-    near, away = (
-        contacts.closed_wall(block, motion, side, False),
-        contacts.closed_wall(block, motion, -side, True),
-    )
+    near = contacts.closed_wall(block, motion, side, False)
+    away = contacts.closed_wall(block, motion, -side, True)
     if (near and away) or (
         motion.theta != 0.0 and abs(motion.w) < contacts.SLOW and (near or away)
     ):
@@ -324,10 +319,8 @@ def _touching(block, base, state):
     favoured = _favoured(block, base, state)
     first = 1 if favoured >= 0 else -1
     walls = touched_walls(block, motion, 1, True)
-    near, away = (
-        touched_walls(block, motion, first, False),
-        touched_walls(block, motion, -first, False),
-    )
+    near = touched_walls(block, motion, first, False)
+    away = touched_walls(block, motion, -first, False)
     return _Touching(favoured, first, floor, v, walls, near, away, _FLAT_TRIES)
 
 

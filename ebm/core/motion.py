@@ -155,9 +155,8 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
         scale *= reach
         # A uniform rotation has no higher rates, but its sine and cosine do.
         small = small + 1 if (abs(w) + abs(s) + abs(c)) * scale < enough else 0
-        if (
-            not still_vertical and abs(a[Row.G, k]) * scale >= enough
-        ):  # at its balance point only P feels the vertical motion
+        # At its balance point only P feels the vertical motion.
+        if not still_vertical and abs(a[Row.G, k]) * scale >= enough:
             small = 0
         if small == 3:
             order = k + 1
@@ -244,11 +243,12 @@ def _lean_series(block, side, tip, order, a):
     """
     s, c = a[Row.SIN, 0], a[Row.COS, 0]
     wall = 1.0 if tip else -1.0
+    # The wall's arm about the pivot, c - c'.
     arm = (
         c + side.tip_sin * s + side.tip_cos * c
         if tip
         else (block.left.arm + block.right.arm) * np.sin(a[Row.PHI, 0])
-    )  # c - c'
+    )
     push = Row.NA if tip else Row.NB
     for k in range(order + 1):
         a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
@@ -327,9 +327,8 @@ def _contact_series(block, mode, order, enough, reach, a):
     """
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
-    kappa = (
-        block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
-    )  # Q = -kappa P
+    # Q = -kappa P.
+    kappa = block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
     side = side_of(block, mode.sense)
     acting = _Acting(side, block.spin, kappa, floor, tip, far)
     n = _contact_rows(acting, a)
@@ -401,10 +400,11 @@ def _accelerations(acting, n, free, k, a):
     sine and cosine but for phi's own, and the moment of the forces' lower coefficients.
     """
     side, (ks, kc, moment) = acting.side, free
+    # The rates of s'.
     tip_reach, far_reach = (
         side.tip_sin * kc - side.tip_cos * ks,
         side.far_sin * kc - side.far_cos * ks,
-    )  # of s'
+    )
     s, c = a[Row.SIN, 0], a[Row.COS, 0]
     tip_arm, far_arm = _wall_arms(side, s, c)
     ax, ay, aphi = -a[Row.U, k], -a[Row.G, k], acting.spin * moment

@@ -213,9 +213,8 @@ def _order_of_zero(a, row, n, floor, ahead):
     """
     noise = floor
     scale = _ERROR
-    for k in range(
-        min(n, 2) + 1
-    ):  # later terms may grow without bound where friction nearly jams the pivot (Painleve)
+    # Later terms may grow without bound where friction nearly jams the pivot (Painleve).
+    for k in range(min(n, 2) + 1):
         noise = max(noise, abs(a[row, k]) * scale)
         scale *= ahead
     scale = 1.0
@@ -224,9 +223,8 @@ def _order_of_zero(a, row, n, floor, ahead):
         total += a[row, k] * scale
         if abs(a[row, k]) * scale > noise and math.copysign(total, total * a[row, k]) > noise:
             soon = a[row, k] + (k + 1) * a[row, k + 1] * INSTANT if k < n else a[row, k]
-            turns = a[row, k] * soon < 0.0 and (
-                k > 1 or soon > 0.0
-            )  # a gap that a rebound opens ends in an impact, however soon
+            # A gap that a rebound opens ends in an impact, however soon.
+            turns = a[row, k] * soon < 0.0 and (k > 1 or soon > 0.0)
             if not turns:
                 return k
         scale *= ahead

@@ -85,10 +85,8 @@ def touch(block, mode, motion, which):
         )
         turned = phi + contacts.wall_gap(block, motion, mode.sense) / arms
         if turned > 0.0:
-            s, c = (
-                side.radius * math.sin(side.alpha - turned),
-                side.radius * math.cos(side.alpha - turned),
-            )
+            s = side.radius * math.sin(side.alpha - turned)
+            c = side.radius * math.cos(side.alpha - turned)
             motion.x, motion.y, motion.theta = sign * (pivot + s), c, sign * turned
             motion.vx, motion.vy = -c * motion.w, s * sign * motion.w
         else:  # past upright it would stand on its other corner, without an impact
@@ -227,10 +225,8 @@ def _strike_all(block, base, run, resting):
     phi = abs(motion.theta)
     flat = motion.theta == 0.0
     floor = abs(contacts.floor_gap(block, motion)) < contacts.CLOSED
-    tip, far = (
-        abs(contacts.wall_gap(block, motion, sign)) < contacts.CLOSED,
-        abs(contacts.wall_gap(block, motion, -sign)) < contacts.CLOSED,
-    )
+    tip = abs(contacts.wall_gap(block, motion, sign)) < contacts.CLOSED
+    far = abs(contacts.wall_gap(block, motion, -sign)) < contacts.CLOSED
     touching, v = work[WORK], work[WORK + 1]
     touching[Contact.FOOT], touching[Contact.OTHER] = floor, flat and floor
     touching[Contact.TIP_TOP], touching[Contact.TIP_BOTTOM] = tip, flat and tip
