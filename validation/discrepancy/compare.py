@@ -200,17 +200,16 @@ def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
     if max(starts) - min(starts) > step:
         late = pair.reference if starts[0] > starts[1] else pair.candidate
         return f"{late.model} starts only at {max(starts):g} s", False
-    if pair.reference.outcome == pair.candidate.outcome and pair.reference.outcome in TURNS:
-        return "", False
+    fell_alike = pair.reference.outcome == pair.candidate.outcome in TURNS
     asked = max(ends) if until is None else until
-    if asked - min(ends) > step:
-        short = pair.reference if ends[0] < ends[1] else pair.candidate
-        fall = short.outcome in TURNS
-        return (
-            f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
-            fall,
-        )
-    return "", False
+    if fell_alike or asked - min(ends) <= step:
+        return "", False
+    short = pair.reference if ends[0] < ends[1] else pair.candidate
+    fall = short.outcome in TURNS
+    return (
+        f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
+        fall,
+    )
 
 
 def _step(history: History) -> float:

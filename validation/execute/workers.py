@@ -102,8 +102,7 @@ def _simulate(work: Work, scene: Scene) -> History:
     for name, column in returned.channels.items():
         if column.dtype.kind == "f" and not np.all(np.abs(column) <= MOST):  # NaN, too
             row = int(np.flatnonzero(~(np.abs(column) <= MOST))[0])
-            at = f"t = {returned.channels['t'][row]:g} s"
-            raise ModelFailure(f"{name} is {column[row]} at {at}")
+            raise ModelFailure(f"{name} is {column[row]} at t = {returned.channels['t'][row]:g} s")
     if not len(returned.channels["t"]):
         raise ModelFailure("the history is empty")
     return dataclasses.replace(returned, model=work.label)

@@ -134,8 +134,8 @@ def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
     f, a = paper.frequencies[j], paper.amplitudes[i]
     opposite = "nowhere the opposite"
     if len(i):
-        opposite = f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-        opposite += (
+        opposite = (
+            f"the opposite at {share(len(i) / safer.size)} of the nodes,"
             f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
         )
     value = f"safe area {share(safer)} against {share(other)}; {opposite}"
@@ -289,8 +289,10 @@ def restitution_rules(paper: Paper) -> Measured:
     for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
         by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
-        value = f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-        value += f" at up to {share(by_e)} between e"
+        value = (
+            f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
+            f" at up to {share(by_e)} between e"
+        )
         rows.append(Row(f"{side} wall, μ 0.6", value, bool(by_gap < by_e)))
         most.append((by_gap, by_e))
     gaps, e = map(share, np.max(most, axis=0))
@@ -307,12 +309,19 @@ def likelier_side(paper: Paper) -> Measured:
         left, right = (np.mean(outcomes == side, axis=1) for side in (LEFT, RIGHT))
         gain = np.cumsum(right - left) > 0.0  # over amplitudes from the lowest up to each
         until = a[np.flatnonzero(gain)[-1]] if gain.any() else 0.0
-        said = f"clockwise up to a_p of {until:.1f} g tan α"
-        rows.append(Row(f"μ {mu:g}, lower amplitudes", said, bool(until > 0.0)))
-        rows.append(_lowest(paper, mu, outcomes))
-        value = f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}"
-        where = f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α"
-        rows.append(Row(where, value, bool(right.mean() > left.mean())))
+        rows += [
+            Row(
+                f"μ {mu:g}, lower amplitudes",
+                f"clockwise up to a_p of {until:.1f} g tan α",
+                bool(until > 0.0),
+            ),
+            _lowest(paper, mu, outcomes),
+            Row(
+                f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α",
+                f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}",
+                bool(right.mean() > left.mean()),
+            ),
+        ]
         ends.append(f"{until:.1f} g tan α (μ = {mu:g})")
         whole.append(f"{share(right)} against {share(left)} of the nodes (μ = {mu:g})")
     # The mirror image: a right wall under the reversed pulse is a left wall under the pulse.
@@ -608,10 +617,13 @@ def _areas(paper: Paper) -> Plot:
     for side, of_side in zip(AXES["side"], areas, strict=True):
         series = []
         for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True):
-            lines = zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
-            series += [Series(f"μ {mu:g}, e {e:g}", gaps, line) for e, line in lines]
-            level = [float(free)] * len(gaps)
-            series.append(Series(f"μ {mu:g}, no wall", gaps, level, style="dots"))
+            series += [
+                *(
+                    Series(f"μ {mu:g}, e {e:g}", gaps, line)
+                    for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
+                ),
+                Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
+            ]
         panels.append(Panel(f"Wall on the {side}", series))
     x, y = Axis("gap, mm"), Axis("safe nodes, %")
     return Plot("safe-areas", panels=panels, x=x, y=y, note="Safe areas of all spectra.")
