@@ -215,38 +215,29 @@ class WindowedHistory:
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
 
 
-@dataclass(frozen=True)
 class Pair:
     """Reference and candidate over their common time up to `until` (s).
 
-    The time axis is the reference's; the candidate is interpolated linearly. `start` and `end`
-    bound the common time within the window.
+    `time` are the reference's times within it; the candidate is interpolated linearly. `start` and
+    `end` bound the common time within the window. `known` is the history whose block is known, the
+    reference's where both are. `alpha` is that block's slenderness angle, rad; None if unknown.
     """
 
-    reference: History
-    candidate: History
-    scene: Scene | None = None
-    until: float = math.inf
-
-    @cached_property
-    def start(self) -> float:
-        """First common time, s."""
-        return max(float(self.reference.channels["t"][0]), float(self.candidate.channels["t"][0]))
-
-    @cached_property
-    def end(self) -> float:
-        """Last common time within the window, s."""
-        return min(
-            float(self.reference.channels["t"][-1]),
-            float(self.candidate.channels["t"][-1]),
-            self.until,
-        )
-
-    @cached_property
-    def time(self) -> Array:
-        """The reference's times within the common time."""
-        t = np.asarray(self.reference.channels["t"], dtype=float)
-        return t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+    def __init__(
+        self,
+        reference: History,
+        candidate: History,
+        scene: Scene | None = None,
+        until: float = math.inf,
+    ) -> None:
+        self.reference, self.candidate = reference, candidate
+        t, other = (np.asarray(one.channels["t"], float) for one in (reference, candidate))
+        self.start = max(float(t[0]), float(other[0]))
+        self.end = min(float(t[-1]), float(other[-1]), until)
+        self.time: Array = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+        known = candidate if reference.alpha is None else reference
+        self.known = WindowedHistory(known, scene)
+        self.alpha = scene.block.alpha if scene else known.alpha
 
     def channels(self, name: str) -> tuple[Array, Array]:
         """One column of both on `time`: reference, candidate."""
@@ -256,23 +247,11 @@ class Pair:
         return reference, candidate
 
     @cached_property
-    def alpha(self) -> float | None:
-        """Slenderness angle of the block, rad, from the scene or a history; None if unknown."""
-        return (self.scene.block if self.scene else self.known.history).alpha
-
-    @cached_property
     def theta(self) -> tuple[Array, Array]:
         """Theta of both, in alpha (in rad where the block is unknown)."""
         scale = self.alpha or 1.0
         reference, candidate = self.channels("theta")
         return reference / scale, candidate / scale
-
-    @cached_property
-    def known(self) -> WindowedHistory:
-        """The history whose block is known: the reference's where both are."""
-        return WindowedHistory(
-            self.reference if self.reference.alpha is not None else self.candidate, self.scene
-        )
 
     @property
     def rocking(self) -> tuple[Array, Array]:
