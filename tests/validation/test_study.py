@@ -58,7 +58,7 @@ def test_what_was_played_is_read_back_whatever_plays_it(
     tmp_path: Path, log: Path, jobs: int
 ) -> None:
     heard: list[tuple[float, float]] = []
-    study = squares([2.0, 3.0, 3.0], log)
+    study = squares([2.0, 3.0, 3.0, 11.0], log)  # whose square is a task of a second wave
     found = run(
         study,
         tmp_path / "out",
@@ -66,20 +66,15 @@ def test_what_was_played_is_read_back_whatever_plays_it(
         on_progress=lambda done, of, what="": heard.append((done, of)),
     )
     again = run(study, tmp_path / "out", jobs=jobs)
-    assert found.table("squares").rows == again.table("squares").rows == [[2.0, 4.0], [3.0, 9.0]]
-    assert played(log) == [2.0, 3.0]
-    assert heard[0] == (0, 2)
-    assert heard[-1] == (2, 2)
+    values = [2.0, 3.0, 11.0, 121.0, 14641.0]
+    rows = [[value, value**2] for value in values]
+    assert found.table("squares").rows == again.table("squares").rows == rows
+    assert played(log) == values
+    assert (heard[0], heard[-1]) == ((0, 3), (5, 5))
     assert found.complete
     assert found.made
-    assert run(study, tmp_path / "out", jobs=jobs, force=True).data == {"count": 2}
-    assert played(log) == [2.0, 2.0, 3.0, 3.0]
-
-
-def test_a_wave_follows_from_what_was_found(tmp_path: Path, log: Path) -> None:
-    found = run(squares([2.0, 11.0], log), tmp_path / "out", jobs=0)
-    assert played(log) == [2.0, 11.0, 121.0, 14641.0]
-    assert found.data == {"count": 4}
+    assert run(study, tmp_path / "out", jobs=jobs, force=True).data == {"count": 5}
+    assert played(log) == sorted(2 * values)
 
 
 def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> None:

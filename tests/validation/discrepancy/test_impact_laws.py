@@ -134,17 +134,14 @@ def test_where_two_laws_give_one_motion_both_are_named() -> None:
     assert max(found.errors["closed"], found.errors["open"]) < 1e-3 < found.spread
 
 
-def flat_landing(**change: object) -> Scene:
-    """A block that is dropped upright while it moves to the left: its left corner leads."""
-    scene = Scene(
-        name="flat",
-        block=Block(half_width=0.3, half_height=1.0),
-        floor=Floor(friction=0.9),
-        initial_height=0.05,
-        initial_velocity=-1.0,
-        duration=3.0,
-    )
-    return scene.replace(**change)
+FLAT = Scene(  # dropped upright while it moves to the left: its left corner leads
+    name="flat",
+    block=Block(half_width=0.3, half_height=1.0),
+    floor=Floor(friction=0.9),
+    initial_height=0.05,
+    initial_velocity=-1.0,
+    duration=3.0,
+)
 
 
 @pytest.mark.parametrize(("tilt", "law"), [(1e-9, "leading-first"), (-1e-9, "trailing-first")])
@@ -154,7 +151,7 @@ def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(
 ) -> None:
     """Tilted to the side to which it slides a block lands on its leading corner; the laws are the
     limits of such landings."""
-    scene = flat_landing(initial_velocity=speed)
+    scene = FLAT.replace(initial_velocity=speed)
     tilted = EventBasedModel(pivot="unilateral").simulate(
         scene.replace(initial_rotation=-speed * tilt)
     )
@@ -168,9 +165,9 @@ def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(
 
 
 def test_a_flat_landing_is_told_from_one_without_slip_and_one_that_tips() -> None:
-    still = flat_landing(initial_velocity=0.0)
+    still = FLAT.replace(initial_velocity=0.0)
     assert EventBasedModel(pivot="unilateral").simulate(still).cost.rules["flat landing"] == 1
-    tilted = flat_landing(initial_rotation=0.01)
+    tilted = FLAT.replace(initial_rotation=0.01)
     assert "flat landing" not in EventBasedModel(pivot="unilateral").simulate(tilted).cost.rules
     for scene in (still, tilted):
         assert parting_landing(scene) is None

@@ -53,12 +53,9 @@ def judged(spectra_made, least=None):
 def tongue(spectrum):
     """Nodes that are said to overturn after one impact: just above the line, at omega_p/p from 2 to
     3."""
-    found = np.zeros(spectrum.outcomes.shape, dtype=bool)
-    lowest = int(np.argmax(~spectrum.safe[:, 0]))
-    found[
-        lowest : lowest + 3, (spectrum.frequency_ratios >= 2.0) & (spectrum.frequency_ratios <= 3.0)
-    ] = True
-    return found
+    above = np.arange(len(spectrum.amplitude_ratios)) - np.argmax(~spectrum.safe[:, 0])
+    f = spectrum.frequency_ratios
+    return np.outer((above >= 0) & (above < 3), (f >= 2.0) & (f <= 3.0))
 
 
 def as_said(mu, *wall):
