@@ -225,7 +225,7 @@ def test_events_agree_until_the_first_without_counterpart(made):
 
 def test_matching_takes_the_nearest_and_each_once():
     matched = match_impacts(
-        [impact(1.0), impact(1.012)], [impact(1.011), impact(1.03, kind="wall impact")]
+        [impact(1.0), impact(1.012)], [impact(1.011), impact(1.015, kind="wall impact")]
     )
     assert [(a.t, b.t) for a, b in matched.pairs] == [(1.012, 1.011)]
     assert [e.t for e in matched.only_reference] == [1.0]
