@@ -220,7 +220,7 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     with Pool(1, DRAWING_MB) as pool:
         (ended,) = pool.run(deque([Call(_draw_again, (known[name], path), DRAWING)]))
     if ended.error is not None:
-        raise InputError(f"{printable(known[name])}: no data of a figure: {ended.fault}")
+        raise InputError(f"{printable(known[name])}: no data of a figure: {ended.outcome.reason}")
     return path
 
 

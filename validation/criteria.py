@@ -12,7 +12,6 @@ kinetic friction. SI units, frequencies in Hz.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -99,21 +98,16 @@ def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
 
 @dataclass(frozen=True)
 class Base:
-    """A base motion as hand methods see it."""
+    """A base motion as hand methods see it.
+
+    A and V are its largest horizontal `acceleration` (m/s^2) and `velocity` (m/s); `vertical` is
+    its largest vertical acceleration (m/s^2).
+    """
 
     motion: Recording
-    #: Largest vertical acceleration, m/s^2.
-    vertical: float = 0.0
-
-    @cached_property
-    def acceleration(self) -> float:
-        """A, largest horizontal acceleration, m/s^2."""
-        return intensity.peak_acceleration(self.motion) * GRAVITY_OF_RECORDS
-
-    @cached_property
-    def velocity(self) -> float:
-        """V, largest horizontal velocity, m/s."""
-        return intensity.peak_velocity(self.motion)
+    acceleration: float
+    velocity: float
+    vertical: float
 
     def spectral(self, frequency: float, damping: float) -> float:
         """Pseudo-spectral acceleration (m/s^2) at a frequency."""
@@ -129,7 +123,12 @@ def base_of(scene: Scene) -> Base:
         replace(one, samples=one.samples[: int(scene.duration / one.time_step * (1 + 1e-12)) + 1])
         for one in (sampled(each, scene.duration) for each in (scene.excitation, scene.vertical))
     )
-    return Base(across, float(np.max(np.abs(up.samples))))
+    return Base(
+        motion=across,
+        acceleration=intensity.peak_acceleration(across) * GRAVITY_OF_RECORDS,
+        velocity=intensity.peak_velocity(across),
+        vertical=float(np.max(np.abs(up.samples))),
+    )
 
 
 def sampled(motion: Excitation, duration: float) -> Recording:

@@ -113,12 +113,12 @@ def run(
 
 def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
-    task = workers.Task(
-        label=model, family=model, settings=settings, search_path=(str(Path.cwd()),), scene=scene
+    work = workers.Work(
+        label=model, family=model, settings=settings, search_path=(str(Path.cwd()),)
     )
     with Pool(1) as pool:
-        (ended,) = pool.run(deque([Call(guarded, (workers.play, task))]))
-    result = Failure(ended.fault) if ended.error else ended.result
+        (ended,) = pool.run(deque([Call(guarded, (workers.play, work, scene))]))
+    result = ended.outcome
     if isinstance(result, Failure):
         if result.refused:
             raise InputError(result.reason)

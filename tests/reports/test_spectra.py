@@ -143,7 +143,7 @@ def test_a_map_of_each_finding():
     found = findings_of(paper)
     _, plot, rows = beyond(paper, found)
     for panel, one in zip(plot.data["panels"], found, strict=True):
-        assert panel["outcomes"].count("G") == one.shown.gained.sum()
-        assert panel["outcomes"].count("X") == one.shown.lost.sum()
+        assert panel["outcomes"].count("G") == one.gained.sum()
+        assert panel["outcomes"].count("X") == one.lost.sum()
     assert len(figure_of(plot).axes) == 3
-    assert len(rows.rows) == sum(len(one.shown.rows) for one in found)
+    assert len(rows.rows) == sum(len(one.rows) for one in found)

@@ -188,7 +188,7 @@ def test_two_versions_share_a_store(tmp_path):
     new.put("s--ebm--2222", {".csv.gz": b"new"}, {"outcome": "moving", "something": {"new": [1]}})
     assert old.get("s--ebm--1111") == {"outcome": "at rest"}
     assert new.get("s--ebm--1111") == {"outcome": "at rest"}
-    assert old.history("s--ebm--1111").read_text() == "old"
+    assert (tmp_path / HISTORIES / "s--ebm--1111.csv.gz").read_text() == "old"
     (tmp_path / HISTORIES / "s--ebm--2222.json").write_text(
         json.dumps({"version": 9, "files": ["a", "list"]})
     )

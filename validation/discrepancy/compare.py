@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -98,7 +98,7 @@ def compare(
     return Discrepancy(
         reference.model,
         candidate.model,
-        _figures(_chosen(DIFFERENCES, measures), pair, angle, until, reference.model),
+        _figures(DIFFERENCES, measures, pair, angle, until, reference.model),
         pair.start,
         pair.end,
         *_gap(pair, until),
@@ -133,26 +133,23 @@ def describe(
 ) -> tuple[Figure, ...]:
     """The figures of one history, up to `until` (s): peak rotation, impacts, hop and so on."""
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
-    return _figures(_chosen(FIGURES, measures), motion, "alpha", until)
-
-
-def _chosen(known: Mapping[str, Measure], names: Collection[str] | None) -> list[Measure]:
-    """The measures of these names; None: all but those that are `on_request`."""
-    if names is None:
-        return [measure for measure in known.values() if not measure.on_request]
-    if unknown := [name for name in names if name not in known]:
-        raise InputError(f"{unknown[0]!r} is not allowed: {', '.join(known)}", "measures")
-    return [known[name] for name in names]
+    return _figures(FIGURES, measures, motion, "alpha", until)
 
 
 def _figures(
-    chosen: Sequence[Measure], what: object, angle: str, until: float | None, against: str = ""
+    known: Mapping[str, Measure],
+    names: Collection[str] | None,
+    what: object,
+    angle: str,
+    until: float | None,
+    against: str = "",
 ) -> tuple[Figure, ...]:
-    window = "" if until is None else f"{until:g}s"
-    return tuple(
-        evaluate(measure, what, angle, against=against, window=window, until=until)
-        for measure in chosen
-    )
+    """The figures of the measures of these names; None: of all but those that are `on_request`."""
+    if names is None:
+        names = [name for name, measure in known.items() if not measure.on_request]
+    if unknown := [name for name in names if name not in known]:
+        raise InputError(f"{unknown[0]!r} is not allowed: {', '.join(known)}", "measures")
+    return tuple(evaluate(known[name], what, angle, against=against, until=until) for name in names)
 
 
 def evaluate(
@@ -161,7 +158,6 @@ def evaluate(
     angle: str,
     *,
     against: str = "",
-    window: str = "",
     until: float | None = None,
 ) -> Figure:
     """One measure as a figure; a value that is not finite becomes None with a note."""
@@ -178,7 +174,7 @@ def evaluate(
         unit=angle if measure.unit == "angle" else measure.unit,
         value=float(value) if math.isfinite(value) else None,
         against=against,
-        window=window,
+        window="" if until is None else f"{until:g}s",
         until=until,
         note=note,
     )
@@ -204,17 +200,16 @@ def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
     if max(starts) - min(starts) > step:
         late = pair.reference if starts[0] > starts[1] else pair.candidate
         return f"{late.model} starts only at {max(starts):g} s", False
-    if pair.reference.outcome == pair.candidate.outcome and pair.reference.outcome in TURNS:
-        return "", False
+    fell_alike = pair.reference.outcome == pair.candidate.outcome in TURNS
     asked = max(ends) if until is None else until
-    if asked - min(ends) > step:
-        short = pair.reference if ends[0] < ends[1] else pair.candidate
-        fall = short.outcome in TURNS
-        return (
-            f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
-            fall,
-        )
-    return "", False
+    if fell_alike or asked - min(ends) <= step:
+        return "", False
+    short = pair.reference if ends[0] < ends[1] else pair.candidate
+    fall = short.outcome in TURNS
+    return (
+        f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
+        fall,
+    )
 
 
 def _step(history: History) -> float:

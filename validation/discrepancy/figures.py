@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import compress
-from operator import attrgetter
 from typing import Any, Literal
 
 import numpy as np
@@ -183,25 +182,27 @@ class WindowedHistory:
         """The scene's gravity, or 9.81 m/s^2."""
         return STANDARD_GRAVITY if self.scene is None else self.scene.gravity
 
-    @cached_property
-    def inside(self) -> NDArray[np.bool_]:
-        """The rows within the window."""
-        return self.history.channels["t"] <= self.until + 1e-9
-
     def channel(self, name: str) -> Array:
         """One column within the window."""
         if name not in self.history.channels:
             raise Unavailable(f"{self.history.model} has no column {name}")
-        return np.asarray(self.history.channels[name][self.inside], dtype=float)
+        inside = self.history.channels["t"] <= self.until + 1e-9
+        return np.asarray(self.history.channels[name][inside], dtype=float)
 
     def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
         """Events of these kinds within the window, from `start` (s) on.
 
         A landing with an impulse counts as a floor impact, whatever the model calls it.
         """
+        named = (
+            replace(event, kind="floor impact")
+            if event.kind == "landing" and event.impulse != 0.0
+            else event
+            for event in self.history.event_list
+        )
         return [
             event
-            for event in map(_impact, self.history.event_list)
+            for event in named
             if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
         ]
 
@@ -214,70 +215,43 @@ class WindowedHistory:
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
 
 
-@dataclass(frozen=True)
 class Pair:
     """Reference and candidate over their common time up to `until` (s).
 
-    The time axis is the reference's; the candidate is interpolated linearly. `start` and `end`
-    bound the common time within the window.
+    `time` are the reference's times within it; the candidate is interpolated linearly. `start` and
+    `end` bound the common time within the window. `known` is the history whose block is known, the
+    reference's where both are. `alpha` is that block's slenderness angle, rad; None if unknown.
     """
 
-    reference: History
-    candidate: History
-    scene: Scene | None = None
-    until: float = math.inf
-    cache: dict[str, Any] = field(default_factory=dict, repr=False, compare=False)
-
-    @cached_property
-    def start(self) -> float:
-        """First common time, s."""
-        return max(float(self.reference.channels["t"][0]), float(self.candidate.channels["t"][0]))
-
-    @cached_property
-    def end(self) -> float:
-        """Last common time within the window, s."""
-        return min(
-            float(self.reference.channels["t"][-1]),
-            float(self.candidate.channels["t"][-1]),
-            self.until,
-        )
-
-    @cached_property
-    def time(self) -> Array:
-        """The reference's times within the common time."""
-        t = np.asarray(self.reference.channels["t"], dtype=float)
-        return t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+    def __init__(
+        self,
+        reference: History,
+        candidate: History,
+        scene: Scene | None = None,
+        until: float = math.inf,
+    ) -> None:
+        self.reference, self.candidate = reference, candidate
+        t, other = (np.asarray(one.channels["t"], float) for one in (reference, candidate))
+        self.start = max(float(t[0]), float(other[0]))
+        self.end = min(float(t[-1]), float(other[-1]), until)
+        self.time: Array = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+        known = candidate if reference.alpha is None else reference
+        self.known = WindowedHistory(known, scene)
+        self.alpha = scene.block.alpha if scene else known.alpha
 
     def channels(self, name: str) -> tuple[Array, Array]:
         """One column of both on `time`: reference, candidate."""
-        if name not in self.cache:
-            both = [WindowedHistory(one) for one in (self.reference, self.candidate)]
-            curves = [(one.channel("t"), one.channel(name)) for one in both]
-            if len(self.time) == 0:
-                raise Unavailable("the histories have no time in common")
-            self.cache[name] = tuple(np.interp(self.time, *curve) for curve in curves)
-        return self.cache[name]
+        both = [WindowedHistory(one) for one in (self.reference, self.candidate)]
+        curves = [(one.channel("t"), one.channel(name)) for one in both]
+        reference, candidate = (np.interp(self.time, *curve) for curve in curves)
+        return reference, candidate
 
     @cached_property
-    def alpha(self) -> float | None:
-        """Slenderness angle of the block, rad, from the scene or a history; None if unknown."""
-        if self.scene is not None:
-            return self.scene.block.alpha
-        return self.reference.alpha if self.reference.alpha is not None else self.candidate.alpha
-
-    @property
     def theta(self) -> tuple[Array, Array]:
         """Theta of both, in alpha (in rad where the block is unknown)."""
         scale = self.alpha or 1.0
         reference, candidate = self.channels("theta")
         return reference / scale, candidate / scale
-
-    @cached_property
-    def known(self) -> WindowedHistory:
-        """The history whose block is known: the reference's where both are."""
-        return WindowedHistory(
-            self.reference if self.reference.alpha is not None else self.candidate, self.scene
-        )
 
     @property
     def rocking(self) -> tuple[Array, Array]:
@@ -360,24 +334,17 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
     Weak impacts (`WEAK_IMPACT`) need no counterpart. Overturning counts as an event of its own
     kind.
     """
-    found = [
-        _matched(*([e for e in events if e.kind == kind] for events in (reference, candidate)))
-        for kind in IMPACTS + TURNS
-    ]
-    return MatchedImpacts(
-        sorted((pair for one in found for pair in one.pairs), key=lambda two: two[0].t),
-        sorted((e for one in found for e in one.only_reference), key=attrgetter("t")),
-        sorted((e for one in found for e in one.only_candidate), key=attrgetter("t")),
+    kinds = IMPACTS + TURNS
+    reference, candidate = (
+        sorted(events, key=lambda e: (e.t, kinds.index(e.kind)))
+        for events in (reference, candidate)
     )
-
-
-def _matched(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
-    """Match events that all are of one kind."""
     times = np.array([e.t for e in candidate])
     near = [
         (abs(times[j] - first.t), i, j)
         for i, first in enumerate(reference)
         for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
+        if candidate[j].kind == first.kind
     ]
     partners: dict[int, int] = {}
     taken: set[int] = set()
@@ -389,15 +356,13 @@ def _matched(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedI
         [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
         for events, matched in ((reference, partners), (candidate, taken))
     )
-    return MatchedImpacts([(reference[i], candidate[j]) for i, j in partners.items()], *alone)
+    pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
+    return MatchedImpacts(pairs, *alone)
 
 
 def _strong(impacts: Sequence[Event]) -> list[bool]:
-    """Which impacts are not weak (`WEAK_IMPACT`)."""
-    most = max((abs(event.impulse) for event in impacts), default=0.0)
-    return [abs(event.impulse) >= WEAK_IMPACT * most for event in impacts]
-
-
-def _impact(event: Event) -> Event:
-    strikes = event.kind == "landing" and event.impulse != 0.0
-    return replace(event, kind="floor impact") if strikes else event
+    """Which impacts are not weak (`WEAK_IMPACT`) among those of their kind."""
+    most: dict[str, float] = {}
+    for event in impacts:
+        most[event.kind] = max(most.get(event.kind, 0.0), abs(event.impulse))
+    return [abs(event.impulse) >= WEAK_IMPACT * most[event.kind] for event in impacts]

@@ -42,11 +42,6 @@ class LawFollowed(Stored):
     errors: dict[ImpactLaw, float]
     spread: float
 
-    @property
-    def error(self) -> float:
-        """The distance from the nearest law, alpha."""
-        return min(self.errors.values())
-
 
 class Landing(Stored):
     """The first landing of a scene at which the laws of impacts part.

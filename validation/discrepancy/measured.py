@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen
@@ -20,15 +19,13 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import block_fields, check_readable, outcome_of
 from rockcheck.scenes.reading import read_table
 
-Floats = NDArray[np.float64]
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.
 AVERAGED = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")
-TIMES = {"s": 1.0, "ms": 1e-3}
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
 UNITS: Mapping[str, Mapping[str, float]] = {
-    "t": TIMES,
+    "t": {"s": 1.0, "ms": 1e-3},
     "theta": ANGLES,
     "theta_dot": {f"{unit}_s": factor for unit, factor in ANGLES.items()},
     **dict.fromkeys(("x", "y", "slip"), LENGTHS),
@@ -112,8 +109,12 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     """
     check_readable(Path(path))
     shown = printable(path)
+    # quotes and comments of the heading are read as in the rows
+    heading = read_table(Path(path), header=None, nrows=1, dtype=str, keep_default_na=False)
+    if heading.empty:
+        raise InputError(f"{shown}: empty")
     columns: dict[str, tuple[str, float]] = {}
-    for column in _heading(Path(path), shown):
+    for column in map(str.strip, heading.iloc[0]):
         name, factor = _meaning(column, shown)
         if name in (known for known, _ in columns.values()):
             raise InputError(
@@ -129,14 +130,6 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     si = all(factor == 1.0 for _, factor in columns.values())
     outcome = history.outcome if si else outcome_of(channels)
     return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
-
-
-def _heading(path: Path, shown: str) -> list[str]:
-    """Names of the columns; quotes and comments are read as in the rows."""
-    row = read_table(path, header=None, nrows=1, dtype=str, keep_default_na=False)
-    if row.empty:
-        raise InputError(f"{shown}: empty")
-    return [column.strip() for column in row.iloc[0]]
 
 
 def _meaning(column: str, shown: str) -> tuple[str, float]:
@@ -201,6 +194,8 @@ def mean_history(tests: Sequence[History]) -> History:
     Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
     `InputError` where the tests have no time in common, or only some of them overturn.
     """
+    from scipy.stats import t as student
+
     first, *others = tests
     if not others:
         return first
@@ -224,25 +219,20 @@ def mean_history(tests: Sequence[History]) -> History:
         if all(name in test.channels for test in tests)
     }
     channels = {"t": t, **{name: rows.mean(axis=0) for name, rows in stacked.items()}}
+    theta = stacked["theta"]
+    scatter = {
+        "theta_rms": float(np.sqrt(np.mean(np.var(theta, axis=0, ddof=1)))),
+        "peak_rotation": float(np.std(np.max(np.abs(theta), axis=1), ddof=1)),
+    }
+    if "slip" in stacked:
+        scatter["last_slip"] = float(np.std(stacked["slip"][:, -1], ddof=1))
+    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1))
+    factor = quantile / np.sqrt(len(tests))
     return dataclasses.replace(
         first,
         channels=channels,
         event_list=(),
         outcome=outcome_of(channels),
-        uncertainty=_scatter(stacked),
+        uncertainty={name: factor * value for name, value in scatter.items()},
         notes=(*first.notes, f"the mean of {len(tests)} tests"),
     )
-
-
-def _scatter(stacked: Mapping[str, Floats]) -> dict[str, float]:
-    count = len(stacked["theta"])
-    from scipy.stats import t
-
-    factor = float(t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)) / np.sqrt(count)
-    found = {
-        "theta_rms": float(np.sqrt(np.mean(np.var(stacked["theta"], axis=0, ddof=1)))),
-        "peak_rotation": float(np.std(np.max(np.abs(stacked["theta"]), axis=1), ddof=1)),
-    }
-    if "slip" in stacked:
-        found["last_slip"] = float(np.std(stacked["slip"][:, -1], ddof=1))
-    return {name: factor * value for name, value in found.items()}

@@ -41,8 +41,6 @@ def _peak_ratio(pair: Pair) -> float:
 
 
 def _hausdorff(pair: Pair) -> float:
-    if pair.alpha is None:
-        raise Unavailable("the block's size is not known")
     p = pair.known.block.weaker_pivot.frequency_parameter(pair.known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
@@ -388,21 +386,21 @@ FIGURES = by_name(
 
 
 def _sliding_distance(motion: WindowedHistory) -> float:
-    scene = _flat_start(motion, "a block that starts sliding flat", walls=0)
+    scene, braking = _flat_start(motion, "a block that starts sliding flat", walls=0)
     _stopped(motion, scene, abs(scene.initial_velocity))
     x = motion.channel("x")
-    return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / _braking(scene)
+    return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / braking
 
 
 def _wall_rebound(motion: WindowedHistory) -> float:
-    scene = _flat_start(motion, "a block that slides flat into a wall", walls=1)
+    scene, braking = _flat_start(motion, "a block that slides flat into a wall", walls=1)
     wall = scene.walls[0]
-    speed2 = scene.initial_velocity**2 - _braking(scene) * wall.gap
+    speed2 = scene.initial_velocity**2 - braking * wall.gap
     _need(speed2 > 0.0, "a block that reaches the wall")
     lost = (1.0 - wall.restitution) * math.sqrt(speed2)
     _stopped(motion, scene, abs(scene.initial_velocity) - lost)
     from_wall = wall.gap - abs(float(motion.channel("x")[-1]))
-    return from_wall - wall.restitution**2 * speed2 / _braking(scene)
+    return from_wall - wall.restitution**2 * speed2 / braking
 
 
 def _bounce_height(motion: WindowedHistory) -> float:
@@ -464,12 +462,15 @@ def _scene(motion: WindowedHistory) -> Scene:
     return motion.scene
 
 
-def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> Scene:
-    """The scene; raises `Unavailable` unless its block starts sliding flat with `walls` walls."""
+def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> tuple[Scene, float]:
+    """The scene, and the loss of speed squared by friction on the way, m/s^2.
+
+    Raises `Unavailable` unless its block starts sliding flat with `walls` walls.
+    """
     scene = _scene(motion)
     slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
     _need(slides and len(scene.walls) == walls, what)
-    return scene
+    return scene, 2.0 * scene.floor.friction * scene.gravity
 
 
 def _stopped(motion: WindowedHistory, scene: Scene, speed: float) -> None:
@@ -477,11 +478,6 @@ def _stopped(motion: WindowedHistory, scene: Scene, speed: float) -> None:
     reached = scene.floor.friction * scene.gravity * float(motion.channel("t")[-1])
     if motion.history.overturned_at is None and reached <= speed:
         raise Undefined("the window ends before the block has stopped")
-
-
-def _braking(scene: Scene) -> float:
-    """Loss of speed squared by friction on the way, m/s^2."""
-    return 2.0 * scene.floor.friction * scene.gravity
 
 
 def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:

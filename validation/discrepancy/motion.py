@@ -4,13 +4,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.scenes import History, Scene, kinematics
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.finding import Column
 
-Floats = NDArray[np.float64]
 #: A slip below this share of the block's half height is rounding.
 ROUNDING = 1e-14
 
@@ -52,8 +50,11 @@ class Motion(Stored):
 
     def words(self) -> list[str]:
         """The known figures, with their units."""
-        known = [(q, getattr(self, q.name)) for q in QUANTITIES]
-        return [f"{q.label} {value:.4g} {q.unit}" for q, value in known if value is not None]
+        return [
+            f"{q.label} {value:.4g} {q.unit}"
+            for q in QUANTITIES
+            if (value := getattr(self, q.name)) is not None
+        ]
 
 
 def motion_of(history: History, scene: Scene | None = None) -> Motion:

@@ -16,9 +16,6 @@ from rockcheck.validation.discrepancy.figures import Array, Measure, Unavailable
 #: Peaks below this (alpha) have no ratio worth a logarithm.
 SMALLEST_PEAK = 1e-3
 CONFIDENCE = 0.95
-#: Why there is no value.
-FAILED = "a model failed in some of the scenes"
-FEW = "fewer than two scenes in which both rock and neither falls"
 
 
 @dataclass(frozen=True)
@@ -57,7 +54,7 @@ class Samples:
             raise Undefined("fewer than two scenes in which the reference rocks and does not fall")
         usable = rocks & too
         if np.sum(usable) < 2:
-            raise Unavailable(FEW)
+            raise Unavailable("fewer than two scenes in which both rock and neither falls")
         return np.log(c.peaks[usable] / r.peaks[usable])
 
 
@@ -66,7 +63,7 @@ def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
     both = samples.reference, samples.candidate
     r, c = (np.where(one.fallen, fallen, np.minimum(one.peaks, fallen)) for one in both)
     if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        raise Unavailable(FAILED)
+        raise Unavailable("a model failed in some of the scenes")
     return r, c
 
 

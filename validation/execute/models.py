@@ -205,7 +205,7 @@ def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
             f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can"
             " play"
         )
-    return _built(name, _class_of(name), settings)
+    return build_own(name, settings)
 
 
 def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
@@ -213,23 +213,16 @@ def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
 
     For worker processes; call it only for code that was allowed.
     """
-    if not is_own(name):
-        return build(name, settings)
     check_allowed(name, (name,))
-    kind = _class_of(name)
-    if not isinstance(kind, type) or not callable(getattr(kind, "simulate", None)):
+    kind, model_class, settings = family(name), _class_of(name), dict(settings or {})
+    if not isinstance(model_class, type) or not callable(getattr(model_class, "simulate", None)):
         raise InputError(
             f"{printable(name)!r} is no model: it must be a class with a method `simulate`"
         )
-    if kind.__module__.partition(".")[0] in sys.stdlib_module_names:
+    if model_class.__module__.partition(".")[0] in sys.stdlib_module_names:
         raise InputError(
             f"{printable(name)!r} is no model: it is part of Python's standard library"
         )
-    return _built(name, kind, settings)
-
-
-def _built(name: str, model_class: Any, settings: Mapping[str, Any] | None) -> Model:
-    kind, settings = family(name), dict(settings or {})
     for key in kind.fixed.keys() & settings.keys():
         raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
     try:

@@ -8,7 +8,6 @@ worker is protected in the same way: its child process ends, the worker does not
 for the next call of the same run, since starting one takes as long as many a call.
 """
 
-import contextlib
 import math
 import multiprocessing
 import os
@@ -20,7 +19,7 @@ import uuid
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.util import find_spec
@@ -104,22 +103,23 @@ class Ended:
     @property
     def outcome(self) -> Any:
         """The result, or a `Failure` where there is none."""
-        return Failure(self.fault) if self.error else self.result
-
-    @property
-    def fault(self) -> str:
-        """Why there is no result, in one line; empty where there is one."""
         from pebble import ProcessExpired
 
-        if self.error is None:
-            return ""
-        if isinstance(self.error, TimeoutError):
-            return f"did not end within {self.seconds:g} s"
-        if isinstance(self.error, ProcessExpired):
-            return death(int(self.error.exitcode or 0))
-        if isinstance(self.error, MemoryError):
-            return "out of memory"
-        return printable(f"{type(self.error).__name__}: {self.error}", 300)
+        match self.error:
+            case None:
+                return self.result
+            case TimeoutError():
+                reason = f"did not end within {self.seconds:g} s"
+            case ProcessExpired(exitcode=int(code)) if code < 0:
+                names = {-one: one.name for one in signal.Signals}
+                reason = f"crashed: {names.get(code, f'signal {-code}')}"
+            case ProcessExpired():
+                reason = f"the process ended with code {self.error.exitcode or 0}"
+            case MemoryError():
+                reason = "out of memory"
+            case _:
+                reason = printable(f"{type(self.error).__name__}: {self.error}", 300)
+        return Failure(reason)
 
 
 @dataclass(eq=False)
@@ -269,15 +269,13 @@ def prepare(memory_mb: float | None, announces: bool = False) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
         os.dup2(nowhere, stream)
-    try:
+    with suppress(ImportError, ValueError, OSError):
         import resource
 
         if memory_mb is not None:
             most = int(memory_mb * 2**20)
             resource.setrlimit(resource.RLIMIT_DATA, (most, most))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    except (ImportError, ValueError, OSError):
-        pass
 
 
 def _write(stream: int, text: str) -> None:
@@ -290,16 +288,6 @@ def _follow(run: Any) -> None:
     os._exit(1)
 
 
-def death(code: int) -> str:
-    """How a process ended, from its exit code."""
-    names = {-one: one.name for one in signal.Signals}
-    return (
-        f"crashed: {names.get(code, f'signal {-code}')}"
-        if code < 0
-        else f"the process ended with code {code}"
-    )
-
-
 class Cluster(Pool):
     """The workers of a Dask cluster.
 
@@ -309,7 +297,7 @@ class Cluster(Pool):
     def __init__(self, address: str, memory_mb: float | None = None) -> None:
         super().__init__(1, memory_mb)
         self._address, self._run = address, uuid.uuid4().hex
-        self._stack = contextlib.ExitStack()
+        self._stack = ExitStack()
 
     def __enter__(self) -> Self:
         self._pool = self._stack.enter_context(connected(self._address))

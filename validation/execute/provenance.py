@@ -29,7 +29,8 @@ from rockcheck.validation.execute.models import FAMILIES, family, home
 #: The package whose code counts where it can be reached; the package of the model itself always
 #: does.
 OWN_PACKAGE = "rockcheck"
-_KEPT = 30 * 86400.0  # s
+#: Time (s) after which a cached digest is removed.
+_KEPT = 30 * 86400.0
 
 
 def cell_key(
@@ -41,26 +42,21 @@ def cell_key(
     versions of its libraries and of Python, and the machine type. `search_path` holds folders in
     which a user-defined model may lie. Its source is read, not run.
     """
+    given = settings.get("files", {}).get(scene.name, [])
+    tables = map(Path, [given] if isinstance(given, str) else given)
+    # of a measured history, and of its events
+    files = [file for table in tables for file in (table, events_path(table)) if file.is_file()]
     depends = {
         "scene": scene.model_dump(mode="json"),
         "model": name,
         "settings": dict(settings),
-        "files": [
-            hashlib.sha256(file.read_bytes()).hexdigest() for file in _files(settings, scene)
-        ],
+        "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
         "code": code_digest(home(name), search_path),
         "libraries": {library: version_of(library) for library in family(name).libraries},
         "python": platform.python_version(),
         "machine": platform.machine(),
     }
     return digest(json.dumps(depends, sort_keys=True, default=str))
-
-
-def _files(settings: Mapping[str, Any], scene: Scene) -> list[Path]:
-    """The existing files that a measured history of this scene, and its events, are read from."""
-    given = settings.get("files", {}).get(scene.name, [])
-    tables = [Path(file) for file in ([given] if isinstance(given, str) else given)]
-    return [file for table in tables for file in (table, events_path(table)) if file.is_file()]
 
 
 def digest(text: str) -> str:
@@ -77,7 +73,8 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     cached for later processes, under a hash of all our sources.
     """
     kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
-    if kept is not None and (known := _text_of(kept)):
+    known = head_of(kept, 100).strip() if kept else ""
+    if re.fullmatch(r"[0-9a-f]{16}", known):
         return known
     found = digest(
         "".join(
@@ -85,8 +82,13 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
             for name, path in sorted(reachable(module, search_path).items())
         )
     )
-    if kept is not None:
-        _keep(kept, found)
+    if kept:
+        with contextlib.suppress(OSError):
+            kept.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            write_whole(kept, found + "\n")
+            for old in kept.parent.glob("*.txt"):
+                if time.time() - old.stat().st_mtime > _KEPT:
+                    old.unlink(missing_ok=True)
     return found
 
 
@@ -100,22 +102,6 @@ def _kept(module: str) -> Path:
                 content.update(source.name.encode() + b"\0" + source.read_bytes())
     cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
     return cache / "rockcheck" / "code" / f"{content.hexdigest()[:32]}.txt"
-
-
-def _text_of(path: Path) -> str:
-    """A cached digest, empty where there is none."""
-    found = head_of(path, 100).strip()
-    return found if re.fullmatch(r"[0-9a-f]{16}", found) else ""
-
-
-def _keep(path: Path, found: str) -> None:
-    """Cache a digest if possible, and remove digests older than `_KEPT`."""
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-        write_whole(path, found + "\n")
-        for old in path.parent.glob("*.txt"):
-            if time.time() - old.stat().st_mtime > _KEPT:
-                old.unlink(missing_ok=True)
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
@@ -230,9 +216,12 @@ def versions() -> dict[str, str]:
 
 def hardware() -> dict[str, str]:
     """Processor, cores, memory and system of this machine."""
+    cpuinfo = Path("/proc/cpuinfo")
+    text = cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.exists() else ""
+    named = re.search(r"^model name[^:\n]*:(.*)$", text, re.MULTILINE)
     facts = {
         "system": f"{platform.system()} {platform.release()}",
-        "processor": _processor(),
+        "processor": named[1].strip() if named else platform.processor() or platform.machine(),
         "cores": str(os.cpu_count() or 1),
     }
     if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
@@ -240,10 +229,3 @@ def hardware() -> dict[str, str]:
             f"{os.sysconf('SC_PHYS_PAGES') * os.sysconf('SC_PAGE_SIZE') / 2**30:.0f} GiB"
         )
     return facts
-
-
-def _processor() -> str:
-    cpuinfo = Path("/proc/cpuinfo")
-    text = cpuinfo.read_text(encoding="utf-8", errors="replace") if cpuinfo.exists() else ""
-    named = re.search(r"^model name[^:\n]*:(.*)$", text, re.MULTILINE)
-    return named[1].strip() if named else platform.processor() or platform.machine()

@@ -65,10 +65,6 @@ class Store:
                 f"{printable(self.folder)}: cannot be used as the output folder: {error.strerror}"
             ) from None
 
-    def history(self, name: str) -> Path:
-        """Path of a history's CSV."""
-        return self.folder / HISTORIES / f"{name}{TABLE}"
-
     def put(
         self,
         name: str,
@@ -96,7 +92,7 @@ class Store:
         if found is None:
             for suffix in SUFFIXES:
                 within(self.folder, HISTORIES, f"{name}{suffix}")
-            found = History.load(self.history(name))
+            found = History.load(self.folder / HISTORIES / f"{name}{TABLE}")
         return self._remember(name, found)
 
     def _remember(self, name: str, history: History) -> History:

@@ -3,6 +3,7 @@
 import dataclasses
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,21 +33,6 @@ class Work:
     search_path: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Task(Work):
-    """One scene, whose history is kept; `uncertainty` asks for its numerical error, too."""
-
-    scene: Scene
-    uncertainty: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class BatchTask(Work):
-    """Many scenes, of which only peak rotation and outcome are kept."""
-
-    scenes: tuple[Scene, ...]
-
-
 @dataclass(frozen=True)
 class Played:
     """The result of a worker: the record, and the history's files by suffix.
@@ -61,29 +47,32 @@ class Played:
     traceback: str = ""
 
 
-def play(task: Task | BatchTask) -> Played:
-    """Simulate. Raises the model's errors; in a batch they are recorded by scene."""
+def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
+    """The history of a scene, with its numerical error if `uncertainty` asks for it.
+
+    Raises the model's errors.
+    """
     began = time.perf_counter()
-    sys.path.extend(path for path in task.search_path if path not in sys.path)
-    if isinstance(task, BatchTask):
-        return _play_batch(task, began)
-    history = _simulate(task, task.scene)
+    history = _simulate(work, scene)
     cost = {key: value for key, value in vars(history.cost).items() if value is not None}
     record = {
         "outcome": history.outcome,
         "notes": list(history.notes),
-        "settings": _plain(history.settings),
+        "settings": {  # as plain JSON values, sorted as the store returns them
+            str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
+            for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
+        },
         "uncertainty": dict(history.uncertainty),
-        "numerical": _numerical(task, history) if task.uncertainty else None,
+        "numerical": _numerical(work, scene, history) if uncertainty else None,
         "cost": {**cost, "worker_seconds": time.perf_counter() - began},
     }
-    return Played(record, history.packed(), None if is_own(task.family) else history)
+    return Played(record, history.packed(), None if is_own(work.family) else history)
 
 
-def _play_batch(task: BatchTask, began: float) -> Played:
+def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:
     """Peak |theta| (alpha) and outcome of each scene; None and the reason where it failed."""
-    found = [guarded(_end_of, task, scene) for scene in task.scenes]
-    failed = [one for one in found if isinstance(one, Failure)]
+    began = time.perf_counter()
+    found = [guarded(_end_of, work, scene) for scene in scenes]
     costs = [one[2] for one in found if not isinstance(one, Failure)]
     ends = [(None, one.reason) if isinstance(one, Failure) else one[:2] for one in found]
     cost = {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
@@ -92,50 +81,40 @@ def _play_batch(task: BatchTask, began: float) -> Played:
         "outcomes": [outcome for _, outcome in ends],
         "cost": {**cost, "worker_seconds": time.perf_counter() - began},
     }
-    return Played(record, traceback=next((one.traceback for one in failed if one.traceback), ""))
+    traces = (one.traceback for one in found if isinstance(one, Failure) and one.traceback)
+    return Played(record, traceback=next(traces, ""))
 
 
-def _end_of(task: Work, scene: Scene) -> tuple[float, str, Cost]:
-    history = _simulate(task, scene)
+def _end_of(work: Work, scene: Scene) -> tuple[float, str, Cost]:
+    history = _simulate(work, scene)
     return history.peak_rotation / scene.block.alpha, history.outcome, history.cost
 
 
-def _simulate(task: Work, scene: Scene) -> History:
-    returned: object = build_own(task.family, task.settings).simulate(scene)
+def _simulate(work: Work, scene: Scene) -> History:
+    """The history; raises `ModelFailure` for what is none, is empty or has a value not finite."""
+    sys.path.extend(path for path in work.search_path if path not in sys.path)
+    returned: object = build_own(work.family, work.settings).simulate(scene)
     if not isinstance(returned, History):
         raise ModelFailure(
-            f"{task.family} returned {type(returned).__name__}; `simulate` must return a"
+            f"{work.family} returned {type(returned).__name__}; `simulate` must return a"
             " rockcheck.History"
         )
-    history = dataclasses.replace(returned, model=task.label)
-    if fault := _not_finite(history):
-        raise ModelFailure(fault)
-    return history
+    for name, column in returned.channels.items():
+        if column.dtype.kind == "f" and not np.all(np.abs(column) <= MOST):  # NaN, too
+            row = int(np.flatnonzero(~(np.abs(column) <= MOST))[0])
+            raise ModelFailure(f"{name} is {column[row]} at t = {returned.channels['t'][row]:g} s")
+    if not len(returned.channels["t"]):
+        raise ModelFailure("the history is empty")
+    return dataclasses.replace(returned, model=work.label)
 
 
-def _numerical(task: Task, history: History) -> dict[str, Any] | None:
+def _numerical(work: Work, scene: Scene, history: History) -> dict[str, Any] | None:
     """Numerical uncertainty of a run; None for a model without a step.
 
     If a coarser run fails, the result is not converged.
     """
     try:
-        found = numerical_uncertainty(build_own(task.family, task.settings), task.scene, history)
+        found = numerical_uncertainty(build_own(work.family, work.settings), scene, history)
     except (ModelFailure, InputError) as error:
         found = failed(history, f"a coarser run failed: {printable(error)}")
     return None if found is None else found.model_dump(mode="json")
-
-
-def _not_finite(history: History) -> str:
-    for name, column in history.channels.items():
-        if column.dtype.kind == "f" and not np.all(np.abs(column) <= MOST):  # NaN, too
-            row = int(np.flatnonzero(~(np.abs(column) <= MOST))[0])
-            return f"{name} is {column[row]} at t = {history.channels['t'][row]:g} s"
-    return "" if len(history.channels["t"]) else "the history is empty"
-
-
-def _plain(settings: Any) -> dict[str, Any]:
-    """Settings as plain JSON values, sorted as the store returns them."""
-    return {
-        str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
-        for key, value in sorted(settings.items(), key=lambda item: str(item[0]))
-    }

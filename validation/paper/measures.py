@@ -73,6 +73,7 @@ Measured = tuple[list[Row], dict[str, Any]]
 class Paper:
     """The 28 spectra on one grid: outcomes and safe nodes by place, and by friction without a wall.
 
+    `falls` are the nodes that overturn: one whose run failed is neither safe nor overturned.
     `least`: the lowest overturning amplitude of `SCANNED` by (gap, e) of a right wall, None without
     one; infinite where none overturns. `tongues`: by friction, the nodes of `near_one_impact` at
     which the free block overturns after exactly one floor impact.
@@ -94,22 +95,13 @@ class Paper:
         self.safe, self.safe_alone = self.outcomes != 0, self.alone != 0
         for one in spectra:
             mu = AXES["friction"].index(one.scene.floor.friction)
-            outcomes, safe, place = self.alone, self.safe_alone, (mu,)
+            if not one.scene.walls:
+                self.alone[mu], self.safe_alone[mu] = one.outcomes, one.safe
             for wall in one.scene.walls:
-                outcomes, safe = self.outcomes, self.safe
                 side, e = AXES["side"].index(wall.side), RESTITUTIONS.index(wall.restitution)
-                place = side, mu, GAPS.index(wall.gap), e  # type: ignore[assignment]
-            outcomes[place], safe[place] = one.outcomes, one.safe
-
-    @property
-    def falls(self) -> Mask:
-        """Nodes that overturn, by place; a node whose run failed is neither safe nor overturned."""
-        return self.outcomes != SAFE
-
-    @property
-    def falls_alone(self) -> Mask:
-        """Nodes that overturn without a wall, by friction."""
-        return self.alone != SAFE
+                place = side, mu, GAPS.index(wall.gap), e
+                self.outcomes[place], self.safe[place] = one.outcomes, one.safe
+        self.falls, self.falls_alone = self.outcomes != SAFE, self.alone != SAFE
 
 
 def about(place: Sequence[int | None]) -> str:
@@ -123,25 +115,17 @@ def share(mask: Mask | float) -> str:
     return f"{100.0 * float(np.mean(mask)):.1f} %"
 
 
-def _along(axis: str) -> Iterator[tuple[Place, int]]:
-    """The places at the beginning of an axis, each with the axis's number."""
-    k = list(AXES).index(axis)
-    return ((place, k) for place in WALLS if place[k] == 0)
-
-
-def _at(place: Sequence[int | None], k: int, n: int | None) -> Any:
-    return (*place[:k], n, *place[k + 1 :])
-
-
 def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
     """Compare each value of a parameter, which the paper calls safer, with the next one."""
     rows = [_pair(paper, "no wall", *paper.safe_alone)] if free else []
-    for place, k in _along(axis):
-        for n, (one, other) in enumerate(pairwise(AXES[axis])):
-            what = about(_at(place, k, None))
-            what += f": {one:g} against {other:g} mm" if len(AXES[axis]) > 2 else ""
-            both = (paper.safe[_at(place, k, m)] for m in (n, n + 1))
-            rows.append(_pair(paper, what, *both))
+    k = list(AXES).index(axis)
+    for place in np.ndindex(*SIZES[:k], 1, *SIZES[k + 1 :]):
+        before, after = place[:k], place[k + 1 :]
+        along = paper.safe[(*before, slice(None), *after)]
+        for (one, safe), (other, next_safe) in pairwise(zip(AXES[axis], along, strict=True)):
+            what = about((*before, None, *after))
+            what += f": {one:g} against {other:g} mm" if len(along) > 2 else ""
+            rows.append(_pair(paper, what, safe, next_safe))
     return rows, {}
 
 
@@ -150,8 +134,8 @@ def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
     f, a = paper.frequencies[j], paper.amplitudes[i]
     opposite = "nowhere the opposite"
     if len(i):
-        opposite = f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-        opposite += (
+        opposite = (
+            f"the opposite at {share(len(i) / safer.size)} of the nodes,"
             f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
         )
     value = f"safe area {share(safer)} against {share(other)}; {opposite}"
@@ -305,8 +289,10 @@ def restitution_rules(paper: Paper) -> Measured:
     for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
         by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
-        value = f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-        value += f" at up to {share(by_e)} between e"
+        value = (
+            f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
+            f" at up to {share(by_e)} between e"
+        )
         rows.append(Row(f"{side} wall, μ 0.6", value, bool(by_gap < by_e)))
         most.append((by_gap, by_e))
     gaps, e = map(share, np.max(most, axis=0))
@@ -323,12 +309,19 @@ def likelier_side(paper: Paper) -> Measured:
         left, right = (np.mean(outcomes == side, axis=1) for side in (LEFT, RIGHT))
         gain = np.cumsum(right - left) > 0.0  # over amplitudes from the lowest up to each
         until = a[np.flatnonzero(gain)[-1]] if gain.any() else 0.0
-        said = f"clockwise up to a_p of {until:.1f} g tan α"
-        rows.append(Row(f"μ {mu:g}, lower amplitudes", said, bool(until > 0.0)))
-        rows.append(_lowest(paper, mu, outcomes))
-        value = f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}"
-        where = f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α"
-        rows.append(Row(where, value, bool(right.mean() > left.mean())))
+        rows += [
+            Row(
+                f"μ {mu:g}, lower amplitudes",
+                f"clockwise up to a_p of {until:.1f} g tan α",
+                bool(until > 0.0),
+            ),
+            _lowest(paper, mu, outcomes),
+            Row(
+                f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α",
+                f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}",
+                bool(right.mean() > left.mean()),
+            ),
+        ]
         ends.append(f"{until:.1f} g tan α (μ = {mu:g})")
         whole.append(f"{share(right)} against {share(left)} of the nodes (μ = {mu:g})")
     # The mirror image: a right wall under the reversed pulse is a left wall under the pulse.
@@ -368,13 +361,14 @@ def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.i
 
 
 @dataclass(frozen=True)
-class Shown:
-    """The case that shows a finding best, and the nodes that its map marks.
+class Beyond:
+    """A finding that is not in the paper, the case that shows it best, and the nodes of its map.
 
     `case` is its place or friction in words, `figure` the paper's figure; `safe` excludes marked
     nodes. `rows` and `says` are as of any measure.
     """
 
+    about: Mapping[str, Any]
     case: str
     figure: int
     gained: Mask
@@ -382,6 +376,12 @@ class Shown:
     safe: Mask
     rows: list[Row]
     says: dict[str, Any]
+
+    @property
+    def words(self) -> str:
+        """The finding's text, filled in."""
+        counts = {"gained": self.gained.sum(), "lost": self.lost.sum()}
+        return str(self.about["words"].format(**counts, **self.says))
 
 
 def _figure(side: int, mu: int) -> int:
@@ -394,7 +394,7 @@ def _case(place: Place) -> str:
     return f"{side} wall, {gap:g} mm, e = {e:g}, μ = {mu:g}"
 
 
-def exchange(paper: Paper) -> Shown:
+def exchange(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     """The wall that changes the safe area least, with the nodes that it saves and overturns."""
     alone, falls_alone = (
         mask[None, :, None, None] for mask in (paper.safe_alone, paper.falls_alone)
@@ -402,7 +402,8 @@ def exchange(paper: Paper) -> Shown:
     saved, lost = paper.safe & falls_alone, paper.falls & alone
     counts = {place: (int(saved[place].sum()), int(lost[place].sum())) for place in WALLS}
     place = min(counts, key=lambda one: abs(counts[one][0] - counts[one][1]))
-    return Shown(
+    return Beyond(
+        sentence,
         _case(place),
         _figure(*place[:2]),
         saved[place],
@@ -421,13 +422,14 @@ def exchange(paper: Paper) -> Shown:
     )
 
 
-def either_side(paper: Paper) -> Shown:
+def either_side(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     """Nodes at which the block stands alone, but falls beside a wall on either side."""
     alone, falls_alone = (mask[:, None, None] for mask in (paper.safe_alone, paper.falls_alone))
     harmed, helped = alone & paper.falls.all(axis=0), falls_alone & paper.safe.all(axis=0)
     places = list(np.ndindex(*SIZES[1:]))
     place = mu, gap, e = max(places, key=lambda one: int(harmed[one].sum()))
-    return Shown(
+    return Beyond(
+        sentence,
         f"{AXES['gap'][gap]:g} mm, e = {RESTITUTIONS[e]:g}, μ = {AXES['friction'][mu]:g}",
         _figure(1, mu),
         helped[place],
@@ -444,7 +446,7 @@ def either_side(paper: Paper) -> Shown:
     )
 
 
-def stronger_is_safe(paper: Paper) -> Shown:
+def stronger_is_safe(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     """Nodes that are safe though a weaker pulse of the same frequency overturns the block."""
     above = paper.safe & np.logical_or.accumulate(paper.falls, axis=-2)
     alone = paper.safe_alone & np.logical_or.accumulate(paper.falls_alone, axis=-2)
@@ -452,7 +454,8 @@ def stronger_is_safe(paper: Paper) -> Shown:
     free = alone[place[1]]
     masks = [(f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)]
     masks += [(_case(one), above[one]) for one in WALLS]
-    return Shown(
+    return Beyond(
+        sentence,
         _case(place),
         _figure(*place[:2]),
         above[place],
@@ -498,15 +501,6 @@ class Claim:
     rows: Sequence[Row]
 
 
-@dataclass(frozen=True)
-class Beyond:
-    """A finding that is not in the paper, and the case that shows it best."""
-
-    about: Mapping[str, Any]
-    words: str
-    shown: Shown
-
-
 def claims_of(paper: Paper) -> list[Claim]:
     """The paper's sentences with their verdicts.
 
@@ -531,15 +525,7 @@ def _judged(paper: Paper, about: Mapping[str, Any]) -> Claim:
 
 def findings_of(paper: Paper) -> list[Beyond]:
     """Findings from the spectra that are not in the paper."""
-    shown = [(about, globals()[about["measure"]](paper)) for about in SENTENCES["finding"]]
-    return [
-        Beyond(
-            about,
-            about["words"].format(gained=one.gained.sum(), lost=one.lost.sum(), **one.says),
-            one,
-        )
-        for about, one in shown
-    ]
+    return [globals()[about["measure"]](paper, about) for about in SENTENCES["finding"]]
 
 
 def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
@@ -579,10 +565,7 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
     yield Table(
         "findings",
         [text("sentence", "finding"), text("case", "where"), text("words", "nodes", brief=False)],
-        [
-            [one.about["sentence"], f"{one.shown.case} (Fig. {one.shown.figure})", one.words]
-            for one in found
-        ],
+        [[one.about["sentence"], f"{one.case} (Fig. {one.figure})", one.words] for one in found],
         "What the paper does not say",
     )
     gained, lost = (
@@ -597,19 +580,23 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
             "amplitudes": paper.amplitudes.tolist(),
             "record": False,
             "height": 3.0,
-            "panels": [_map(one.shown, column) for column, one in enumerate(found)],
+            "panels": [
+                {
+                    "title": one.case,
+                    "free": True,
+                    "outcomes": "".join(
+                        np.select(
+                            [one.lost, one.gained, one.safe], [LOST, GAINED, STANDS], FALLEN
+                        ).ravel()
+                    ),
+                    "place": [0, 1, column],
+                }
+                for column, one in enumerate(found)
+            ],
             "key": {FALLEN: "overturned", STANDS: "safe", GAINED: gained, LOST: lost},
         },
     )
-    yield _rows(
-        "finding-figures", "All cases", {one.about["name"]: one.shown.rows for one in found}
-    )
-
-
-def _map(one: Shown, column: int) -> dict[str, Any]:
-    letters = np.select([one.lost, one.gained, one.safe], [LOST, GAINED, STANDS], FALLEN)
-    shown = "".join(letters.ravel())
-    return {"title": one.case, "free": True, "outcomes": shown, "place": [0, 1, column]}
+    yield _rows("finding-figures", "All cases", {one.about["name"]: one.rows for one in found})
 
 
 def _rows(name: str, title: str, of: Mapping[str, Sequence[Row]]) -> Table:
@@ -630,10 +617,13 @@ def _areas(paper: Paper) -> Plot:
     for side, of_side in zip(AXES["side"], areas, strict=True):
         series = []
         for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True):
-            lines = zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
-            series += [Series(f"μ {mu:g}, e {e:g}", gaps, line) for e, line in lines]
-            level = [float(free)] * len(gaps)
-            series.append(Series(f"μ {mu:g}, no wall", gaps, level, style="dots"))
+            series += [
+                *(
+                    Series(f"μ {mu:g}, e {e:g}", gaps, line)
+                    for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
+                ),
+                Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
+            ]
         panels.append(Panel(f"Wall on the {side}", series))
     x, y = Axis("gap, mm"), Axis("safe nodes, %")
     return Plot("safe-areas", panels=panels, x=x, y=y, note="Safe areas of all spectra.")

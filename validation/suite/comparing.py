@@ -72,11 +72,10 @@ class Planned(Task):
 
     def play(self) -> workers.Played:
         """The history, or the peaks of a batch."""
-        model, scene = vars(self.variant), self.scene
         if self.ensemble is None:
-            return workers.play(workers.Task(**model, scene=scene, uncertainty=self.uncertainty))
-        scenes = tuple(self.ensemble.drawn(scene, n) for n in self.numbers)
-        return workers.play(workers.BatchTask(**model, scenes=scenes))
+            return workers.play(self.variant, self.scene, uncertainty=self.uncertainty)
+        scenes = [self.ensemble.drawn(self.scene, n) for n in self.numbers]
+        return workers.play_batch(self.variant, scenes)
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on

@@ -10,6 +10,12 @@ from rockcheck.scenes import ModelFailure
 from rockcheck.validation.finding import Column, Finding, Table
 from rockcheck.validation.study import Study, Task
 
+FAULTS = {
+    13.0: ModelFailure("no square of 13"),
+    14.0: ZeroDivisionError("a bug"),
+    16.0: KeyboardInterrupt(),
+}
+
 
 @dataclass(frozen=True)
 class Square(Task):
@@ -40,25 +46,18 @@ class Squares(Study):
         self.first = [Square(value, str(log), **how) for value in values]
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Square]:
-        larger = [
-            one.value
-            for one in done.values()
-            if isinstance(one, Squared) and 100.0 < one.value < 1e6
-        ]
+        squares = (one.value for one in done.values() if isinstance(one, Squared))
+        larger = (value for value in squares if 100.0 < value < 1e6)
         return [*self.first, *(Square(value, self.first[0].log) for value in larger)]
 
     @staticmethod
     def play(task: Square) -> Squared:
         with Path(task.log).open("a") as file:
             file.write(f"{task.value:g}\n")
-        if task.value == 13.0:
-            raise ModelFailure("no square of 13")
-        if task.value == 14.0:
-            raise ZeroDivisionError("a bug")
+        if task.value in FAULTS:
+            raise FAULTS[task.value]
         if task.value == 15.0:
             os._exit(3)
-        if task.value == 16.0:
-            raise KeyboardInterrupt
         return Squared(task.value**2, os.getpid())
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
