@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import TypeAdapter, field_validator
 
@@ -18,8 +18,8 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.files import UncertainScene
-from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, too_short
-from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
+from rockcheck.validation.discrepancy.compare import compare, describe, too_short
+from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.execute import provenance, workers
@@ -32,6 +32,7 @@ from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
+T = TypeVar("T")
 #: Measures judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.
 BY_ANY = ("outcome_agrees", "peak_ratio")
@@ -95,30 +96,51 @@ class CellRecord(Stored):
     cost: CostRecord
 
 
-class ComparisonRecord(Stored):
-    """The figures of a comparison, and its gaps by window.
+class BatchRecord(Stored):
+    """The kept record of a batch: peak |theta| in alpha and outcome of each scene.
 
-    A gap says what could not be compared, and whether because one block fell; its key is measure
-    and window where the measure has a gap of its own. `impact_law` and `overturned_at` are given
-    with a cell's own figures.
+    None and the reason where the model failed.
     """
 
-    figures: tuple[Figure, ...]
-    gaps: dict[str, tuple[str, bool]]
+    peaks: tuple[float | None, ...]
+    outcomes: tuple[str, ...]
+    cost: CostRecord
+
+
+class Window(NamedTuple):
+    """A window as tolerances name it, its end (s; None: the whole time), and its measures."""
+
+    name: str
+    until: float | None
+    measures: Sequence[str]
+
+
+class Compared(NamedTuple):
+    """A figure, and what of its window could not be compared: `fall` if because one block fell."""
+
+    figure: Figure
+    gap: str = ""
+    fall: bool = False
+
+
+class ComparisonRecord(Stored):
+    """All figures of a cell, its own and those against each reference."""
+
+    figures: tuple[Compared, ...]
     impact_law: LawFollowed | None = None
     overturned_at: float | None = None
 
     @field_validator("figures")
     @classmethod
-    def _known(cls, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
-        if unknown := {figure.measure for figure in figures} - MEASURES.keys():
+    def _known(cls, figures: tuple[Compared, ...]) -> tuple[Compared, ...]:
+        if unknown := {one.figure.measure for one in figures} - MEASURES.keys():
             raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
         return figures
 
 
-def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
+def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
     """The store's value of type `kind` under that name; computed and kept if missing or invalid."""
-    adapter = TypeAdapter(kind)
+    adapter: TypeAdapter[T] = TypeAdapter(kind)
     with suppress(KeyError, TypeError, ValueError):
         return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
     found = compute()
@@ -141,24 +163,19 @@ def inputs_of(store: Store, given: UncertainScene) -> Inputs:
         spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
         correlation=given.correlation.tolist(),
     )
-    found: Inputs = kept(store, name, Inputs, lambda: propagate(given).inputs)
-    return found
+    return kept(store, name, Inputs, lambda: propagate(given).inputs)
 
 
 def landing_of(store: Store, scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part, None without one; kept in the store."""
 
     def landing() -> Landing | None:
-        try:
+        with suppress(InputError, ModelFailure):  # it is not a scene for that model
             return parting_landing(scene)
-        except (InputError, ModelFailure):  # it is not a scene for that model
-            return None
-
-    if not may_fly(scene):
         return None
+
     name = _of_scene(scene, "impact-laws", "validation.discrepancy.impact_laws")
-    found: Landing | None = kept(store, name, Landing | None, landing)
-    return found
+    return kept(store, name, Landing | None, landing) if may_fly(scene) else None
 
 
 def horizon_of(store: Store, scene: Scene) -> float:
@@ -167,7 +184,7 @@ def horizon_of(store: Store, scene: Scene) -> float:
     Up to this time, histories can be compared point by point.
     """
     name = _of_scene(scene, HORIZON, "ebm.horizon")
-    return float(kept(store, name, float, lambda: predictability_horizon(scene)))
+    return kept(store, name, float, lambda: predictability_horizon(scene))
 
 
 def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
@@ -185,33 +202,37 @@ def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
 
 
 def by_any(
-    found: Discrepancy,
-    references: Mapping[str, History],
     candidate: History,
+    reference: History | None,
+    others: Mapping[str, History],
     scene: Scene,
-    until: float | None,
-    measures: Iterable[str],
-) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
-    """The figures of a comparison, those of BY_ANY against the reference under the nearest law.
+    window: Window,
+) -> list[Compared]:
+    """A history's figures against `reference`, those of BY_ANY against it under the nearest law.
 
-    `references` are the reference's histories under other laws. The note of a figure names the law
-    if it is another one. The second value says, by measure, what could not be compared under that
-    law, and whether the reason is that one block fell.
+    `others` are the reference's histories under other laws. The note of a figure names the law if
+    it is another one. Without a reference, the history's own figures.
     """
-    figures = {figure.measure: figure for figure in found.figures}
-    gaps: dict[str, tuple[str, bool]] = {}
+    name, until, measures = window
+    if reference is None:
+        own = describe(candidate, until=until, scene=scene, measures=measures)
+        figures = {one.measure: Compared(one, too_short(candidate, until)) for one in own}
+    else:
+        found = compare(reference, candidate, until=until, scene=scene, measures=measures)
+        figures = {one.measure: Compared(one, found.gap, found.fall) for one in found.figures}
     wanted = [measure for measure in measures if measure in BY_ANY]
-    for law, reference in references.items():
-        other = compare(reference, candidate, until=until, scene=scene, measures=wanted)
+    for law, history in others.items():
+        other = compare(history, candidate, until=until, scene=scene, measures=wanted)
         for rival in other.figures:
-            own = figures.get(rival.measure)
-            if own is not None and _away(rival) < _away(own):
-                note = f'{rival.note}; impacts = "{law}"' if rival.note else f'impacts = "{law}"'
-                figures[rival.measure] = rival.model_copy(
-                    update={"against": own.against, "window": own.window, "note": note}
-                )
-                gaps[rival.measure] = other.gap, other.fall
-    return tuple(figures.values()), gaps
+            first = figures[rival.measure].figure
+            if _away(rival) < _away(first):
+                note = "; ".join(filter(None, (rival.note, f'impacts = "{law}"')))
+                nearer = rival.model_copy(update={"against": first.against, "note": note})
+                figures[rival.measure] = Compared(nearer, other.gap, other.fall)
+    return [
+        one._replace(figure=one.figure.model_copy(update={"window": name}))
+        for one in figures.values()
+    ]
 
 
 def _away(figure: Figure) -> float:
@@ -222,8 +243,8 @@ def _away(figure: Figure) -> float:
 
 def compared(
     store: Store, scene: Scene, planned: Planned, asked: Mapping[str, Asked]
-) -> dict[str, ComparisonRecord]:
-    """The comparisons of a cell by name of the reference, OWN_FIGURES for its own figures.
+) -> ComparisonRecord:
+    """The comparisons of a cell; `asked` by name of the reference, OWN_FIGURES for its own figures.
 
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
@@ -236,73 +257,49 @@ def compared(
         [name, reference.key if reference else "", list(map(str, extra))]
         for name, (reference, extra) in asked.items()
     ]
-    name = name_of(
-        scene.name,
-        planned.variant.label,
-        provenance.digest(
-            # with the code of this module and of `compare`
-            json.dumps([planned.key, against, horizon, provenance.code_digest(__name__)])
-        ),
+    # with the code of this module and of `compare`
+    depends = [planned.key, against, horizon, provenance.code_digest(__name__)]
+    name = name_of(scene.name, planned.model, provenance.digest(json.dumps(depends)))
+    return kept(
+        store, name, ComparisonRecord, lambda: _compute(store, scene, planned, asked, horizon)
     )
-    found: dict[str, ComparisonRecord] = kept(
-        store,
-        name,
-        dict[str, ComparisonRecord],
-        lambda: {
-            one: _compute(store, scene, planned, reference, extra, horizon)
-            for one, (reference, extra) in asked.items()
-        },
-    )
-    return {one: found[one] for one in asked}  # what is kept is in order of the alphabet
 
 
 def _compute(
     store: Store,
     scene: Scene,
     planned: Planned,
-    reference: Planned | None,
-    windowed: Sequence[Windowed],
+    asked: Mapping[str, Asked],
     horizon: float | None,
 ) -> ComparisonRecord:
-    """The comparison with `reference`; without one, the cell's own figures and impact law."""
     candidate, landing = store.load(planned.name), landing_of(store, scene)
-    windows = _windows(DIFFERENCES if reference else FIGURES, windowed, horizon)
-    if reference is None:
-        return ComparisonRecord(
-            figures=tuple(
-                figure.model_copy(update={"window": window})
-                for window, until, measures in windows
-                for figure in describe(candidate, until=until, scene=scene, measures=measures)
-            ),
-            gaps={window: (too_short(candidate, until), False) for window, until, _ in windows},
-            impact_law=landing.followed_by(candidate, scene) if landing else None,
-            overturned_at=candidate.overturned_at,
-        )
-    yardstick = store.load(reference.name)
-    others = under_other_laws(scene, reference.variant) if landing else {}
-    figures: list[Figure] = []
-    gaps: dict[str, tuple[str, bool]] = {}
-    for window, until, measures in windows:
-        found = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-        rivals = others if landing and (until is None or until > landing.t) else {}
-        nearest, own = by_any(found, rivals, candidate, scene, until, measures)
-        figures += [figure.model_copy(update={"window": window}) for figure in nearest]
-        gaps[window] = found.gap, found.fall
-        gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-    return ComparisonRecord(figures=tuple(figures), gaps=gaps)
+    parted = landing.t if landing else math.inf
+    figures: list[Compared] = []
+    for reference, extra in asked.values():
+        yardstick = store.load(reference.name) if reference else None
+        others = under_other_laws(scene, reference.variant) if reference and landing else {}
+        for window in _windows(reference, extra, horizon):
+            rivals = others if window.until is None or window.until > parted else {}
+            figures += by_any(candidate, yardstick, rivals, scene, window)
+    return ComparisonRecord(
+        figures=tuple(figures),
+        impact_law=landing.followed_by(candidate, scene) if landing else None,
+        overturned_at=candidate.overturned_at,
+    )
 
 
 def _windows(
-    known: Mapping[str, Measure], extra: Iterable[Windowed], horizon: float | None
-) -> list[tuple[str, float | None, list[str]]]:
-    """Each window, its end (s; None: the whole time), and its measures."""
+    reference: Planned | None, extra: Iterable[Windowed], horizon: float | None
+) -> list[Window]:
+    """The whole time with all measures but those on request, and the windows of `extra`."""
+    known = DIFFERENCES if reference else FIGURES
     found = {"": [measure.name for measure in known.values() if not measure.on_request]}
     for what in extra:
         found.setdefault(what.window, []).append(what.measure)
     ends = {"": None, HORIZON: horizon}
     return [
-        (window, ends[window] if window in ends else float(window[:-1]), measures)
-        for window, measures in found.items()
+        Window(name, ends[name] if name in ends else float(name[:-1]), measures)
+        for name, measures in found.items()
     ]
 
 

@@ -187,32 +187,24 @@ class Suite:
         """The suites that it joins, or the suite itself."""
         return self.included or (self,)
 
-    def suite_of(self, scene: str) -> Suite:
-        """The suite that a scene or an ensemble comes from: this one, or the included one."""
-        return next(
-            (suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles),
-            self,
-        )
+    @property
+    def owners(self) -> dict[str, Suite]:
+        """The part that each scene or ensemble comes from."""
+        return {place: part for part in self.parts for place in (*part.scenes, *part.ensembles)}
 
-    def cells(self) -> Iterator[tuple[Scene, Work]]:
-        """All cells, scene by scene."""
-        return (
-            (suite.scenes[scene], suite.models[model])
-            for suite in self.parts
-            for scene, model in _played(suite.scenes, suite.models)
-        )
-
-    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
-        """All ensembles with the scene that they are drawn from, model by model."""
-        return (
-            (*suite.ensembles[name], suite.models[model])
-            for suite in self.parts
-            for name, model in _played(suite.ensembles, suite.models)
-        )
+    def cells(self) -> Iterator[tuple[Scene, Work, Ensemble | None]]:
+        """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
+        for part in self.parts:
+            for name, model in _played(part.scenes, part.models):
+                yield part.scenes[name], part.models[model], None
+        for part in self.parts:
+            for name, model in _played(part.ensembles, part.models):
+                ensemble, scene = part.ensembles[name]
+                yield scene, part.models[model], ensemble
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
-        own = self.suite_of(scene)
+        own = self.owners.get(scene, self)
         if scene not in own.scenes:
             raise unknown_name("scene of the suite", scene, self.scenes)
         if model not in own.models:
@@ -222,7 +214,7 @@ class Suite:
             for place, line in own.tolerances.items()
             if (place.scene, place.model) == (scene, model)
         }
-        needed = {model, *own.yardsticks(scene, tolerances)}
+        needed = {model, *own.yardsticks(tolerances)}
         return replace(
             own,
             scenes={scene: own.scenes[scene]},
@@ -231,28 +223,32 @@ class Suite:
             tolerances=tolerances,
         )
 
-    def required(self, scene: str, model: str) -> dict[Place, Kind]:
-        """The checks of a cell, with their kinds: those required or given a tolerance."""
-        own = self.suite_of(scene)
-        require = own.given.require
-        if scene in own.ensembles:
-            require = Require(difference=require.ensemble)
-        places = [
-            Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in require.figures
-        ]
-        for against, texts in (
-            (own.reference, require.difference),
-            (own.model_form, require.model_form),
-        ):
-            if against and model not in (own.reference, against):
-                places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
-        places += own._judged.get((scene, model), [])
-        return {place: own.kind(place) for place in places}
+    def required(self, place: str, model: str) -> dict[Place, Kind]:
+        """The checks of a cell, with their kinds: those required or given a tolerance.
 
-    def yardsticks(self, scene: str, checks: Iterable[Place]) -> list[str]:
-        """`OWN_FIGURES`, then the models that a scene's cells are compared with."""
-        own, named = self.suite_of(scene), (place.against for place in checks)
-        return list(dict.fromkeys((OWN_FIGURES, own.reference, own.model_form, *named)))
+        `place` is a scene or an ensemble of this very suite, not of one that it joins.
+        """
+        require = self.given.require
+        if place in self.ensembles:
+            require = Require(difference=require.ensemble)
+        asked = [(OWN_FIGURES, require.figures)]
+        for against, texts in (
+            (self.reference, require.difference),
+            (self.model_form, require.model_form),
+        ):
+            if against and model not in (self.reference, against):
+                asked.append((against, texts))
+        places = [
+            Place(place, model, against, Windowed.parse(text))
+            for against, texts in asked
+            for text in texts
+        ]
+        return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
+
+    def yardsticks(self, checks: Iterable[Place]) -> list[str]:
+        """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
+        named = (place.against for place in checks)
+        return list(dict.fromkeys((OWN_FIGURES, self.reference, self.model_form, *named)))
 
     def kind(self, place: Place) -> Kind:
         """The kind of a check.

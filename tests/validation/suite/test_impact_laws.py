@@ -8,10 +8,9 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Scene
-from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute.store import COMPARISONS, Store
 from rockcheck.validation.execute.workers import Work
-from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
+from rockcheck.validation.suite.comparing import Window, by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -210,16 +209,7 @@ def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> Non
         EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
         for law in ("moreau", "floor-first")
     )
-    others = {"floor-first": other}
-    figures, gaps = by_any(
-        compare(one, one, scene=scene), others, one, scene, None, ["outcome_agrees", "peak_ratio"]
-    )
-    assert gaps == {}
-    assert {
-        figure.measure: figure.value
-        for figure in figures
-        if figure.measure in ("outcome_agrees", "peak_ratio")
-    } == {
-        "outcome_agrees": 1.0,
-        "peak_ratio": 1.0,
-    }
+    whole = Window("", None, ["outcome_agrees", "peak_ratio"])
+    found = by_any(one, one, {"floor-first": other}, scene, whole)
+    assert [figure.value for figure, *_ in found] == [1.0, 1.0]
+    assert [gap for _, gap, _ in found] == ["", ""]

@@ -188,8 +188,7 @@ def test_a_new_line_holds_what_it_was_made_from(tmp_path):
 def test_shipped_suites_load_and_their_tolerances_have_cells():
     for name in named_suites():
         suite = load_suite(name)
-        cells = {(scene.name, variant.label) for scene, variant in suite.cells()}
-        cells |= {(ensemble.name, variant.label) for ensemble, _, variant in suite.ensemble_cells()}
+        cells = {((of or scene).name, variant.label) for scene, variant, of in suite.cells()}
         assert cells, name
         for place, line in suite.tolerances.items():
             assert (place.scene, place.model) in cells, str(place)
