@@ -27,7 +27,7 @@ from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import CostRecord, value_of
+from rockcheck.validation.suite.results import Cell, CostRecord, value_of
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
@@ -148,22 +148,33 @@ def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
     return found
 
 
-def _of_scene(scene: Scene, what: str, module: str, **more: Any) -> str:
-    """The name of a kept result of a scene that depends on the code of a module."""
+def _of_scene(
+    store: Store,
+    scene: Scene,
+    what: str,
+    module: str,
+    kind: Any,
+    compute: Callable[[], T],
+    **more: Any,
+) -> T:
+    """A result of type `kind` on a scene, by the code of a module; kept in the store."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
-    return name_of(scene.name, what, provenance.cell_key(scene, "ebm-unilateral", depends))
+    key = provenance.cell_key(scene, "ebm-unilateral", depends)
+    return kept(store, name_of(scene.name, what, key), kind, compute)
 
 
 def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     """The effect of the spread of a scene's inputs on its figures; kept in the store."""
-    name = _of_scene(
+    return _of_scene(
+        store,
         given.scene,
         "inputs",
         "validation.uncertainty.population",
+        Inputs,
+        lambda: propagate(given).inputs,
         spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
         correlation=given.correlation.tolist(),
     )
-    return kept(store, name, Inputs, lambda: propagate(given).inputs)
 
 
 def landing_of(store: Store, scene: Scene) -> Landing | None:
@@ -174,8 +185,10 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
             return parting_landing(scene)
         return None
 
-    name = _of_scene(scene, "impact-laws", "validation.discrepancy.impact_laws")
-    return kept(store, name, Landing | None, landing) if may_fly(scene) else None
+    module = "validation.discrepancy.impact_laws"
+    if not may_fly(scene):
+        return None
+    return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
 
 
 def horizon_of(store: Store, scene: Scene) -> float:
@@ -183,8 +196,9 @@ def horizon_of(store: Store, scene: Scene) -> float:
 
     Up to this time, histories can be compared point by point.
     """
-    name = _of_scene(scene, HORIZON, "ebm.horizon")
-    return kept(store, name, float, lambda: predictability_horizon(scene))
+    return _of_scene(
+        store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
+    )
 
 
 def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
@@ -309,51 +323,47 @@ QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 def explanations(
     scene: Scene,
-    figures: Sequence[Figure],
-    own: CellRecord,
-    references: Mapping[str, tuple[Sequence[Figure], CellRecord]],
+    cell: Cell,
+    references: Iterable[Cell],
+    scatters: Mapping[str, Mapping[str, float]],
     inputs: Inputs | None,
 ) -> Iterator[Explanation]:
-    """The verdict on each quantity of a cell against each reference, by name.
+    """The verdict on each quantity of a cell against each reference.
 
-    `figures` and `own` are the cell's figures and record. There is no verdict for a model whose
-    numerical error is unknown. Where the outcomes differ and a block falls, the only verdict is on
-    the outcome.
+    `scatters` is, by model, the scatter of the repeats of a measured history: rotations in rad,
+    slips in m. There is no verdict for a model whose numerical error is unknown. Where the outcomes
+    differ and a block falls, the only verdict is on the outcome.
     """
-    if own.numerical is None:
+    if cell.numerical is None:
         return
-    # of a measured history, the scatter of its repeats: rotations in rad, slips in m
     sizes = {"alpha": scene.block.alpha, "m": 1.0}
     u_inputs = {name: inputs.u_input(name) or 0.0 for name in QUANTITIES} if inputs else {}
-    for against, (yardstick, other) in references.items():
-        if own.outcome != other.outcome and "overturned" in own.outcome + other.outcome:
-            yield _other_outcome(against, own.numerical, other.numerical, inputs)
+    for other in references:
+        if cell.outcome != other.outcome and "overturned" in cell.outcome + other.outcome:
+            yield _other_outcome(other.model, cell.numerical, other.numerical, inputs)
             continue
         for name, unit in QUANTITIES.items():
-            error = _difference(name, figures, yardstick, against)
+            error = _difference(name, cell.figures, other)
             if error is None:
                 continue
-            u_num, reason = _both(name, own.numerical, other.numerical)
-            scatters = own.uncertainty.get(name, 0.0), other.uncertainty.get(name, 0.0)
-            u_data = math.hypot(scatters[0] / sizes[unit], scatters[1] / sizes[unit])
+            u_num, reason = _both(name, cell.numerical, other.numerical)
+            own, theirs = scatters[cell.model].get(name, 0.0), scatters[other.model].get(name, 0.0)
             yield explain(
                 name,
                 unit,
                 error,
                 u_num,
                 u_inputs.get(name, 0.0),
-                u_data,
+                math.hypot(own / sizes[unit], theirs / sizes[unit]),
                 reason=reason,
-                against=against,
+                against=other.model,
             )
 
 
-def _difference(
-    name: str, figures: Sequence[Figure], yardstick: Sequence[Figure], against: str
-) -> float | None:
+def _difference(name: str, figures: Sequence[Figure], other: Cell) -> float | None:
     if name == "theta_rms":
-        return value_of(figures, name, against)
-    mine, theirs = value_of(figures, name), value_of(yardstick, name)
+        return value_of(figures, name, other.model)
+    mine, theirs = value_of(figures, name), value_of(other.figures, name)
     return None if mine is None or theirs is None else abs(mine - theirs)
 
 

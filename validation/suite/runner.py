@@ -120,6 +120,7 @@ class SuiteStudy(Study):
         }
         self.playable = in_order([item for item in self.items if item not in self.ended])
         self.read_back: set[Planned] = set()
+        #: Batches of which some scenes failed without a result.
         self.traces: set[Planned] = set()
         self.compared: dict[str, list[Cell]] = {}
 
@@ -204,9 +205,7 @@ class SuiteStudy(Study):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The run, as the data of a finding."""
         suite = self.suite
-        failed = {task: one for task, one in done.items() if isinstance(one, Failure)}
-        self.ended |= failed
-        self.traces |= {task for task, one in failed.items() if one.traceback}
+        self.ended |= {task: one for task, one in done.items() if isinstance(one, Failure)}
         if any(item not in self.ended for item in self.items):
             return Finding(self.name, suite.name, "interrupted", complete=False)
         inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
@@ -261,13 +260,18 @@ class SuiteStudy(Study):
         status = "failed" if reason else "done"
         if missing := not_installed(variant.family):
             status = "absent" if has_wheel(variant.family) else "unavailable"
-        traced = [f"{FAULTS}/{part.name}.txt" for part in parts if part in self.traces]
-        whole = "".join(part.key for part in parts)
+        traced = [
+            f"{FAULTS}/{part.name}.txt"
+            for part in parts
+            if part in self.traces or getattr(self.ended[part], "traceback", None)
+        ]
         return {
             "scene": first.place,
             "model": variant.label,
             "settings": dict(variant.settings),
-            "key": provenance.digest(whole) if first.ensemble else first.key,
+            "key": provenance.digest("".join(part.key for part in parts))
+            if first.ensemble
+            else first.key,
             "status": status,
             "reason": missing or reason,
             "read_back": all(part in self.read_back for part in parts),
@@ -333,19 +337,12 @@ class SuiteStudy(Study):
         Only of those that finished, and whose numerical error is known.
         """
         own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
-        records = {label: self.ended[one] for label, (one,) in self.planned[scene].items()}
+        played = self.planned[scene]
+        scatters = {one.model: self.ended[played[one.model][0]].uncertainty for one in done}
         for cell in self.compared[scene]:
-            references = {
-                other.model: (other.figures, records[other.model])
-                for other in done
-                if other.model in {own.reference, own.model_form} - {cell.model}
-            }
-            mine = records[cell.model]
-            found = (
-                explanations(own.scenes[scene], cell.figures, mine, references, inputs)
-                if cell in done
-                else ()
-            )
+            against = {own.reference, own.model_form} - {cell.model}
+            references = [other for other in done if other.model in against]
+            found = explanations(own.scenes[scene], cell, references, scatters, inputs)
             yield cell.model_copy(update={"explanations": tuple(found)})
 
     def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
@@ -362,11 +359,10 @@ class SuiteStudy(Study):
             peaks={label: one.peaks for label, one in played.items()},
             outcomes={label: one.outcomes for label, one in played.items()},
         )
-        cells = [
+        return whole, [
             self._ensemble_cell(batches, samples, played[label].cost)
             for label, batches in planned.items()
         ]
-        return whole, cells
 
     def _together(self, batches: Sequence[Planned]) -> BatchRecord:
         """Batches as one; each scene of a batch that failed has its reason."""
@@ -465,13 +461,14 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
     compiled as a whole are quick, and fill the processes up to the end.
     """
     first = {item.compiles: item for item in reversed(items)}
-
-    def turn(item: Planned) -> tuple[bool, bool, float]:
-        quick, scene = family(item.variant.family).compiled, item.scene
-        waits = not item.compiles or first[item.compiles] is not item
-        return waits, quick, -scene.duration * (1 + len(scene.walls))
-
-    return sorted(items, key=turn)
+    return sorted(
+        items,
+        key=lambda item: (
+            not item.compiles or first[item.compiles] is not item,
+            family(item.variant.family).compiled,
+            -item.scene.duration * (1 + len(item.scene.walls)),
+        ),
+    )
 
 
 def _missing(place: Place) -> Figure:

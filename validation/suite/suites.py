@@ -231,16 +231,14 @@ class Suite:
         require = self.given.require
         if place in self.ensembles:
             require = Require(difference=require.ensemble)
-        asked = [(OWN_FIGURES, require.figures)]
-        for against, texts in (
-            (self.reference, require.difference),
-            (self.model_form, require.model_form),
-        ):
-            if against and model not in (self.reference, against):
-                asked.append((against, texts))
         places = [
             Place(place, model, against, Windowed.parse(text))
-            for against, texts in asked
+            for against, texts in (
+                (OWN_FIGURES, require.figures),
+                (self.reference, require.difference),
+                (self.model_form, require.model_form),
+            )
+            if against == OWN_FIGURES or (against and model not in (self.reference, against))
             for text in texts
         ]
         return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
@@ -299,9 +297,8 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
-        text, shown = str(error), printable(path)
-        told = text.startswith((printable(path.parent), f"{shown}: "))
-        raise InputError(text if told else f"{shown}: {text}") from None
+        told = str(error).startswith((printable(path.parent), f"{printable(path)}: "))
+        raise InputError(str(error) if told else f"{printable(path)}: {error}") from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
@@ -382,11 +379,9 @@ def is_scene(source: str) -> bool:
 
     Raises `InputError` for a file that is no TOML.
     """
-    if source in named_suites():
-        return False
     path = Path(source)
-    return source in named_scenes() or (
-        path.suffix.lower() == ".toml" and "block" in read_toml(path)
+    return source not in named_suites() and (
+        source in named_scenes() or (path.suffix.lower() == ".toml" and "block" in read_toml(path))
     )
 
 
@@ -395,17 +390,16 @@ def _check_names(
 ) -> None:
     """Raise `InputError` where something is missing, named twice, or unknown."""
     known = ", ".join(models) or "none"
-    faults = [
-        (label and label not in models, key, f"{label!r} is not among the suite's models: {known}")
-        for key, label in (("reference", given.reference), ("model_form", given.model_form))
-    ]
-    faults += [
+    count = Counter((*scenes, *(one.name for one in given.ensemble)))
+    for wrong, key, said in (
+        *(
+            (one and one not in models, key, f"{one!r} is not among the suite's models: {known}")
+            for key, one in (("reference", given.reference), ("model_form", given.model_form))
+        ),
         (not models, "models", "no model; at least the reference is needed"),
         (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
-    ]
-    count = Counter((*scenes, *(one.name for one in given.ensemble)))
-    faults += [(n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()]
-    for wrong, key, said in faults:
+        *((n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()),
+    ):
         if wrong:
             raise InputError(said, key)
     for key, texts in given.require:
@@ -434,12 +428,12 @@ def _tolerances(
 
 def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
-    for scene in scenes:
-        yield from (
-            (scene, label)
-            for label, model in models.items()
-            if scene in model.settings.get("files", {scene: ""})
-        )
+    return (
+        (scene, label)
+        for scene in scenes
+        for label, model in models.items()
+        if scene in model.settings.get("files", {scene: ""})
+    )
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:

@@ -13,7 +13,12 @@ from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.suites import load_suite, named_suites
-from rockcheck.validation.suite.tolerances import Tolerance, Windowed, judge, parse_tolerances
+from rockcheck.validation.suite.tolerances import (
+    Tolerance,
+    Windowed,
+    judge,
+    parse_tolerances,
+)
 
 LINE = Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 
@@ -96,10 +101,10 @@ def check(value, line=LINE, measure="theta_rms"):
 
 
 def accepted(path: Path, run: Run, reason: str | None = None):
-    suite = SimpleNamespace(
-        included=(), path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}
+    part = SimpleNamespace(
+        path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
     )
-    return accept(suite, run, reason)
+    return accept(SimpleNamespace(parts=[part]), run, reason)
 
 
 FILE = (
