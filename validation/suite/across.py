@@ -322,8 +322,8 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
 
 
 def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment]) -> Panel:
-    bad = [n for n, moment in enumerate(moments) if name in moment.not_passed]
-    marked = Series("not passed", [n + 1 for n in bad], [values[n] for n in bad], style="points")
+    bad = [n for n, moment in enumerate(moments, 1) if name in moment.not_passed]
+    marked = Series("not passed", bad, [values[n - 1] for n in bad], style="points")
     whole = Series("", list(range(1, len(moments) + 1)), values)
     return Panel(name.replace(": ", "\n", 1), [whole, marked])
 

@@ -185,20 +185,10 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
             return parting_landing(scene)
         return None
 
-    module = "validation.discrepancy.impact_laws"
     if not may_fly(scene):
         return None
+    module = "validation.discrepancy.impact_laws"
     return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
-
-
-def horizon_of(store: Store, scene: Scene) -> float:
-    """The horizon of predictability of a scene, s (`ebm.horizon`); kept in the store.
-
-    Up to this time, histories can be compared point by point.
-    """
-    return _of_scene(
-        store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
-    )
 
 
 def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
@@ -262,11 +252,11 @@ def compared(
 
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
-    horizon = (
-        horizon_of(store, scene)
-        if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
-        else None
-    )
+    horizon = None  # s; up to it, histories can be compared point by point
+    if any(what.window == HORIZON for _, extra in asked.values() for what in extra):
+        horizon = _of_scene(
+            store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
+        )
     against = [
         [name, reference.key if reference else "", list(map(str, extra))]
         for name, (reference, extra) in asked.items()

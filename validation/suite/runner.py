@@ -98,7 +98,6 @@ class SuiteStudy(Study):
     """
 
     name = "suite"
-    record = CellRecord | BatchRecord
     kinds = (HISTORIES, COMPARISONS)
 
     def __init__(self, suite: Suite, folder: Path) -> None:
@@ -173,7 +172,7 @@ class SuiteStudy(Study):
         found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            self.ended[task] = self._adapter.validate_python(found)
+            self.ended[task] = _record_of(task).model_validate(found)
             self.read_back.add(task)
         return self.ended.get(task)
 
@@ -182,7 +181,7 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        self.ended[task] = self._adapter.validate_python(record.record)
+        self.ended[task] = _record_of(task).model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -312,12 +311,11 @@ class SuiteStudy(Study):
 
     def _asked(self, planned: Planned, required: Iterable[Place]) -> dict[str, Asked]:
         """What a cell is compared with: its own figures, and the references that finished."""
-        there: dict[str, Planned | None] = {
+        there: dict[str, Planned | None] = {OWN_FIGURES: None} | {
             name: one
             for name, (one,) in self.planned[planned.place].items()
             if one is not planned and not isinstance(self.ended[one], Failure)
         }
-        there[OWN_FIGURES] = None
         return {
             name: (
                 there[name],
@@ -409,6 +407,10 @@ class SuiteStudy(Study):
         )
 
 
+def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
+    return CellRecord if task.ensemble is None else BatchRecord
+
+
 def _checks(
     own: Suite,
     required: Mapping[Place, Kind],
@@ -423,15 +425,26 @@ def _checks(
     known = {(one.figure.against or OWN_FIGURES, one.figure.windowed): one for one in figures}
     for place, kind in required.items() if own.judged else ():
         what, line = place.what, own.tolerances.get(place)
-        found = known.get((place.against, str(what))) or Compared(_missing(place))
+        measure = what.definition
+        itself = place.against == OWN_FIGURES
+        nothing = Figure(  # without a value, so that the check cannot pass
+            measure=measure.name,
+            label=measure.label,
+            unit=measure.unit,
+            value=None,
+            against="" if itself else place.against,
+            window=what.window,
+            note="not computed" if itself else f"{place.against} failed in this scene",
+        )
+        found = known.get((place.against, str(what)), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap
         yield judge(
             found.figure,
             line,
             kind=kind,
-            measure=what.definition,
+            measure=measure,
             gap=gap + SHIFTS if gap and kind == "measured" and not found.fall else gap,
-            floor=floor(what.definition),
+            floor=floor(measure),
             beside=beside.get((what.measure, what.window)) if line and kind == "absolute" else None,
         )
 
@@ -468,18 +481,4 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
             family(item.variant.family).compiled,
             -item.scene.duration * (1 + len(item.scene.walls)),
         ),
-    )
-
-
-def _missing(place: Place) -> Figure:
-    """The figure of a check for which there is none: it has no value, so the check cannot pass."""
-    measure, own = place.what.definition, place.against == OWN_FIGURES
-    return Figure(
-        measure=measure.name,
-        label=measure.label,
-        unit=measure.unit,
-        value=None,
-        against="" if own else place.against,
-        window=place.what.window,
-        note="not computed" if own else f"{place.against} failed in this scene",
     )

@@ -205,10 +205,9 @@ class Suite:
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
         own = self.owners.get(scene, self)
-        if scene not in own.scenes:
-            raise unknown_name("scene of the suite", scene, self.scenes)
-        if model not in own.models:
-            raise unknown_name("model of the suite", model, own.models)
+        for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
+            if name not in known:
+                raise unknown_name(f"{what} of the suite", name, known)
         tolerances = {
             place: line
             for place, line in own.tolerances.items()

@@ -73,6 +73,15 @@ def run_of(*checks: Check, **more: object) -> Run:
             (50.0, 5.0, 1.0),
             {51.0: "pass", 52.0: "changed", 48.0: "changed", 56.0: "fail"},
         ),
+        ("peak_rotation", (0.33, 0.01, 0.001), {0.33: "pass", 0.335: "changed", 0.345: "fail"}),
+        # A figure just at its drift passes, one just at its limit does not fail: numbers that a
+        # computer holds exactly.
+        (
+            "theta_rms",
+            (0.25, 0.5, 0.125),
+            {0.375: "pass", 0.125: "pass", 0.3750001: "changed", 0.1249999: "better"}
+            | {0.5: "changed", 0.5000001: "fail", -0.5: "changed", 0.0: "better", -0.75: "fail"},
+        ),
         # An error is better where it falls. Its limit holds as it is written.
         (
             "theta_rms",
@@ -86,7 +95,14 @@ def run_of(*checks: Check, **more: object) -> Run:
             (1.125, 0.25, 0.01),
             {1.0: "better", 1.0625: "better", 0.875: "changed", 0.5: "fail"},
         ),
+        (
+            "peak_ratio",
+            (1.0, 0.1, 0.05),
+            {1.0: "pass", 0.94: "changed", 0.89: "fail", 1.11: "fail"},
+        ),
         ("outcome_agrees", (0.0, 1.0, 0.0), {0.0: "pass", 1.0: "better"}),
+        ("outcome_agrees", (1.0, 0.0, 0.0), {1.0: "pass", 0.0: "fail"}),
+        ("events_agree_until", (None, 8.0, None), {8.0: "pass", 12.0: "pass", 7.9: "fail"}),
         (
             "events_agree_until",
             (9.0, 8.0, 0.1),
