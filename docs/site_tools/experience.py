@@ -8,18 +8,54 @@ which `History.expected` and the report read, and the tables of docs/theory.md.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
-from rockcheck.scenes.experience import Experience
+from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
 from rockcheck.scenes.writing import markdown_table, write_whole
-from rockcheck.validation.suite.across import experience_of
+from rockcheck.validation.execute.models import FAMILIES, build
+from rockcheck.validation.suite.across import pairs_of, trust_in
 from rockcheck.validation.suite.results import Run
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "scenes" / "data" / "experience.json"
 PAGE = ROOT / "docs" / "theory.md"
 BEGIN, END = "<!-- experience: begin -->\n", "<!-- experience: end -->\n"
+
+#: Settings that change no motion.
+LIMITS = {"estimate_error", "most_steps", "most_events"}
+
+
+def experience_of(runs: Sequence[Run]) -> Experience:
+    """Bias and scatter by model and figure, and the domain of the scenes, over some runs.
+
+    The domain is the range of each axis, `scenes.experience.axes_of`.
+    """
+    trust: dict[str, dict[str, Trust]] = {}
+    for model, pairs in sorted(pairs_of(runs).items()):
+        if found := trust_in(pairs):
+            trust[model] = {"peak_rotation": found}
+    scenes = [axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
+    domain = {}
+    for axis in dict.fromkeys(axis for one in scenes for axis in one):
+        numbers = [number for one in scenes for number in one.get(axis, ())]
+        domain[axis] = Range(low=min(numbers), high=max(numbers))
+    settings = {model: _settings_of(model, runs) for model in trust if model in FAMILIES}
+    return Experience(
+        suites=tuple(run.suite for run in runs), trust=trust, settings=settings, domain=domain
+    )
+
+
+def _settings_of(model: str, runs: Iterable[Run]) -> dict[str, tuple[Any, ...]]:
+    """The values of each setting that a model had, but for those that change no motion."""
+    values: defaultdict[str, dict[Any, None]] = defaultdict(dict)
+    for given in [cell.settings for run in runs for cell in run.cells if cell.model == model]:
+        had: Any = build(model, given)
+        for name, value in had.model_dump(exclude=LIMITS, exclude_none=True).items():
+            values[name][value] = None
+    return {name: tuple(found) for name, found in values.items()}
 
 
 def tables(found: Experience) -> str:

@@ -5,13 +5,12 @@ The file keeps its comments and order.
 
 import math
 import re
-from collections.abc import Iterable, Mapping, MutableMapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import tomlkit
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import write_whole
 from rockcheck.validation.suite.results import Cell, Check, Run
@@ -40,14 +39,14 @@ def accept(
     """
     changes: list[str] = []
     refused: list[str] = []
-    checks = [(cell, check) for cell, check in run.checks() if check.verdict != "not defined"]
-    for part in suite.included or (suite,):
-        of_part = [
+    for part in suite.parts:
+        checks = [
             (cell, check)
-            for cell, check in checks
-            if cell.scene in part.scenes or cell.scene in part.ensembles
+            for cell, check in run.checks()
+            if (cell.scene in part.scenes or cell.scene in part.ensembles)
+            and check.verdict != "not defined"
         ]
-        _accept(part, of_part, reason, changes, refused, write)
+        _accept(part, checks, reason, changes, refused, write)
     return changes, refused
 
 
@@ -114,34 +113,22 @@ def _bounds(check: Check, value: float) -> tuple[float, float]:
 
     The room of a first line where there is none, or where the limit is exceeded.
     """
-    limit, drift = _room(check, value)
     measure = MEASURES[check.figure.measure]
+    size, at_least = abs(value - (measure.ideal or 0.0)), measure.sense == "at least"
+    room, band = (OWN_ROOM, OWN_DRIFT) if measure.ideal is None else (ROOM, DRIFT)
+    limit = _round(max(room * size, LEAST_LIMIT * measure.resolution))
+    if at_least:
+        limit = _round(0.9 * value, down=True)
+    drift = _round(max(band * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+    if measure.yes_no:
+        limit, drift = size, 0.0  # 0: must be yes; 1: need not be
     tighter = check.verdict == "better" and measure.role == "error"
-    stricter = max if measure.sense == "at least" else min
     if check.limit is not None and check.verdict != "fail":
+        stricter = max if at_least else min
         limit = stricter(check.limit, limit) if tighter else check.limit
     if check.drift is not None:
         drift = min(check.drift, drift) if tighter else check.drift
     return limit, drift
-
-
-def _room(check: Check, value: float) -> tuple[float, float]:
-    """Limit and drift band of a first line for the figure."""
-    measure = MEASURES[check.figure.measure]
-    own = measure.ideal is None
-    size = abs(value - (measure.ideal or 0.0))
-    if measure.yes_no:
-        return size, 0.0  # 0: must be yes; 1: need not be
-    limit = _round(max((OWN_ROOM if own else ROOM) * size, LEAST_LIMIT * measure.resolution))
-    if measure.sense == "at least":
-        limit = _round(0.9 * value, down=True)
-    return limit, _round(
-        max(
-            (OWN_DRIFT if own else DRIFT) * size,
-            LEAST_SHARE * limit,
-            LEAST_DRIFT * measure.resolution,
-        )
-    )
 
 
 def _named(check: Check, line: Mapping[str, Any]) -> str:
@@ -153,11 +140,9 @@ def _named(check: Check, line: Mapping[str, Any]) -> str:
     return "tightened" if check.weighs == "pass" else "moved"
 
 
-def _table(tables: MutableMapping[str, Any], path: tuple[str, ...]) -> Any:
-    for depth, name in enumerate(path):
-        if name not in tables:
-            tables[name] = tomlkit.table(is_super_table=depth < len(path) - 1)
-        tables = tables[name]
+def _table(tables: Any, path: tuple[str, ...]) -> Any:
+    for depth, name in enumerate(path, 1):
+        tables = tables.setdefault(name, tomlkit.table(is_super_table=depth < len(path)))
     return tables
 
 

@@ -1,8 +1,7 @@
-"""Comparison of runs: changes between two, trends over many, and experience with each model.
+"""Comparison of runs: changes between two, trends over many, and trust in each model.
 
 Changes between two runs (`rockcheck compare`), figures over a history of runs (`rockcheck validate
---history FILE`), and, over several suites, bias and scatter of each model's figures and the domain
-that the scenes cover.
+--history FILE`), and, over several suites, bias and scatter of each model's figures.
 
 A history of runs is a file of JSON lines, one a run: `Moment`. Bias and scatter as in the FDS
 validation guide (McGrattan and Toman 2011). With M a model's figure and E the reference's,
@@ -19,19 +18,17 @@ import re
 import shutil
 import subprocess
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import from_validation, printable
-from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
+from rockcheck.scenes.errors import InputError, from_validation, printable
+from rockcheck.scenes.experience import Trust
 from rockcheck.scenes.reading import read_text
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.execute.models import FAMILIES, build
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -47,7 +44,6 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.suite.results import Cell, Run, value_of
 from rockcheck.validation.suite.tolerances import MEASURES
 
-T = TypeVar("T")
 #: A figure has moved if it differs by more than this share, and by more than its measure's
 #: resolution.
 ROUNDING = 1e-9
@@ -94,7 +90,7 @@ def changes(before: Run, after: Run) -> list[Change]:
         else []
     )
     old, new = ({(cell.scene, cell.model): cell for cell in run.cells} for run in (before, after))
-    for place in dict.fromkeys((*old, *new)):
+    for place in old | new:
         if place in old and place in new:
             found += _of_cell(old[place], new[place])
         else:
@@ -150,34 +146,36 @@ def difference(before: Run, after: Run) -> Finding:
 
 def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
     place = {"scene": old.scene, "model": old.model}
-    said = [
+    said: list[dict[tuple[Any, str], str]] = [
         {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
         | {("verdict", check.figure.title): check.words for check in cell.checks}
         for cell in (old, new)
     ]
-    for (what, name), was, now in _pairs(*said):
+    for what, name in said[0] | said[1]:
+        was, now = (one.get((what, name)) for one in said)
         if was != now:
             yield Change(**place, what=what, name=name, before=was, after=now)
-    figures = ({figure.title: figure for figure in cell.figures} for cell in (old, new))
-    for name, one, other in _pairs(*figures):
+    figures = {figure.title: figure for figure in new.figures}
+    for figure in old.figures:
+        other = figures.get(figure.title)
         if (
-            one
-            and other
-            and not (one.of_a_fall or other.of_a_fall)
-            and _moved(one.measure, one.value, other.value)
+            other
+            and not (figure.of_a_fall or other.of_a_fall)
+            and _moved(figure.measure, figure.value, other.value)
         ):
-            yield Change(**place, what="figure", name=name, before=one.value, after=other.value)
+            yield Change(
+                **place, what="figure", name=other.title, before=figure.value, after=other.value
+            )
 
 
-def _pairs(old: Mapping[Any, T], new: Mapping[Any, T]) -> Iterator[tuple[Any, T | None, T | None]]:
-    yield from ((name, old.get(name), new.get(name)) for name in dict.fromkeys((*old, *new)))
+def _moved(title: str, was: float | None, now: float | None) -> bool:
+    """Whether a figure has moved by more than rounding and its measure's resolution.
 
-
-def _moved(name: str, was: float | None, now: float | None) -> bool:
-    """Whether a measure's value has moved by more than rounding and its resolution."""
+    `title` begins with the measure, perhaps after "scene, model: ".
+    """
     if was is None or now is None:
         return was is not now
-    measure = MEASURES.get(name)
+    measure = MEASURES.get(re.split("[@ ]", title.rpartition(": ")[2])[0])
     least = measure.resolution if measure else 0.0
     return abs(now - was) > max(least, ROUNDING * max(abs(was), abs(now)))
 
@@ -272,32 +270,6 @@ def read_history(path: Path) -> list[Moment]:
     return found
 
 
-class Trend(Stored):
-    """One figure over the runs of a history: its values, None where it is missing."""
-
-    name: str
-    values: tuple[float | None, ...]
-
-    @property
-    def known(self) -> list[float]:
-        """The values that are not missing."""
-        return [value for value in self.values if value is not None]
-
-    @property
-    def spread(self) -> float:
-        """Largest less smallest value over the largest magnitude; 0 if fewer than two are known."""
-        most = max(map(abs, self.known), default=0.0)
-        return (max(self.known) - min(self.known)) / most if most > 0.0 else 0.0
-
-    @property
-    def moved(self) -> bool:
-        """Whether the last value differs from the one before."""
-        if len(self.values) < 2:
-            return False
-        check = self.name.rpartition(": ")[2]
-        return _moved(re.split("[@ ]", check)[0], *self.values[-2:])
-
-
 #: Most figures drawn (those that varied most), and most moved figures listed; the table has
 #: all that varied.
 DRAWN, LISTED = 12, 10
@@ -309,23 +281,25 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     Lists the figures that moved since the run before, draws and tabulates those that varied, and
     lists the runs.
     """
+    import pandas as pd
+
     last = moments[-1]
-    every = [
-        Trend(name=name, values=tuple(moment.figures.get(name) for moment in moments))
-        for name in last.figures
-    ]
-    every.sort(key=lambda trend: -trend.spread)
-    found = [trend for trend in every if trend.spread > 0.0]
-    moved = [trend for trend in every if trend.moved]
-    before = f" since {moments[-2].commit or moments[-2].created}" if len(moments) > 1 else ""
+    every = {name: [one.figures.get(name) for one in moments] for name in last.figures}
+    values = pd.DataFrame(every, dtype=float)
+    least, most = values.min(), values.max()
+    spread = ((most - least) / values.abs().max()).fillna(0.0)
+    names = sorted(every, key=lambda name: -spread[name])
+    found = [name for name in names if spread[name] > 0.0]
+    before, moved = "", []
+    if len(moments) > 1:
+        before = f" since {moments[-2].commit or moments[-2].created}"
+        moved = [name for name in names if _moved(name, *every[name][-2:])]
     told = [
-        f"{one.name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in one.values[-2:])}"
-        for one in moved[:LISTED]
+        f"{name}: {' -> '.join('-' if v is None else f'{v:.6g}' for v in every[name][-2:])}"
+        for name in moved[:LISTED]
     ]
-    panels = [_panel(one, moments) for one in found[:DRAWN]]
-    rows = [
-        [one.name, one.values[0], min(one.known), max(one.known), *one.values[-2:]] for one in found
-    ]
+    panels = [_panel(name, every[name], moments) for name in found[:DRAWN]]
+    rows = [[name, every[name][0], least[name], most[name], *every[name][-2:]] for name in found]
     columns = [text("figure"), *map(Column, ("first", "least", "most", "before", "now"))]
     made = [
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
@@ -347,20 +321,16 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     )
 
 
-def _panel(trend: Trend, moments: Sequence[Moment]) -> Panel:
-    points = dict(enumerate(trend.values, 1))
-    bad = [n for n, moment in enumerate(moments, 1) if trend.name in moment.not_passed]
-    marked = Series("not passed", bad, [points[n] for n in bad], style="points")
-    return Panel(
-        trend.name.replace(": ", "\n", 1), [Series("", list(points), trend.values), marked]
-    )
+def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment]) -> Panel:
+    bad = [n for n, moment in enumerate(moments, 1) if name in moment.not_passed]
+    marked = Series("not passed", bad, [values[n - 1] for n in bad], style="points")
+    whole = Series("", list(range(1, len(moments) + 1)), values)
+    return Panel(name.replace(": ", "\n", 1), [whole, marked])
 
 
 #: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
 #: scatter is computed.
 LEAST, FEWEST = 1e-3, 5
-#: Settings that change no motion.
-LIMITS = {"estimate_error", "most_steps", "most_events"}
 
 
 def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
@@ -398,46 +368,11 @@ def _peaks(run: Run) -> dict[str, dict[tuple[str, int], float]]:
     return found
 
 
-def experience_of(runs: Sequence[Run]) -> Experience:
-    """Bias and scatter by model and figure, and the domain of the scenes, over some runs.
-
-    The domain is the range of each axis, `scenes.experience.axes_of`.
-    """
-    trust: dict[str, dict[str, Trust]] = {}
-    for model, pairs in sorted(pairs_of(runs).items()):
-        if found := trust_in(pairs):
-            trust[model] = {"peak_rotation": found}
-    scenes = [axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
-    domain = {}
-    for axis in dict.fromkeys(axis for one in scenes for axis in one):
-        numbers = [number for one in scenes for number in one.get(axis, ())]
-        domain[axis] = Range(low=min(numbers), high=max(numbers))
-    settings = {model: _settings_of(model, runs) for model in trust if model in FAMILIES}
-    return Experience(
-        suites=tuple(run.suite for run in runs), trust=trust, settings=settings, domain=domain
-    )
-
-
-def _settings_of(model: str, runs: Iterable[Run]) -> dict[str, tuple[Any, ...]]:
-    """The values of each setting that a model had, but for those that change no motion."""
-    values: defaultdict[str, dict[Any, None]] = defaultdict(dict)
-    for given in [cell.settings for run in runs for cell in run.cells if cell.model == model]:
-        had: Any = build(model, given)
-        for name, value in had.model_dump(exclude=LIMITS, exclude_none=True).items():
-            values[name][value] = None
-    return {name: tuple(found) for name, found in values.items()}
-
-
 def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
-    """Bias and scatter of (E, M) pairs, None for fewer than `FEWEST`."""
+    """Bias and scatter of (E, M) pairs, see the module; None for fewer than `FEWEST`."""
     if len(pairs) < FEWEST:
         return None
-    bias, scatter = bias_and_scatter(pairs)
-    return Trust(bias=bias, scatter=scatter, count=len(pairs))
-
-
-def bias_and_scatter(pairs: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Delta and sigma of (E, M) pairs; see the module."""
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
-    return math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter
+    bias = math.exp(float(np.mean(ratios)) + 0.5 * scatter**2)
+    return Trust(bias=bias, scatter=scatter, count=len(pairs))

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from pydantic import TypeAdapter, field_validator
 
@@ -18,8 +18,8 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.files import UncertainScene
-from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, too_short
-from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
+from rockcheck.validation.discrepancy.compare import compare, describe, too_short
+from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.execute import provenance, workers
@@ -27,11 +27,12 @@ from rockcheck.validation.execute.models import build, is_own
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import CostRecord, value_of
+from rockcheck.validation.suite.results import Cell, CostRecord, value_of
 from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
+T = TypeVar("T")
 #: Measures judged by the nearest law. Histories are judged up to the horizon, which ends where the
 #: laws part.
 BY_ANY = ("outcome_agrees", "peak_ratio")
@@ -94,30 +95,51 @@ class CellRecord(Stored):
     cost: CostRecord
 
 
-class ComparisonRecord(Stored):
-    """The figures of a comparison, and its gaps by window.
+class BatchRecord(Stored):
+    """The kept record of a batch: peak |theta| in alpha and outcome of each scene.
 
-    A gap says what could not be compared, and whether because one block fell; its key is measure
-    and window where the measure has a gap of its own. `impact_law` and `overturned_at` are given
-    with a cell's own figures.
+    None and the reason where the model failed.
     """
 
-    figures: tuple[Figure, ...]
-    gaps: dict[str, tuple[str, bool]]
+    peaks: tuple[float | None, ...]
+    outcomes: tuple[str, ...]
+    cost: CostRecord
+
+
+class Window(NamedTuple):
+    """A window as tolerances name it, its end (s; None: the whole time), and its measures."""
+
+    name: str
+    until: float | None
+    measures: Sequence[str]
+
+
+class Compared(NamedTuple):
+    """A figure, and what of its window could not be compared: `fall` if because one block fell."""
+
+    figure: Figure
+    gap: str = ""
+    fall: bool = False
+
+
+class ComparisonRecord(Stored):
+    """All figures of a cell, its own and those against each reference."""
+
+    figures: tuple[Compared, ...]
     impact_law: LawFollowed | None = None
     overturned_at: float | None = None
 
     @field_validator("figures")
     @classmethod
-    def _known(cls, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
-        if unknown := {figure.measure for figure in figures} - MEASURES.keys():
+    def _known(cls, figures: tuple[Compared, ...]) -> tuple[Compared, ...]:
+        if unknown := {one.figure.measure for one in figures} - MEASURES.keys():
             raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
         return figures
 
 
-def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
+def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
     """The store's value of type `kind` under that name; computed and kept if missing or invalid."""
-    adapter = TypeAdapter(kind)
+    adapter: TypeAdapter[T] = TypeAdapter(kind)
     with suppress(KeyError, TypeError, ValueError):
         return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
     found = compute()
@@ -125,48 +147,47 @@ def kept(store: Store, name: str, kind: Any, compute: Callable[[], Any]) -> Any:
     return found
 
 
-def _of_scene(scene: Scene, what: str, module: str, **more: Any) -> str:
-    """The name of a kept result of a scene that depends on the code of a module."""
+def _of_scene(
+    store: Store,
+    scene: Scene,
+    what: str,
+    module: str,
+    kind: Any,
+    compute: Callable[[], T],
+    **more: Any,
+) -> T:
+    """A result of type `kind` on a scene, by the code of a module; kept in the store."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
-    return name_of(scene.name, what, provenance.cell_key(scene, "ebm-unilateral", depends))
+    key = provenance.cell_key(scene, "ebm-unilateral", depends)
+    return kept(store, name_of(scene.name, what, key), kind, compute)
 
 
 def inputs_of(store: Store, given: UncertainScene) -> Inputs:
     """The effect of the spread of a scene's inputs on its figures; kept in the store."""
-    name = _of_scene(
+    return _of_scene(
+        store,
         given.scene,
         "inputs",
         "validation.uncertainty.population",
+        Inputs,
+        lambda: propagate(given).inputs,
         spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
         correlation=given.correlation.tolist(),
     )
-    found: Inputs = kept(store, name, Inputs, lambda: propagate(given).inputs)
-    return found
 
 
 def landing_of(store: Store, scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part, None without one; kept in the store."""
 
     def landing() -> Landing | None:
-        try:
+        with suppress(InputError, ModelFailure):  # it is not a scene for that model
             return parting_landing(scene)
-        except (InputError, ModelFailure):  # it is not a scene for that model
-            return None
+        return None
 
     if not may_fly(scene):
         return None
-    name = _of_scene(scene, "impact-laws", "validation.discrepancy.impact_laws")
-    found: Landing | None = kept(store, name, Landing | None, landing)
-    return found
-
-
-def horizon_of(store: Store, scene: Scene) -> float:
-    """The horizon of predictability of a scene, s (`ebm.horizon`); kept in the store.
-
-    Up to this time, histories can be compared point by point.
-    """
-    name = _of_scene(scene, HORIZON, "ebm.horizon")
-    return float(kept(store, name, float, lambda: predictability_horizon(scene)))
+    module = "validation.discrepancy.impact_laws"
+    return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
 
 
 def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
@@ -184,33 +205,37 @@ def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
 
 
 def by_any(
-    found: Discrepancy,
-    references: Mapping[str, History],
     candidate: History,
+    reference: History | None,
+    others: Mapping[str, History],
     scene: Scene,
-    until: float | None,
-    measures: Iterable[str],
-) -> tuple[tuple[Figure, ...], dict[str, tuple[str, bool]]]:
-    """The figures of a comparison, those of BY_ANY against the reference under the nearest law.
+    window: Window,
+) -> list[Compared]:
+    """A history's figures against `reference`, those of BY_ANY against it under the nearest law.
 
-    `references` are the reference's histories under other laws. The note of a figure names the law
-    if it is another one. The second value says, by measure, what could not be compared under that
-    law, and whether the reason is that one block fell.
+    `others` are the reference's histories under other laws. The note of a figure names the law if
+    it is another one. Without a reference, the history's own figures.
     """
-    figures = {figure.measure: figure for figure in found.figures}
-    gaps: dict[str, tuple[str, bool]] = {}
+    name, until, measures = window
+    if reference is None:
+        own = describe(candidate, until=until, scene=scene, measures=measures)
+        figures = {one.measure: Compared(one, too_short(candidate, until)) for one in own}
+    else:
+        found = compare(reference, candidate, until=until, scene=scene, measures=measures)
+        figures = {one.measure: Compared(one, found.gap, found.fall) for one in found.figures}
     wanted = [measure for measure in measures if measure in BY_ANY]
-    for law, reference in references.items():
-        other = compare(reference, candidate, until=until, scene=scene, measures=wanted)
+    for law, history in others.items():
+        other = compare(history, candidate, until=until, scene=scene, measures=wanted)
         for rival in other.figures:
-            own = figures.get(rival.measure)
-            if own is not None and _away(rival) < _away(own):
-                note = f'{rival.note}; impacts = "{law}"' if rival.note else f'impacts = "{law}"'
-                figures[rival.measure] = rival.model_copy(
-                    update={"against": own.against, "window": own.window, "note": note}
-                )
-                gaps[rival.measure] = other.gap, other.fall
-    return tuple(figures.values()), gaps
+            first = figures[rival.measure].figure
+            if _away(rival) < _away(first):
+                note = "; ".join(filter(None, (rival.note, f'impacts = "{law}"')))
+                nearer = rival.model_copy(update={"against": first.against, "note": note})
+                figures[rival.measure] = Compared(nearer, other.gap, other.fall)
+    return [
+        one._replace(figure=one.figure.model_copy(update={"window": name}))
+        for one in figures.values()
+    ]
 
 
 def _away(figure: Figure) -> float:
@@ -221,87 +246,63 @@ def _away(figure: Figure) -> float:
 
 def compared(
     store: Store, scene: Scene, planned: Planned, asked: Mapping[str, Asked]
-) -> dict[str, ComparisonRecord]:
-    """The comparisons of a cell by name of the reference, OWN_FIGURES for its own figures.
+) -> ComparisonRecord:
+    """The comparisons of a cell; `asked` by name of the reference, OWN_FIGURES for its own figures.
 
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
-    horizon = (
-        horizon_of(store, scene)
-        if any(what.window == HORIZON for _, extra in asked.values() for what in extra)
-        else None
-    )
+    horizon = None  # s; up to it, histories can be compared point by point
+    if any(what.window == HORIZON for _, extra in asked.values() for what in extra):
+        horizon = _of_scene(
+            store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
+        )
     against = [
         [name, reference.key if reference else "", list(map(str, extra))]
         for name, (reference, extra) in asked.items()
     ]
-    name = name_of(
-        scene.name,
-        planned.variant.label,
-        provenance.digest(
-            # with the code of this module and of `compare`
-            json.dumps([planned.key, against, horizon, provenance.code_digest(__name__)])
-        ),
+    # with the code of this module and of `compare`
+    depends = [planned.key, against, horizon, provenance.code_digest(__name__)]
+    name = name_of(scene.name, planned.model, provenance.digest(json.dumps(depends)))
+    return kept(
+        store, name, ComparisonRecord, lambda: _compute(store, scene, planned, asked, horizon)
     )
-    found: dict[str, ComparisonRecord] = kept(
-        store,
-        name,
-        dict[str, ComparisonRecord],
-        lambda: {
-            one: _compute(store, scene, planned, reference, extra, horizon)
-            for one, (reference, extra) in asked.items()
-        },
-    )
-    return {one: found[one] for one in asked}  # what is kept is in order of the alphabet
 
 
 def _compute(
     store: Store,
     scene: Scene,
     planned: Planned,
-    reference: Planned | None,
-    windowed: Sequence[Windowed],
+    asked: Mapping[str, Asked],
     horizon: float | None,
 ) -> ComparisonRecord:
-    """The comparison with `reference`; without one, the cell's own figures and impact law."""
     candidate, landing = store.load(planned.name), landing_of(store, scene)
-    windows = _windows(DIFFERENCES if reference else FIGURES, windowed, horizon)
-    if reference is None:
-        return ComparisonRecord(
-            figures=tuple(
-                figure.model_copy(update={"window": window})
-                for window, until, measures in windows
-                for figure in describe(candidate, until=until, scene=scene, measures=measures)
-            ),
-            gaps={window: (too_short(candidate, until), False) for window, until, _ in windows},
-            impact_law=landing.followed_by(candidate, scene) if landing else None,
-            overturned_at=candidate.overturned_at,
-        )
-    yardstick = store.load(reference.name)
-    others = under_other_laws(scene, reference.variant) if landing else {}
-    figures: list[Figure] = []
-    gaps: dict[str, tuple[str, bool]] = {}
-    for window, until, measures in windows:
-        found = compare(yardstick, candidate, until=until, scene=scene, measures=measures)
-        rivals = others if landing and (until is None or until > landing.t) else {}
-        nearest, own = by_any(found, rivals, candidate, scene, until, measures)
-        figures += [figure.model_copy(update={"window": window}) for figure in nearest]
-        gaps[window] = found.gap, found.fall
-        gaps |= {str(Windowed(measure, window)): gap for measure, gap in own.items()}
-    return ComparisonRecord(figures=tuple(figures), gaps=gaps)
+    parted = landing.t if landing else math.inf
+    figures: list[Compared] = []
+    for reference, extra in asked.values():
+        yardstick = store.load(reference.name) if reference else None
+        others = under_other_laws(scene, reference.variant) if reference and landing else {}
+        for window in _windows(reference, extra, horizon):
+            rivals = others if window.until is None or window.until > parted else {}
+            figures += by_any(candidate, yardstick, rivals, scene, window)
+    return ComparisonRecord(
+        figures=tuple(figures),
+        impact_law=landing.followed_by(candidate, scene) if landing else None,
+        overturned_at=candidate.overturned_at,
+    )
 
 
 def _windows(
-    known: Mapping[str, Measure], extra: Iterable[Windowed], horizon: float | None
-) -> list[tuple[str, float | None, list[str]]]:
-    """Each window, its end (s; None: the whole time), and its measures."""
+    reference: Planned | None, extra: Iterable[Windowed], horizon: float | None
+) -> list[Window]:
+    """The whole time with all measures but those on request, and the windows of `extra`."""
+    known = DIFFERENCES if reference else FIGURES
     found = {"": [measure.name for measure in known.values() if not measure.on_request]}
     for what in extra:
         found.setdefault(what.window, []).append(what.measure)
     ends = {"": None, HORIZON: horizon}
     return [
-        (window, ends[window] if window in ends else float(window[:-1]), measures)
-        for window, measures in found.items()
+        Window(name, ends[name] if name in ends else float(name[:-1]), measures)
+        for name, measures in found.items()
     ]
 
 
@@ -311,51 +312,47 @@ QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 def explanations(
     scene: Scene,
-    figures: Sequence[Figure],
-    own: CellRecord,
-    references: Mapping[str, tuple[Sequence[Figure], CellRecord]],
+    cell: Cell,
+    references: Iterable[Cell],
+    scatters: Mapping[str, Mapping[str, float]],
     inputs: Inputs | None,
 ) -> Iterator[Explanation]:
-    """The verdict on each quantity of a cell against each reference, by name.
+    """The verdict on each quantity of a cell against each reference.
 
-    `figures` and `own` are the cell's figures and record. There is no verdict for a model whose
-    numerical error is unknown. Where the outcomes differ and a block falls, the only verdict is on
-    the outcome.
+    `scatters` is, by model, the scatter of the repeats of a measured history: rotations in rad,
+    slips in m. There is no verdict for a model whose numerical error is unknown. Where the outcomes
+    differ and a block falls, the only verdict is on the outcome.
     """
-    if own.numerical is None:
+    if cell.numerical is None:
         return
-    # of a measured history, the scatter of its repeats: rotations in rad, slips in m
     sizes = {"alpha": scene.block.alpha, "m": 1.0}
     u_inputs = {name: inputs.u_input(name) or 0.0 for name in QUANTITIES} if inputs else {}
-    for against, (yardstick, other) in references.items():
-        if own.outcome != other.outcome and "overturned" in own.outcome + other.outcome:
-            yield _other_outcome(against, own.numerical, other.numerical, inputs)
+    for other in references:
+        if cell.outcome != other.outcome and "overturned" in cell.outcome + other.outcome:
+            yield _other_outcome(other.model, cell.numerical, other.numerical, inputs)
             continue
         for name, unit in QUANTITIES.items():
-            error = _difference(name, figures, yardstick, against)
+            error = _difference(name, cell.figures, other)
             if error is None:
                 continue
-            u_num, reason = _both(name, own.numerical, other.numerical)
-            scatters = own.uncertainty.get(name, 0.0), other.uncertainty.get(name, 0.0)
-            u_data = math.hypot(scatters[0] / sizes[unit], scatters[1] / sizes[unit])
+            u_num, reason = _both(name, cell.numerical, other.numerical)
+            own, theirs = scatters[cell.model].get(name, 0.0), scatters[other.model].get(name, 0.0)
             yield explain(
                 name,
                 unit,
                 error,
                 u_num,
                 u_inputs.get(name, 0.0),
-                u_data,
+                math.hypot(own / sizes[unit], theirs / sizes[unit]),
                 reason=reason,
-                against=against,
+                against=other.model,
             )
 
 
-def _difference(
-    name: str, figures: Sequence[Figure], yardstick: Sequence[Figure], against: str
-) -> float | None:
+def _difference(name: str, figures: Sequence[Figure], other: Cell) -> float | None:
     if name == "theta_rms":
-        return value_of(figures, name, against)
-    mine, theirs = value_of(figures, name), value_of(yardstick, name)
+        return value_of(figures, name, other.model)
+    mine, theirs = value_of(figures, name), value_of(other.figures, name)
     return None if mine is None or theirs is None else abs(mine - theirs)
 
 

@@ -1,10 +1,10 @@
 """Run a suite: play the cells that are not up to date, compare, judge, return the `Run`."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from functools import partial
-from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -15,7 +15,7 @@ from rockcheck.scenes import Scene
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance, workers
 from rockcheck.validation.execute.models import compiles, family, has_wheel, is_own, not_installed
@@ -25,14 +25,24 @@ from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import FAULTS, Study, run
 from rockcheck.validation.suite.comparing import (
     Asked,
+    BatchRecord,
     CellRecord,
+    Compared,
     Planned,
     compared,
     explanations,
     inputs_of,
 )
 from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run, Strict
+from rockcheck.validation.suite.results import (
+    Cell,
+    Check,
+    CostRecord,
+    EnsembleRecord,
+    Kind,
+    Run,
+    Strict,
+)
 from rockcheck.validation.suite.suites import Suite
 from rockcheck.validation.suite.tolerances import (
     MEASURES,
@@ -51,17 +61,6 @@ ADDED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations", "worke
 SHIFTS = (
     "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
 )
-
-
-class BatchRecord(Stored):
-    """The kept record of a batch: peak |theta| in alpha and outcome of each scene.
-
-    None and the reason where the model failed.
-    """
-
-    peaks: tuple[float | None, ...]
-    outcomes: tuple[str, ...]
-    cost: CostRecord
 
 
 def run_suite(
@@ -102,88 +101,87 @@ class SuiteStudy(Study):
     kinds = (HISTORIES, COMPARISONS)
 
     def __init__(self, suite: Suite, folder: Path) -> None:
-        self.suite, self.store = suite, Store(folder)
-        limits = [suite.suite_of(name).given.limits for name in (*suite.scenes, *suite.ensembles)]
-        self.memory_mb = max((limit.memory_mb for limit in limits), default=None)
-        asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
-        self.cells = [
-            self._planned(
-                scene, variant, asked if suite.suite_of(scene.name).given.uncertainty else {}
-            )
-            for scene, variant in suite.cells()
+        self.suite, self.store, self.own = suite, Store(folder), suite.owners
+        self.memory_mb = max((part.given.limits.memory_mb for part in suite.parts), default=None)
+        #: By scene or ensemble, and by model: the cell, or the batches of it.
+        self.planned: dict[str, dict[str, list[Planned]]] = {}
+        for scene, variant, ensemble in suite.cells():
+            found = list(self._planned(scene, variant, ensemble))
+            self.planned.setdefault(found[0].place, {})[variant.label] = found
+        self.items = [
+            item for models in self.planned.values() for found in models.values() for item in found
         ]
-        self.batches = [
-            batch for found in suite.ensemble_cells() for batch in self._batches(*found)
-        ]
-        self.items: list[Planned] = [*self.cells, *self.batches]
-        self.by_scene: dict[str, dict[str, Planned]] = {}
-        for cell in self.cells:
-            self.by_scene.setdefault(cell.place, {})[cell.variant.label] = cell
-        self.read_back: set[Planned] = set()
-        self.records: dict[Planned, Any] = {}  # `CellRecord`, `BatchRecord`
-        self.failures = {
-            item: missing for item in self.items if (missing := not_installed(item.variant.family))
+        #: The record of each that has ended, or why it has none.
+        self.ended: dict[Planned, Any] = {
+            item: Failure(missing)
+            for item in self.items
+            if (missing := not_installed(item.variant.family))
         }
+        self.playable = in_order([item for item in self.items if item not in self.ended])
+        self.read_back: set[Planned] = set()
+        #: Batches of which some scenes failed without a result.
         self.traces: set[Planned] = set()
         self.compared: dict[str, list[Cell]] = {}
 
     def _planned(
-        self, scene: Scene, variant: workers.Work, depends: Mapping[str, Any], **of: Any
-    ) -> Planned:
-        own, settings = self.suite.suite_of(scene.name), {**variant.settings, **depends}
-        if "ensemble" in of:
-            own = self.suite.suite_of(of["ensemble"].name)
-        kind = variant.family
-        return Planned(
-            scene,
-            variant,
-            variant.label,
-            provenance.cell_key(scene, kind, settings, variant.search_path),
-            own.given.uncertainty,
-            **of,
-            seconds=own.given.limits.seconds,
-            compiles=compiles(kind, variant.settings),
-        )
-
-    def _batches(self, ensemble: Ensemble, base: Scene, variant: workers.Work) -> Iterator[Planned]:
-        """An ensemble in batches.
+        self, scene: Scene, variant: workers.Work, ensemble: Ensemble | None
+    ) -> Iterator[Planned]:
+        """A cell, or the batches of an ensemble.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
         """
-        drawing = {
-            "ensemble": ensemble.model_dump(mode="json", exclude={"count", "batch", "description"}),
-            "code": provenance.code_digest("rockcheck.validation.suite.motions"),
-        }
-        for start in range(0, ensemble.count, ensemble.batch):
-            numbers = range(start, min(start + ensemble.batch, ensemble.count))
-            drawn = {**drawing, "numbers": [numbers.start, numbers.stop]}
-            yield self._planned(base, variant, {"drawn": drawn}, ensemble=ensemble, numbers=numbers)
+        own, kind = self.own[ensemble.name if ensemble else scene.name], variant.family
+        asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
+        parts: list[tuple[range, dict[str, Any]]] = [
+            (range(0), asked if own.given.uncertainty else {})
+        ]
+        if ensemble:
+            how = ensemble.model_dump(mode="json", exclude={"count", "batch", "description"})
+            code = provenance.code_digest("rockcheck.validation.suite.motions")
+            every = range(ensemble.count)
+            batches = [every[n : n + ensemble.batch] for n in every[:: ensemble.batch]]
+            parts = [
+                (n, {"drawn": {"ensemble": how, "code": code, "numbers": [n.start, n.stop]}})
+                for n in batches
+            ]
+        for numbers, depends in parts:
+            settings = {**variant.settings, **depends}
+            yield Planned(
+                scene,
+                variant,
+                variant.label,
+                provenance.cell_key(scene, kind, settings, variant.search_path),
+                own.given.uncertainty,
+                ensemble,
+                numbers,
+                seconds=own.given.limits.seconds,
+                compiles=compiles(kind, variant.settings),
+            )
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed."""
-        return in_order([item for item in self.items if item in done or item not in self.failures])
+        return self.playable
 
     def file(self, task: Any) -> str:
         """Name of the cell's files."""
         return str(task.name)
 
-    def find(self, store: Store, task: Any) -> workers.Played | None:
+    def find(self, store: Store, task: Any) -> Any:
         """The kept record of a batch, or of a cell whose history is whole; else None."""
         whole = task.ensemble is None
         found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            self.records[task] = _record_of(task).model_validate(found)
+            self.ended[task] = _record_of(task).model_validate(found)
             self.read_back.add(task)
-            return workers.Played(found or {})
-        return None
+        return self.ended.get(task)
 
     def keep(self, store: Store, task: Any, record: workers.Played) -> None:
         """Keep a history or a batch; compare a scene's cells once the last of them is kept.
 
         So scenes are compared while others are still played.
         """
-        self.records[task] = _record_of(task).model_validate(record.record)
+        self.ended[task] = _record_of(task).model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -195,12 +193,10 @@ class SuiteStudy(Study):
 
     def _compare(self, scene: str) -> None:
         """Compare and judge the cells of a scene, once all are there."""
-        cells, found = self.by_scene[scene], dict[str, Cell]()
-        if scene in self.compared or not all(
-            cell in self.records or cell in self.failures for cell in cells.values()
-        ):
+        cells, found = self.planned[scene], dict[str, Cell]()
+        if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
-        reference = self.suite.suite_of(scene).reference
+        reference = self.own[scene].reference
         for label in sorted(cells, key=lambda label: label != reference):
             found[label] = self._cell(cells[label], found.get(reference))
         self.compared[scene] = [found[label] for label in cells]
@@ -208,22 +204,20 @@ class SuiteStudy(Study):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The run, as the data of a finding."""
         suite = self.suite
-        failed = {task: one for task, one in done.items() if isinstance(one, Failure)}
-        self.failures |= {task: one.reason for task, one in failed.items()}
-        self.traces |= {task for task, one in failed.items() if one.traceback}
-        if any(item not in done and item not in self.failures for item in self.items):
+        self.ended |= {task: one for task, one in done.items() if isinstance(one, Failure)}
+        if any(item not in self.ended for item in self.items):
             return Finding(self.name, suite.name, "interrupted", complete=False)
         inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
         cells: list[Cell] = []
-        for scene in self.by_scene:
-            self._compare(scene)
-            cells += self._explained(scene, inputs.get(scene))
         ensembles: list[EnsembleRecord] = []
-        for ensemble, batches in groupby(self.batches, key=lambda batch: batch.ensemble):
-            if ensemble is not None:
-                record, of_ensemble = self._ensemble(ensemble, list(batches))
+        for place in self.planned:
+            if place in suite.ensembles:
+                record, of_ensemble = self._ensemble(place)
                 ensembles.append(record)
                 cells += of_ensemble
+            else:
+                self._compare(place)
+                cells += self._explained(place, inputs.get(place))
         there = {(cell.scene, cell.model) for cell in cells}
         finished = Run(
             suite=suite.name,
@@ -236,9 +230,7 @@ class SuiteStudy(Study):
             cells=tuple(cells),
             ensembles=tuple(ensembles),
             inputs=inputs,
-            printed=tuple(
-                name for name in suite.scenes if suite.suite_of(name).given.print_figures
-            ),
+            printed=tuple(name for name in suite.scenes if self.own[name].given.print_figures),
             faults=tuple(
                 f"tolerance [{place}] has no cell in the suite"
                 for place in suite.tolerances
@@ -261,18 +253,24 @@ class SuiteStudy(Study):
             exit_code=finished.exit_code,
         )
 
-    def _about(self, parts: Sequence[Planned], key: str, reason: str = "") -> dict[str, Any]:
+    def _about(self, parts: Sequence[Planned], reason: str = "") -> dict[str, Any]:
         """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
-        place, variant = parts[0].place, parts[0].variant
+        first, variant = parts[0], parts[0].variant
         status = "failed" if reason else "done"
         if missing := not_installed(variant.family):
             status = "absent" if has_wheel(variant.family) else "unavailable"
-        traced = [f"{FAULTS}/{part.name}.txt" for part in parts if part in self.traces]
+        traced = [
+            f"{FAULTS}/{part.name}.txt"
+            for part in parts
+            if part in self.traces or getattr(self.ended[part], "traceback", None)
+        ]
         return {
-            "scene": place,
+            "scene": first.place,
             "model": variant.label,
             "settings": dict(variant.settings),
-            "key": key,
+            "key": provenance.digest("".join(part.key for part in parts))
+            if first.ensemble
+            else first.key,
             "status": status,
             "reason": missing or reason,
             "read_back": all(part in self.read_back for part in parts),
@@ -281,52 +279,43 @@ class SuiteStudy(Study):
             "unexpected": bool(traced) and not is_own(variant.family),
         }
 
-    def _cell(self, planned: Planned, reference: Cell | None) -> Cell:
+    def _cell(self, parts: Sequence[Planned], reference: Cell | None) -> Cell:
         """The cell, compared and judged; `reference` is the reference's cell of that scene."""
-        about = self._about([planned], planned.key, self.failures.get(planned, ""))
-        if planned in self.failures:
-            return Cell(**about)
-        scene, label, record = planned.scene, planned.variant.label, self.records[planned]
-        own, found = (
-            self.suite.suite_of(scene.name),
-            compared(self.store, scene, planned, self._asked(planned)),
-        )
-        figures = [figure for one in found.values() for figure in one.figures]
-        gaps = {
-            (name, window): gap for name, one in found.items() for window, gap in one.gaps.items()
-        }
+        (planned,), record = parts, self.ended[parts[0]]
+        if isinstance(record, Failure):
+            return Cell(**self._about(parts, record.reason))
+        scene, own = planned.scene, self.own[planned.place]
+        required = own.required(scene.name, planned.model)
+        found = compared(self.store, scene, planned, self._asked(planned, required))
         floor = partial(floor_of, scene=scene, numerical=record.numerical)
-        checks = list(self._checks(scene.name, label, figures, gaps, floor))
+        checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
-        same_equations = Place(scene.name, label, own.reference, Windowed("theta_rms"))
+        same_equations = Place(scene.name, planned.model, own.reference, Windowed("theta_rms"))
         if moved and reference and own.kind(same_equations) == "numerical":
-            beside = as_expected(reference)
-            checks = list(self._checks(scene.name, label, figures, gaps, floor, beside))
+            checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
         return Cell(
-            **about
+            **self._about(parts)
             | {
                 "settings": record.settings,
                 "history": f"{HISTORIES}/{planned.name}{TABLE}",
                 "outcome": record.outcome,
-                "overturned_at": found[OWN_FIGURES].overturned_at,
+                "overturned_at": found.overturned_at,
                 "notes": record.notes,
                 "cost": record.cost,
-                "figures": tuple(figures),
+                "figures": tuple(one.figure for one in found.figures),
                 "checks": tuple(checks),
                 "numerical": record.numerical,
-                "impact_law": found[OWN_FIGURES].impact_law,
+                "impact_law": found.impact_law,
             }
         )
 
-    def _asked(self, planned: Planned) -> dict[str, Asked]:
+    def _asked(self, planned: Planned, required: Iterable[Place]) -> dict[str, Asked]:
         """What a cell is compared with: its own figures, and the references that finished."""
-        required = self.suite.required(planned.place, planned.variant.label)
-        there: dict[str, Planned | None] = {
+        there: dict[str, Planned | None] = {OWN_FIGURES: None} | {
             name: one
-            for name, one in self.by_scene[planned.place].items()
-            if one is not planned and one in self.records
+            for name, (one,) in self.planned[planned.place].items()
+            if one is not planned and not isinstance(self.ended[one], Failure)
         }
-        there[OWN_FIGURES] = None
         return {
             name: (
                 there[name],
@@ -336,97 +325,53 @@ class SuiteStudy(Study):
                     if p.against == name and (p.what.window or p.what.definition.on_request)
                 ),
             )
-            for name in self.suite.yardsticks(planned.place, required)
+            for name in self.own[planned.place].yardsticks(required)
             if name in there
         }
-
-    def _checks(
-        self,
-        scene: str,
-        model: str,
-        figures: Sequence[Figure],
-        gaps: Mapping[tuple[str, str], tuple[str, bool]],
-        floor: Callable[[Measure], float | None],
-        beside: Mapping[tuple[str, str], float | None] = MappingProxyType({}),
-    ) -> Iterator[Check]:
-        """The judged figures of a cell; `gaps` by reference and window, or measure and window.
-
-        `beside` has the reference's own figures, by measure and window, where these are yardsticks.
-        """
-        own = self.suite.suite_of(scene)
-        for place, kind in self.suite.required(scene, model).items() if own.judged else ():
-            what, line = place.what, own.tolerances.get(place)
-            of_window = gaps.get((place.against, what.window), ("", False))
-            text, fall = gaps.get((place.against, str(what)), of_window)
-            gap = "" if fall and kind == "model form" else text
-            yield judge(
-                _figure(figures, place),
-                line,
-                kind=kind,
-                measure=what.definition,
-                gap=gap + SHIFTS if gap and kind == "measured" and not fall else gap,
-                floor=floor(what.definition),
-                beside=beside.get((what.measure, what.window))
-                if line and kind == "absolute"
-                else None,
-            )
 
     def _explained(self, scene: str, inputs: Inputs | None) -> Iterator[Cell]:
         """The cells of a scene with the verdicts on their differences from the references.
 
         Only of those that finished, and whose numerical error is known.
         """
-        own, cells = self.suite.suite_of(scene), self.compared[scene]
-        records: dict[str, Any] = {
-            label: self.records.get(one) for label, one in self.by_scene[scene].items()
-        }
-        for cell in cells:
-            references = {
-                other.model: (other.figures, records[other.model])
-                for other in cells
-                if other.model in {own.reference, own.model_form} - {cell.model}
-                and other.status == "done"
-            }
-            mine = records[cell.model]
-            found = mine and explanations(own.scenes[scene], cell.figures, mine, references, inputs)
-            yield cell.model_copy(update={"explanations": tuple(found or ())})
+        own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
+        played = self.planned[scene]
+        scatters = {one.model: self.ended[played[one.model][0]].uncertainty for one in done}
+        for cell in self.compared[scene]:
+            against = {own.reference, own.model_form} - {cell.model}
+            references = [other for other in done if other.model in against]
+            found = explanations(own.scenes[scene], cell, references, scatters, inputs)
+            yield cell.model_copy(update={"explanations": tuple(found)})
 
-    def _ensemble(
-        self, ensemble: Ensemble, batches: Sequence[Planned]
-    ) -> tuple[EnsembleRecord, list[Cell]]:
-        by_model = {
-            label: list(found)
-            for label, found in groupby(batches, key=lambda batch: batch.variant.label)
-        }
-        played = {label: self._together(parts) for label, parts in by_model.items()}
+    def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
+        planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
+        played = {label: self._together(batches) for label, batches in planned.items()}
         samples = {
             label: Sample(np.array(one.peaks, dtype=float), one.outcomes)
             for label, one in played.items()
         }
         whole = EnsembleRecord(
-            name=ensemble.name,
+            name=name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
             peaks={label: one.peaks for label, one in played.items()},
             outcomes={label: one.outcomes for label, one in played.items()},
         )
-        cells = [
-            self._ensemble_cell(parts, samples, played[label].cost)
-            for label, parts in by_model.items()
+        return whole, [
+            self._ensemble_cell(batches, samples, played[label].cost)
+            for label, batches in planned.items()
         ]
-        return whole, cells
 
     def _together(self, batches: Sequence[Planned]) -> BatchRecord:
         """Batches as one; each scene of a batch that failed has its reason."""
-        found: list[BatchRecord] = [
-            self.records.get(batch)
-            or BatchRecord(
-                peaks=(None,) * len(batch.numbers),
-                outcomes=(self.failures.get(batch, ""),) * len(batch.numbers),
-                cost=CostRecord(),
-            )
-            for batch in batches
-        ]
+        found: list[BatchRecord] = []
+        for batch in batches:
+            one, count = self.ended[batch], len(batch.numbers)
+            if isinstance(one, Failure):
+                one = BatchRecord(
+                    peaks=(None,) * count, outcomes=(one.reason,) * count, cost=CostRecord()
+                )
+            found.append(one)
         return BatchRecord(
             peaks=tuple(peak for one in found for peak in one.peaks),
             outcomes=tuple(outcome for one in found for outcome in one.outcomes),
@@ -438,29 +383,69 @@ class SuiteStudy(Study):
     def _ensemble_cell(
         self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
     ) -> Cell:
-        place, label = batches[0].place, batches[0].variant.label
-        own, reason = samples[label], ""
-        if own.failures:
-            first = own.outcomes[int(np.argmin(np.isfinite(own.peaks)))]
-            reason = f"{own.failures} of {len(own.peaks)} scenes failed; the first: {first}"
-        key = provenance.digest("".join(batch.key for batch in batches))
-        about = self._about(batches, key, reason)
-        about["cost"] = cost
+        name, label = batches[0].place, batches[0].model
+        mine, reason = samples[label], ""
+        if mine.failures:
+            first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
+            reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
+        about = self._about(batches, reason) | {"cost": cost}
         if about["status"] != "done":
             return Cell(**about)
-        required = self.suite.required(place, label)
+        own = self.own[name]
+        required = own.required(name, label)
         figures = [
-            evaluate(measure, Samples(samples[name], own), "alpha", against=name)
-            for name in self.suite.yardsticks(place, required)
-            if name in samples and name != label
+            Compared(evaluate(measure, Samples(samples[other], mine), "alpha", against=other))
+            for other in own.yardsticks(required)
+            if other in samples and other != label
             for measure in STATISTICS.values()
         ]
-        checks = self._checks(place, label, figures, {}, lambda measure: None)
         return Cell(
             **about,
-            outcome=f"{int(np.sum(own.fallen))} of {len(own.peaks)} overturned",
-            figures=tuple(figures),
-            checks=tuple(checks),
+            outcome=f"{int(np.sum(mine.fallen))} of {len(mine.peaks)} overturned",
+            figures=tuple(one.figure for one in figures),
+            checks=tuple(_checks(own, required, figures, attrgetter("resolution"))),
+        )
+
+
+def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
+    return CellRecord if task.ensemble is None else BatchRecord
+
+
+def _checks(
+    own: Suite,
+    required: Mapping[Place, Kind],
+    figures: Sequence[Compared],
+    floor: Callable[[Measure], float],
+    beside: Mapping[tuple[str, str], float | None] = MappingProxyType({}),
+) -> Iterator[Check]:
+    """The judged figures of a cell; none if its suite judges nothing.
+
+    `beside` has the reference's own figures, by measure and window, where these are yardsticks.
+    """
+    known = {(one.figure.against or OWN_FIGURES, one.figure.windowed): one for one in figures}
+    for place, kind in required.items() if own.judged else ():
+        what, line = place.what, own.tolerances.get(place)
+        measure = what.definition
+        itself = place.against == OWN_FIGURES
+        nothing = Figure(  # without a value, so that the check cannot pass
+            measure=measure.name,
+            label=measure.label,
+            unit=measure.unit,
+            value=None,
+            against="" if itself else place.against,
+            window=what.window,
+            note="not computed" if itself else f"{place.against} failed in this scene",
+        )
+        found = known.get((place.against, str(what)), Compared(nothing))
+        gap = "" if found.fall and kind == "model form" else found.gap
+        yield judge(
+            found.figure,
+            line,
+            kind=kind,
+            measure=measure,
+            gap=gap + SHIFTS if gap and kind == "measured" and not found.fall else gap,
+            floor=floor(measure),
+            beside=beside.get((what.measure, what.window)) if line and kind == "absolute" else None,
         )
 
 
@@ -489,37 +474,11 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
     compiled as a whole are quick, and fill the processes up to the end.
     """
     first = {item.compiles: item for item in reversed(items)}
-
-    def turn(item: Planned) -> tuple[bool, bool, float]:
-        quick, scene = family(item.variant.family).compiled, item.scene
-        waits = not item.compiles or first[item.compiles] is not item
-        return waits, quick, -scene.duration * (1 + len(scene.walls))
-
-    return sorted(items, key=turn)
-
-
-def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
-    return CellRecord if task.ensemble is None else BatchRecord
-
-
-def _figure(figures: Sequence[Figure], place: Place) -> Figure:
-    """The figure of a check; if missing, one without a value, so that the check cannot pass."""
-    against = "" if place.against == OWN_FIGURES else place.against
-    for figure in figures:
-        if (figure.measure, figure.against, figure.window) == (
-            place.what.measure,
-            against,
-            place.what.window,
-        ):
-            return figure
-    measure = place.what.definition
-    reason = f"{place.against} failed in this scene" if against else "not computed"
-    return Figure(
-        measure=measure.name,
-        label=measure.label,
-        unit=measure.unit,
-        value=None,
-        against=against,
-        window=place.what.window,
-        note=reason,
+    return sorted(
+        items,
+        key=lambda item: (
+            not item.compiles or first[item.compiles] is not item,
+            family(item.variant.family).compiled,
+            -item.scene.duration * (1 + len(item.scene.walls)),
+        ),
     )

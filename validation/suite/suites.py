@@ -187,42 +187,33 @@ class Suite:
         """The suites that it joins, or the suite itself."""
         return self.included or (self,)
 
-    def suite_of(self, scene: str) -> Suite:
-        """The suite that a scene or an ensemble comes from: this one, or the included one."""
-        return next(
-            (suite for suite in self.included if scene in suite.scenes or scene in suite.ensembles),
-            self,
-        )
+    @property
+    def owners(self) -> dict[str, Suite]:
+        """The part that each scene or ensemble comes from."""
+        return {place: part for part in self.parts for place in (*part.scenes, *part.ensembles)}
 
-    def cells(self) -> Iterator[tuple[Scene, Work]]:
-        """All cells, scene by scene."""
-        return (
-            (suite.scenes[scene], suite.models[model])
-            for suite in self.parts
-            for scene, model in _played(suite.scenes, suite.models)
-        )
-
-    def ensemble_cells(self) -> Iterator[tuple[Ensemble, Scene, Work]]:
-        """All ensembles with the scene that they are drawn from, model by model."""
-        return (
-            (*suite.ensembles[name], suite.models[model])
-            for suite in self.parts
-            for name, model in _played(suite.ensembles, suite.models)
-        )
+    def cells(self) -> Iterator[tuple[Scene, Work, Ensemble | None]]:
+        """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
+        for part in self.parts:
+            for name, model in _played(part.scenes, part.models):
+                yield part.scenes[name], part.models[model], None
+        for part in self.parts:
+            for name, model in _played(part.ensembles, part.models):
+                ensemble, scene = part.ensembles[name]
+                yield scene, part.models[model], ensemble
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
-        own = self.suite_of(scene)
-        if scene not in own.scenes:
-            raise unknown_name("scene of the suite", scene, self.scenes)
-        if model not in own.models:
-            raise unknown_name("model of the suite", model, own.models)
+        own = self.owners.get(scene, self)
+        for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
+            if name not in known:
+                raise unknown_name(f"{what} of the suite", name, known)
         tolerances = {
             place: line
             for place, line in own.tolerances.items()
             if (place.scene, place.model) == (scene, model)
         }
-        needed = {model, *own.yardsticks(scene, tolerances)}
+        needed = {model, *own.yardsticks(tolerances)}
         return replace(
             own,
             scenes={scene: own.scenes[scene]},
@@ -231,28 +222,30 @@ class Suite:
             tolerances=tolerances,
         )
 
-    def required(self, scene: str, model: str) -> dict[Place, Kind]:
-        """The checks of a cell, with their kinds: those required or given a tolerance."""
-        own = self.suite_of(scene)
-        require = own.given.require
-        if scene in own.ensembles:
+    def required(self, place: str, model: str) -> dict[Place, Kind]:
+        """The checks of a cell, with their kinds: those required or given a tolerance.
+
+        `place` is a scene or an ensemble of this very suite, not of one that it joins.
+        """
+        require = self.given.require
+        if place in self.ensembles:
             require = Require(difference=require.ensemble)
         places = [
-            Place(scene, model, OWN_FIGURES, Windowed.parse(text)) for text in require.figures
+            Place(place, model, against, Windowed.parse(text))
+            for against, texts in (
+                (OWN_FIGURES, require.figures),
+                (self.reference, require.difference),
+                (self.model_form, require.model_form),
+            )
+            if against == OWN_FIGURES or (against and model not in (self.reference, against))
+            for text in texts
         ]
-        for against, texts in (
-            (own.reference, require.difference),
-            (own.model_form, require.model_form),
-        ):
-            if against and model not in (own.reference, against):
-                places += [Place(scene, model, against, Windowed.parse(text)) for text in texts]
-        places += own._judged.get((scene, model), [])
-        return {place: own.kind(place) for place in places}
+        return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
 
-    def yardsticks(self, scene: str, checks: Iterable[Place]) -> list[str]:
-        """`OWN_FIGURES`, then the models that a scene's cells are compared with."""
-        own, named = self.suite_of(scene), (place.against for place in checks)
-        return list(dict.fromkeys((OWN_FIGURES, own.reference, own.model_form, *named)))
+    def yardsticks(self, checks: Iterable[Place]) -> list[str]:
+        """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
+        named = (place.against for place in checks)
+        return list(dict.fromkeys((OWN_FIGURES, self.reference, self.model_form, *named)))
 
     def kind(self, place: Place) -> Kind:
         """The kind of a check.
@@ -303,9 +296,8 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except InputError as error:
-        text, shown = str(error), printable(path)
-        told = text.startswith((printable(path.parent), f"{shown}: "))
-        raise InputError(text if told else f"{shown}: {text}") from None
+        told = str(error).startswith((printable(path.parent), f"{printable(path)}: "))
+        raise InputError(str(error) if told else f"{printable(path)}: {error}") from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
@@ -386,11 +378,9 @@ def is_scene(source: str) -> bool:
 
     Raises `InputError` for a file that is no TOML.
     """
-    if source in named_suites():
-        return False
     path = Path(source)
-    return source in named_scenes() or (
-        path.suffix.lower() == ".toml" and "block" in read_toml(path)
+    return source not in named_suites() and (
+        source in named_scenes() or (path.suffix.lower() == ".toml" and "block" in read_toml(path))
     )
 
 
@@ -399,17 +389,16 @@ def _check_names(
 ) -> None:
     """Raise `InputError` where something is missing, named twice, or unknown."""
     known = ", ".join(models) or "none"
-    faults = [
-        (label and label not in models, key, f"{label!r} is not among the suite's models: {known}")
-        for key, label in (("reference", given.reference), ("model_form", given.model_form))
-    ]
-    faults += [
+    count = Counter((*scenes, *(one.name for one in given.ensemble)))
+    for wrong, key, said in (
+        *(
+            (one and one not in models, key, f"{one!r} is not among the suite's models: {known}")
+            for key, one in (("reference", given.reference), ("model_form", given.model_form))
+        ),
         (not models, "models", "no model; at least the reference is needed"),
         (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
-    ]
-    count = Counter((*scenes, *(one.name for one in given.ensemble)))
-    faults += [(n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()]
-    for wrong, key, said in faults:
+        *((n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()),
+    ):
         if wrong:
             raise InputError(said, key)
     for key, texts in given.require:
@@ -438,12 +427,12 @@ def _tolerances(
 
 def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
-    for scene in scenes:
-        yield from (
-            (scene, label)
-            for label, model in models.items()
-            if scene in model.settings.get("files", {scene: ""})
-        )
+    return (
+        (scene, label)
+        for scene in scenes
+        for label, model in models.items()
+        if scene in model.settings.get("files", {scene: ""})
+    )
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:

@@ -57,8 +57,9 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
 def not_shown(run: Run) -> list[str]:
     """A line with the number of scenes that are not `shown`; empty if there are none."""
     more = len(run.by_scene()) - len(shown(run))
-    said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
-    return [said] if more else []
+    if not more:
+        return []
+    return [f"and {more} more scenes, none of them worse; their figures are in figures.csv"]
 
 
 def finding_of(run: Run) -> Finding:
@@ -102,7 +103,10 @@ def verdict_table(run: Run) -> Table:
 
 
 def _verdict_row(cell: Cell) -> list[Any]:
-    near, unsure = nearest(cell), ", not converged" if cell.converged is False else ""
+    # a yes-or-no measure, or a limit of 0, is never near its limit
+    weighed = [one for one in cell.checks if one.verdict == "fail" or (one.limit and not asks(one))]
+    near = max(weighed, key=used, default=None)
+    unsure = ", not converged" if cell.converged is False else ""
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
     idle = cell.status == "done" and not cell.checks
     state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
@@ -251,22 +255,6 @@ def percent(check: Check) -> str:
     if check.words == "no tolerance yet":
         return "-"
     return f"{100.0 * used(check):.0f} %" if math.isfinite(used(check)) else "beyond"
-
-
-def nearest(cell: Cell) -> Check | None:
-    """The check that failed, else the one nearest to its limit.
-
-    A yes-or-no measure, or a limit of 0, is never near its limit.
-    """
-    return max(
-        (
-            check
-            for check in cell.checks
-            if check.verdict == "fail" or (check.limit and not asks(check))
-        ),
-        key=used,
-        default=None,
-    )
 
 
 def asks(check: Check) -> bool:

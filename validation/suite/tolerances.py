@@ -233,9 +233,8 @@ def judge(
     elif gap or tolerance is None:
         reason = gap or "no tolerance yet"
     else:
-        verdict, reason = _verdict(
-            figure, value, tolerance, measure, least, _perfect(measure, kind, beside)
-        )
+        perfect = measure.ideal if measure.role == "error" else beside
+        verdict, reason = _verdict(figure, value, tolerance, measure, least, kind, perfect)
     return Check(
         figure=figure,
         kind=kind,
@@ -252,31 +251,19 @@ def judge(
     )
 
 
-def _perfect(measure: Measure, kind: Kind, beside: float | None) -> float | None:
-    """The perfect value, to which a better one is nearer.
-
-    None for another model form, or for a quantity or count without the reference's figure.
-    """
-    if kind == "model form":
-        return None
-    return (
-        math.inf
-        if measure.sense == "at least"
-        else measure.ideal
-        if measure.role == "error"
-        else beside
-    )
-
-
 def _verdict(
     figure: Figure,
     value: float,
     line: Tolerance,
     measure: Measure,
     floor: float,
+    kind: Kind,
     perfect: float | None,
 ) -> tuple[CheckVerdict, str]:
-    """The verdict by the table at the top of this module, and why the figure is no plain pass."""
+    """The verdict by the table at the top of this module, and why the figure is no plain pass.
+
+    `perfect`: the value to which a better one is nearer, None where it is not known.
+    """
     expected, drift = line.expected, math.inf if line.drift is None else line.drift
     moved = 0.0 if expected is None else apart(value, expected, floor, measure.ideal or 0.0)
     outside = _outside(figure, value, line, measure, moved)
@@ -284,9 +271,9 @@ def _verdict(
         return "fail", outside
     if expected is None or not (outside or moved > drift):
         return "pass", ""
-    if _nearer(value, expected, perfect) > (line.drift or 0.0):
+    if kind != "model form" and _nearer(value, expected, measure, perfect) > (line.drift or 0.0):
         return "better", f"{value:.6g} was {expected:.6g}" + (
-            f", nearer to {perfect:.6g}" if perfect and perfect < math.inf else ""
+            f", nearer to {perfect:.6g}" if perfect else ""
         )
     return (
         ("fail", outside)
@@ -295,11 +282,11 @@ def _verdict(
     )
 
 
-def _nearer(value: float, expected: float, perfect: float | None) -> float:
+def _nearer(value: float, expected: float, measure: Measure, perfect: float | None) -> float:
     """How much nearer the value is to a perfect one than the expected value; 0 without one."""
-    if perfect is None or math.isinf(perfect):
-        return 0.0 if perfect is None else value - expected
-    return abs(expected - perfect) - abs(value - perfect)
+    if measure.sense == "at least":
+        return value - expected
+    return 0.0 if perfect is None else abs(expected - perfect) - abs(value - perfect)
 
 
 def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
@@ -325,8 +312,5 @@ def apart(value: float, expected: float, floor: float, zero: float = 0.0) -> flo
     one, other = value - zero, expected - zero
     if min(abs(one), abs(other)) > floor and one * other > 0.0:
         return abs(value - expected)
-    return abs(_beyond(one, floor) - _beyond(other, floor))
-
-
-def _beyond(size: float, floor: float) -> float:
-    return math.copysign(max(abs(size) - floor, 0.0), size)
+    beyond = [math.copysign(max(abs(size) - floor, 0.0), size) for size in (one, other)]
+    return abs(beyond[0] - beyond[1])

@@ -102,21 +102,21 @@ def numerical_uncertainty(
     runs (together 13/12 of its cost), or one of an event-based model at a hundredth of its
     tolerance. Raises what `simulate` raises.
     """
-    coarser: Any = getattr(model, "coarser", None)
-    finer: Any = getattr(model, "finer", None)
-    if coarser is None and finer is None:
+    if not (hasattr(model, "coarser") or hasattr(model, "finer")):
         return None
     given = history or model.simulate(scene)
-    if coarser is not None:
-        runs = [given, *(coarser(factor).simulate(scene) for factor in FACTORS[1:])]
+    if hasattr(model, "coarser"):
+        runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
         return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
-    found = _from_tolerance(scene, given, finer().simulate(scene))
+    found = _from_tolerance(scene, given, model.finer().simulate(scene))
     return Numerical(method="a hundredth of the tolerance", quantities=found)
 
 
 def failed(history: History, reason: str) -> Numerical:
     """No converged quantity: the coarser or finer run failed, for this reason."""
-    return Numerical(method="", quantities=(_outcome(history, reason),))
+    return Numerical(
+        method="", quantities=(_quantity("outcome", "", history.outcome, reason=reason),)
+    )
 
 
 def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
@@ -134,17 +134,14 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
         unsure = reason = f"the outcome changes with the step: {', '.join(sides)} at h, 2h, 3h, 4h"
     elif parted > LARGE:
         reason = f"the histories part by {parted:.2g} with the step, more than {LARGE:g}"
-    between = {
-        "peak_rotation": _between_rows(finest) / alpha,
-        "end_time": scene.output_step,
-    }
+    between = {"peak_rotation": _between_rows(finest) / alpha, "end_time": scene.output_step}
     found = []
     for name, unit, value in shown:
         own = [one[name] for one in changes]
         u = SAFETY * max(own) if converge else POOR_SAFETY * max(apart) * units[unit]
         u = math.hypot(u, between.get(name, 0.0))
         found.append(_quantity(name, unit, value, u, reason, _order(own)))
-    return (*found, _outcome(finest, unsure))
+    return (*found, _quantity("outcome", "", finest.outcome, reason=unsure))
 
 
 def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
@@ -186,10 +183,6 @@ def _quantity(
     )
 
 
-def _outcome(history: History, reason: str = "") -> Quantity:
-    return _quantity("outcome", "", history.outcome, reason=reason)
-
-
 def _between_rows(history: History) -> float:
     """Bound on how far the peak |theta| exceeds the rows, rad: parabola through the top three."""
     theta = np.abs(history.channels["theta"])
@@ -202,7 +195,8 @@ def _between_rows(history: History) -> float:
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
     """u_num is `SAFETY` times the change: the finer run errs by a few hundredths of the change."""
     if _side(given) != _side(finer):
-        return (_outcome(given, "the outcome changes with the tolerance"),)
+        reason = "the outcome changes with the tolerance"
+        return (_quantity("outcome", "", given.outcome, reason=reason),)
     rms = _changes(scene, given, finer)["theta_rms"]
     figures = zip(_scalars(scene, given), _scalars(scene, finer), strict=True)
     return (
@@ -211,7 +205,7 @@ def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quant
             _quantity(name, unit, value, SAFETY * abs(better - value))
             for (name, unit, value), (_, _, better) in figures
         ),
-        _outcome(given),
+        _quantity("outcome", "", given.outcome),
     )
 
 
@@ -286,8 +280,8 @@ def explain(
     elif error <= u_val:
         verdict = INPUTS if u_input >= u_data else DATA
     else:
-        least = f"{error - u_val:.2g} {unit}"
-        verdict = f"not explained: model form or set-up, at least {least}".rstrip()
+        least = f"at least {error - u_val:.2g} {unit}".rstrip()
+        verdict = f"not explained: model form or set-up, {least}"
     return Explanation(
         quantity=quantity,
         unit=unit,

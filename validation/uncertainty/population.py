@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import TYPE_CHECKING, Any, TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,9 +24,6 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene, kinematic
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE
-
-if TYPE_CHECKING:
-    from rockcheck.ebm.batch import Outcomes
 
 Floats = NDArray[np.float64]
 #: Median and dispersion where no lognormal curve fits.
@@ -74,7 +71,7 @@ def play(scenes: Sequence[Scene], player: Any) -> Runs:
     return Runs(side=side.tolist(), failed=failed.tolist(), figures={"peak_rotation": rotations})
 
 
-def _batch(scenes: Sequence[Scene], model: EventBasedModel, **how: Any) -> Outcomes:
+def _batch(scenes: Sequence[Scene], model: EventBasedModel, **how: Any) -> Any:
     from rockcheck.ebm.batch import pack, run_batch
 
     return run_batch(pack(scenes, model), model, **how)
@@ -229,11 +226,6 @@ class Interval(Stored):
     low: float
     high: float
 
-    @property
-    def half_width(self) -> float:
-        """Distance from the value to the farther end: the figure's u_input."""
-        return max(self.high - self.value, self.value - self.low)
-
 
 class Sensitivity(Stored):
     """Sobol indices of one uncertain number.
@@ -266,13 +258,14 @@ class Inputs(Stored):
     note: str = ""
 
     def u_input(self, name: str) -> float | None:
-        """Half the 95 % interval of a figure, on its longer side; None for an unknown figure.
+        """Distance from a figure to the farther end of its interval; None for an unknown figure.
 
         Of theta_rms the RMS over time of half the band's width, alpha.
         """
         if name == "theta_rms":
             return self.theta_band
-        return next((figure.half_width for figure in self.figures if figure.name == name), None)
+        found = (f for f in self.figures if f.name == name)
+        return next((max(f.high - f.value, f.value - f.low) for f in found), None)
 
 
 @dataclass(frozen=True)
@@ -310,8 +303,9 @@ def propagate(
     from rockcheck.ebm.batch import play_ensemble
 
     if not given.spreads:
-        said = "no number of this scene is uncertain: write one as { value = 0.3, sd = 0.03 }"
-        raise InputError(said)
+        raise InputError(
+            "no number of this scene is uncertain: write one as { value = 0.3, sd = 0.03 }"
+        )
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
     chance = np.random.default_rng(seed)
@@ -325,9 +319,6 @@ def propagate(
         figures.append(_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen]))
     bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
-    correlated = (
-        "inputs are correlated: Sobol indices, which are for independent ones, are left out"
-    )
     found = Inputs(
         samples=count,
         model=model.name,
@@ -340,7 +331,9 @@ def propagate(
         if indices and given.independent
         else (),
         theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
-        note="" if given.independent else correlated,
+        note=""
+        if given.independent
+        else "inputs are correlated: Sobol indices, which are for independent ones, are left out",
     )
     return Propagated(found, played.t, bands, values, peaks, fallen)
 

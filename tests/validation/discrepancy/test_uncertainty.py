@@ -19,11 +19,11 @@ from rockcheck import (
 )
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.engines import MuJoCo
-from rockcheck.scenes.experience import Experience, Range, Trust, axes_of, expected, outside
+from rockcheck.scenes.experience import Experience, Range, axes_of, expected, outside
 from rockcheck.scenes.files import load_scene, load_uncertain_scene
-from rockcheck.validation.suite.across import bias_and_scatter
-from rockcheck.validation.suite.comparing import CellRecord, explanations
-from rockcheck.validation.suite.results import CostRecord
+from rockcheck.validation.suite.across import trust_in
+from rockcheck.validation.suite.comparing import explanations
+from rockcheck.validation.suite.results import Cell
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import junit, markdown
@@ -83,6 +83,10 @@ def uncertain(tmp_path):
 
 
 def test_a_scene_file_says_what_is_not_known(uncertain):
+    uncertain.write_text(
+        UNCERTAIN + '[correlation]\n"floor.friction, excitation.amplitude" = 0.8\n',
+        encoding="utf-8",
+    )
     given = load_uncertain_scene(uncertain)
     assert load_scene(uncertain) == given.scene
     assert given.names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
@@ -91,14 +95,6 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
     np.testing.assert_allclose(values.mean(axis=0), [0.5, 0.055, 6.0], rtol=2e-3)
     np.testing.assert_allclose(values.std(axis=0), [0.05, 0.01 / math.sqrt(12.0), 0.2], rtol=2e-2)
     assert given.at(values[0]).floor.friction == values[0, 0]
-
-
-def test_correlated_numbers(uncertain):
-    uncertain.write_text(
-        UNCERTAIN + '[correlation]\n"floor.friction, excitation.amplitude" = 0.8\n',
-        encoding="utf-8",
-    )
-    values = load_uncertain_scene(uncertain).values(np.random.default_rng(1).random((20000, 3)))
     assert np.corrcoef(values.T)[0, 2] == pytest.approx(0.8, abs=0.02)
 
 
@@ -254,10 +250,9 @@ def test_bias_and_scatter_are_recovered_and_cover():
     chance = np.random.default_rng(2)
     truth = chance.uniform(0.1, 0.9, 4000)
     model = 1.1 * truth * np.exp(0.05 * chance.standard_normal(4000) - 0.5 * 0.05**2)
-    bias, scatter = bias_and_scatter(list(zip(truth[:2000], model[:2000], strict=True)))
-    assert bias == pytest.approx(1.1, rel=5e-3)
-    assert scatter == pytest.approx(0.05, rel=0.05)
-    trust = Trust(bias=bias, scatter=scatter, count=2000)
+    trust = trust_in(list(zip(truth[:2000], model[:2000], strict=True)))
+    assert trust.bias == pytest.approx(1.1, rel=5e-3)
+    assert trust.scatter == pytest.approx(0.05, rel=0.05)
     found = [expected(trust, m) for m in model[2000:]]
     inside = [one.low <= e <= one.high for e, one in zip(truth[2000:], found, strict=True)]
     assert 0.93 <= np.mean(inside) <= 0.97
@@ -357,17 +352,10 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
         method="", quantities=(Quantity(name="outcome", unit="", value="", verdict="converged"),)
     )
     own, other = (
-        CellRecord(
-            outcome=outcome,
-            notes=(),
-            settings={},
-            uncertainty={},
-            numerical=converged,
-            cost=CostRecord(),
-        )
+        Cell(scene="s", model="ebm", status="done", outcome=outcome, numerical=converged)
         for outcome in ("at rest", "overturned left")
     )
-    (found,) = explanations(BOOKCASE, (), own, {"ebm": ((), other)}, None)
+    (found,) = explanations(BOOKCASE, own, [other], {}, None)
     assert found.verdict.startswith("not explained")
     shares = Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4)
     inputs = Inputs(
@@ -378,7 +366,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them():
         overturns=shares,
         sensitivities=(),
     )
-    (found,) = explanations(BOOKCASE, (), own, {"ebm": ((), other)}, inputs)
+    (found,) = explanations(BOOKCASE, own, [other], {}, inputs)
     assert found.verdict == numerical.INPUTS
 
 

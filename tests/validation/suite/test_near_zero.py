@@ -13,7 +13,7 @@ from rockcheck.scenes import Block, Floor, Rest, Scene
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.across import Trend
+from rockcheck.validation.suite.across import _moved
 from rockcheck.validation.suite.results import Cell, Check, Run
 from rockcheck.validation.suite.tables import improvements, junit, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
@@ -73,6 +73,15 @@ def run_of(*checks: Check, **more: object) -> Run:
             (50.0, 5.0, 1.0),
             {51.0: "pass", 52.0: "changed", 48.0: "changed", 56.0: "fail"},
         ),
+        ("peak_rotation", (0.33, 0.01, 0.001), {0.33: "pass", 0.335: "changed", 0.345: "fail"}),
+        # A figure just at its drift passes, one just at its limit does not fail: numbers that a
+        # computer holds exactly.
+        (
+            "theta_rms",
+            (0.25, 0.5, 0.125),
+            {0.375: "pass", 0.125: "pass", 0.3750001: "changed", 0.1249999: "better"}
+            | {0.5: "changed", 0.5000001: "fail", -0.5: "changed", 0.0: "better", -0.75: "fail"},
+        ),
         # An error is better where it falls. Its limit holds as it is written.
         (
             "theta_rms",
@@ -86,7 +95,14 @@ def run_of(*checks: Check, **more: object) -> Run:
             (1.125, 0.25, 0.01),
             {1.0: "better", 1.0625: "better", 0.875: "changed", 0.5: "fail"},
         ),
+        (
+            "peak_ratio",
+            (1.0, 0.1, 0.05),
+            {1.0: "pass", 0.94: "changed", 0.89: "fail", 1.11: "fail"},
+        ),
         ("outcome_agrees", (0.0, 1.0, 0.0), {0.0: "pass", 1.0: "better"}),
+        ("outcome_agrees", (1.0, 0.0, 0.0), {1.0: "pass", 0.0: "fail"}),
+        ("events_agree_until", (None, 8.0, None), {8.0: "pass", 12.0: "pass", 7.9: "fail"}),
         (
             "events_agree_until",
             (9.0, 8.0, 0.1),
@@ -215,6 +231,14 @@ def test_what_is_not_defined_neither_passes_nor_fails():
     assert run_of(NOTHING).verdict == "fail", "a run that judges nothing does not pass"
 
 
+@pytest.fixture
+def suite(tmp_path):
+    suite = SimpleNamespace(path=Path("mine.toml"), scenes={"s": None}, ensembles={})
+    suite.tolerances_path = tmp_path / "t.toml"
+    suite.parts = (suite,)
+    return suite
+
+
 @pytest.mark.parametrize(
     ("old", "reason", "named", "line"),
     [
@@ -240,10 +264,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
         ),
     ],
 )
-def test_accept_names_each_change(tmp_path: Path, old, reason, named, line):
-    suite = SimpleNamespace(
-        included=(), path=Path("mine.toml"), tolerances_path=tmp_path / "t.toml", scenes={"s": None}
-    )
+def test_accept_names_each_change(suite, old, reason, named, line):
     changes, refused = accept(suite, run_of(old, NOTHING), reason)
     assert refused == []
     assert [change.split(": ")[1] for change in changes] == [named]
@@ -255,10 +276,7 @@ def test_accept_names_each_change(tmp_path: Path, old, reason, named, line):
 @pytest.mark.parametrize(
     "worse", [CHANGED, check("theta_rms", 0.5, Tolerance(expected=0.1, limit=0.2, drift=0.01))]
 )
-def test_accept_asks_a_reason_for_what_is_moved_or_loosened(tmp_path: Path, worse):
-    suite = SimpleNamespace(
-        included=(), path=Path("mine.toml"), tolerances_path=tmp_path / "t.toml", scenes={"s": None}
-    )
+def test_accept_asks_a_reason_for_what_is_moved_or_loosened(suite, worse):
     changes, refused = accept(suite, run_of(worse), None)
     assert (changes, ["--reason" in line for line in refused]) == ([], [True])
     assert not suite.tolerances_path.exists()
@@ -269,7 +287,7 @@ def test_accept_asks_a_reason_for_what_is_moved_or_loosened(tmp_path: Path, wors
 )
 def test_what_moves_within_its_resolution_is_no_trend(values, moved):
     for name in ("s, m: last_rotation", "s, m: theta_rms@8s against r"):
-        assert Trend(name=name, values=values).moved == moved
+        assert _moved(name, *values) == moved
 
 
 SUITE = """

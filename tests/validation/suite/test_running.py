@@ -331,14 +331,14 @@ def test_time_to_compile_does_not_count_for_a_cells_limit(
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
     study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
-    assert {cell.compiles for cell in study.cells if cell.variant.label == "a"} == {compiled}
+    assert {cell.compiles for cell in study.items if cell.variant.label == "a"} == {compiled}
 
 
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
     study = SuiteStudy(load_suite("paper"), tmp_path)
-    begun = [(cell.variant.label, cell.place) for cell in in_order(study.cells)]
+    begun = [(cell.variant.label, cell.place) for cell in in_order(study.items)]
     first = ("mujoco", "ebm-unilateral", "ebm", "cm")
     assert begun[:4] == [(model, "fig4a") for model in first]
     engines = begun[4:11]

@@ -71,7 +71,7 @@ def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
             "[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'
         ),
     )
-    assert [(scene.name, variant.label, variant.family) for scene, variant in found.cells()] == [
+    assert [(scene.name, variant.label, variant.family) for scene, variant, _ in found.cells()] == [
         ("shelf", "ebm", "ebm"),
         ("shelf", "coarse", "mujoco"),
     ]

@@ -92,11 +92,6 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
     assert error.get("message") == "more than 10 events"
 
 
-def test_a_run_without_a_fault_is_green():
-    root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25)))))
-    assert totals(root) == {"tests": 2, "failures": 0, "errors": 0}
-
-
 def test_a_cell_that_was_read_back_took_no_time():
     ran = cell("a", "m", check(0.25)).model_copy(update={"cost": CostRecord(worker_seconds=7.5)})
     for read_back, seconds in ((False, 7.5), (True, 0.0)):
@@ -183,26 +178,6 @@ def test_the_summary_names_what_is_not_a_pass():
     assert [line for line in text.splitlines() if line.startswith("| a |")] == [
         "| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"
     ]
-
-
-@pytest.mark.parametrize(
-    ("value", "expected"),
-    [
-        (0.375, "pass"),
-        (0.125, "pass"),
-        (0.3750001, "changed"),
-        (0.1249999, "better"),
-        (0.5, "changed"),
-        (0.5000001, "fail"),
-        (-0.5, "changed"),
-        (0.0, "better"),
-        (-0.75, "fail"),
-    ],
-)
-def test_limit_and_drift_themselves_are_inside(value, expected):
-    """Numbers that a computer holds exactly: a figure just at its drift passes, one just at its
-    limit does not fail."""
-    assert check(value).verdict == expected
 
 
 def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
@@ -310,12 +285,6 @@ def test_a_line_for_every_scene_is_completed_by_the_same_line_only():
     }
     with pytest.raises(InputError, match="theta_rms: limit: is missing"):
         parse_tolerances(tables, [("a", "m")])
-
-
-def test_a_limit_of_zero_asks_for_the_figure_itself():
-    exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
-    assert check(1.0, "outcome_agrees", exact).verdict == "pass"
-    assert check(0.0, "outcome_agrees", exact).verdict == "fail"
 
 
 def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for():
