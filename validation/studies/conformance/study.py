@@ -7,7 +7,7 @@ for an engine elsewhere.
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -128,6 +128,17 @@ def written(folder: Path) -> Player:
 
 
 @dataclass(frozen=True)
+class Seen:
+    """The result of a player: a value, or None where it lacks a part or no value could be read."""
+
+    value: float | None
+    verdict: str
+    reason: str
+    version: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Trial(Task):
     """One player and one phenomenon, whose scenes it plays."""
 
@@ -145,38 +156,9 @@ class Trial(Task):
         cells = [cell_key(scene, who.model, who.given, who.search) for scene in scenes]
         return {**super().depends(), "cells": cells}
 
-
-@dataclass(frozen=True)
-class Seen:
-    """The result of a player: a value, or None where it lacks a part or no value could be read."""
-
-    value: float | None
-    verdict: str
-    reason: str
-    version: str
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Conformance(Study):
-    """The players whose conformance is judged."""
-
-    players: tuple[Player, ...]
-    name = "conformance"
-    record = Seen
-
-    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Trial]:
-        """Player by player."""
-        return [
-            Trial(player, id, expected=player.cost * sum(scene.duration for scene in what.scenes))
-            for player in self.players
-            for id, what in PHENOMENA.items()
-        ]
-
-    @staticmethod
-    def play(task: Trial) -> Seen:
+    def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
-        who, what = task.player, PHENOMENA[task.id]
+        who, what = self.player, PHENOMENA[self.id]
         sys.path.extend(path for path in who.search if path not in sys.path)
         model: Any = build_own(who.model, who.given)
         version = who.version or str(getattr(model, "version", ""))
@@ -196,6 +178,23 @@ class Conformance(Study):
         notes = dict.fromkeys(note for note in said if note not in told)
         shown = value if math.isfinite(value) else None
         return Seen(shown, *what.judge(value), version, tuple(notes))
+
+
+@dataclass(frozen=True)
+class Conformance(Study):
+    """The players whose conformance is judged."""
+
+    players: tuple[Player, ...]
+    name = "conformance"
+    record = Seen
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Trial]:
+        """Player by player."""
+        return [
+            Trial(player, id, expected=player.cost * sum(scene.duration for scene in what.scenes))
+            for player in self.players
+            for id, what in PHENOMENA.items()
+        ]
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """A card a player. Raises `InputError` where one cannot be built at all."""
@@ -226,8 +225,7 @@ def _in_units(scene: Scene, history: History) -> None:
     As a rule a column is then in other units than its name says.
     """
     t, size = history.channels["t"], scene.block.radius
-    begins = dict(zip(("x", "y", "theta"), scene.initial_state, strict=False))
-    for name, value in begins.items():
+    for name, value in zip(("x", "y", "theta"), scene.initial_state, strict=False):
         first = float(history.channels.get(name, [value])[0])
         if not abs(first - value) <= 0.02 * (1.0 if name == "theta" else size):
             raise ModelFailure(
@@ -381,44 +379,41 @@ def changes(before: Path, after: Path) -> Finding:
         key: (old.get(key) or new[key] | gone, new.get(key) or old[key] | gone)
         for key in {**old, **new}
     }
-    rows = [
-        [
-            *key,
-            was["name"],
-            *(one[name] for name in ("version", "verdict", "value") for one in (was, now)),
-            was["verdict"] == "pass" and now["verdict"] in ("fail", "error", "absent"),
-        ]
-        for key, (was, now) in pairs.items()
-        if _changed(was, now)
-    ]
-    worse = sum(row[-1] for row in rows)
-    columns = [
-        Column("engine", kind="model"),
-        text("settings"),
-        text("id", "no."),
-        text("phenomenon", brief=False),
-        text("version_before", brief=False),
-        text("version_after", brief=False),
-        text("verdict_before"),
-        text("verdict_after"),
-        Column("value_before"),
-        Column("value_after"),
-        text("worse", brief=False),
-    ]
+    rows = []
+    for key, (was, now) in pairs.items():
+        known = None not in (was["value"], now["value"], was["limit"])
+        moved = known and abs(now["value"] - was["value"]) > SHARE * was["limit"]
+        if moved or was["verdict"] != now["verdict"]:
+            told = [one[name] for name in ("version", "verdict", "value") for one in (was, now)]
+            worse = was["verdict"] == "pass" and now["verdict"] in ("fail", "error", "absent")
+            rows.append([*key, was["name"], *told, worse])
+    worst = sum(row[-1] for row in rows)
     return Finding(
         "conformance-changes",
         "Conformance: what changed",
-        f"{len(rows)} changes, {worse} for the worse",
-        [Table("changes", columns, rows)],
-        verdict="fail" if worse else "changed" if rows else "pass",
-        exit_code=int(worse > 0),
+        f"{len(rows)} changes, {worst} for the worse",
+        [
+            Table(
+                "changes",
+                [
+                    Column("engine", kind="model"),
+                    text("settings"),
+                    text("id", "no."),
+                    text("phenomenon", brief=False),
+                    text("version_before", brief=False),
+                    text("version_after", brief=False),
+                    text("verdict_before"),
+                    text("verdict_after"),
+                    Column("value_before"),
+                    Column("value_after"),
+                    text("worse", brief=False),
+                ],
+                rows,
+            )
+        ],
+        verdict="fail" if worst else "changed" if rows else "pass",
+        exit_code=int(worst > 0),
     )
-
-
-def _changed(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
-    known = None not in (was["value"], now["value"], was["limit"])
-    moved = known and abs(now["value"] - was["value"]) > SHARE * was["limit"]
-    return moved or bool(was["verdict"] != now["verdict"])
 
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
@@ -449,10 +444,14 @@ def export(folder: Path) -> list[str]:
     """
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
-            write_whole(folder / f"{name}-base.csv", table_text(MOTION, _motion(scene)))
-    rows = [_row(scene) for scene in SCENES.values()]
+            t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
+            velocity = list(map(BaseMotion(scene).velocity, t.tolist()))
+            accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
+            rows = np.column_stack([t, velocity, *accelerations]).tolist()
+            write_whole(folder / f"{name}-base.csv", table_text(MOTION, rows))
+    scenes = [_row(scene) for scene in SCENES.values()]
     write_whole(
-        folder / "scenes.csv", table_text(tuple(rows[0]), (tuple(row.values()) for row in rows))
+        folder / "scenes.csv", table_text(tuple(scenes[0]), [tuple(row.values()) for row in scenes])
     )
     played = [
         f"- {one.id} {one.name}: {', '.join(scene.name for scene in one.scenes)}"
@@ -463,14 +462,6 @@ def export(folder: Path) -> list[str]:
     if not (folder / ABOUT).exists():
         write_whole(folder / ABOUT, (TEXTS / ABOUT).read_text(encoding="utf-8"))
     return list(SCENES)
-
-
-def _motion(scene: Scene) -> Iterable[Any]:
-    base = BaseMotion(scene)
-    t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
-    velocity = np.array([base.velocity(time) for time in t.tolist()])
-    accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
-    return np.column_stack([t, velocity, *accelerations]).tolist()
 
 
 def _row(scene: Scene) -> dict[str, Any]:

@@ -37,7 +37,7 @@ class Knob:
     """The parameter that sets an engine's restitution.
 
     `bounds` are its limits; `words` are all parameters in the engine's own words, in which
-    `calibrate` fills in the numbers.
+    `Tune` fills in the numbers.
     """
 
     bounds: tuple[float, float]
@@ -142,74 +142,6 @@ class Calibration:
     reached: bool
 
 
-def calibrate(
-    engine: str, *, restitution: float, friction: float, time_step: float, penetration: float
-) -> Calibration:
-    """Parameters with which an engine reaches a wanted restitution and friction.
-
-    The rebound of a block dropped from 0.2 m gives the restitution, the way of one sliding at
-    1.5 m/s the friction. Raises `InputError` where the engine cannot reach the restitution, naming
-    what it can.
-    """
-    from scipy.optimize import brentq
-
-    knob, step = KNOBS[engine], time_step
-    model: Any = build(engine, {"time_step": step, "settings": "default"})
-    drop = Scene(
-        name="drop", block=SQUAT, floor=Floor(friction=friction), initial_height=DROP, duration=0.65
-    )
-    slide = Scene(
-        name="slide",
-        block=SQUAT,
-        floor=Floor(friction=friction),
-        initial_velocity=SLIDING,
-        duration=SLIDING / (friction * G) + 0.3,
-    )
-
-    def dropped(setting: float) -> tuple[float, float]:
-        """Restitution of the rebound, and penetration, m."""
-        parameters = {"restitution": setting, "friction": friction}
-        heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
-        later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
-        return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
-
-    low, high = knob.bounds
-    ends = dropped(low)[0], dropped(high)[0]
-    if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
-        raise InputError(
-            f"{restitution:g} cannot be reached by {engine} at a step of {step:g} s:"
-            f" {min(ends):.3g} to {max(ends):.3g} can",
-            "--tune",
-        )
-    near = [
-        one for one, end in zip(knob.bounds, ends, strict=True) if abs(end - restitution) <= NEAR
-    ]
-    found = (
-        near[0]
-        if near
-        else brentq(
-            lambda setting: dropped(setting)[0] - restitution, low, high, xtol=1e-5, rtol=1e-5
-        )
-    )
-    asked = friction
-    for _ in range(12):
-        way = _played(model, slide, {"restitution": found, "friction": asked}, step)[-1, 0]
-        slid = SLIDING**2 / (2.0 * G * float(way))
-        if abs(slid - friction) <= NEAR * friction:
-            break
-        asked *= friction / slid
-    rebound, deep = dropped(found)
-    used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
-    used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
-    words = {where: what.format_map(used) for where, what in knob.words.items()}
-    reached = (
-        abs(rebound - restitution) <= 5.0 * NEAR
-        and abs(slid - friction) <= 5.0 * NEAR * friction
-        and deep <= penetration
-    )
-    return Calibration(engine, step, words, rebound, slid, max(deep, 0.0), reached)
-
-
 def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
     times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
     world = model.tuned_world(scene, parameters, step)
@@ -244,6 +176,79 @@ class Tune(Task):
         """Also the engine's code."""
         return {**super().depends(), "home": code_digest(home(self.engine))}
 
+    def play(self) -> Calibration:
+        """Parameters in the engine's own words, and the contact reached with them.
+
+        The rebound of a block dropped from 0.2 m gives the restitution, the way of one sliding at
+        1.5 m/s the friction. Raises `InputError` where the engine cannot reach the restitution,
+        naming what it can.
+        """
+        from scipy.optimize import brentq
+
+        knob, step, friction = KNOBS[self.engine], self.time_step, self.friction
+        model: Any = build(self.engine, {"time_step": step, "settings": "default"})
+        drop = Scene(
+            name="drop",
+            block=SQUAT,
+            floor=Floor(friction=friction),
+            initial_height=DROP,
+            duration=0.65,
+        )
+        slide = Scene(
+            name="slide",
+            block=SQUAT,
+            floor=Floor(friction=friction),
+            initial_velocity=SLIDING,
+            duration=SLIDING / (friction * G) + 0.3,
+        )
+
+        def dropped(setting: float) -> tuple[float, float]:
+            """Restitution of the rebound, and penetration, m."""
+            parameters = {"restitution": setting, "friction": friction}
+            heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
+            later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
+            return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
+
+        restitution, ends = self.restitution, [dropped(end)[0] for end in knob.bounds]
+        if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
+            raise InputError(
+                f"{restitution:g} cannot be reached by {self.engine} at a step of {step:g} s:"
+                f" {min(ends):.3g} to {max(ends):.3g} can",
+                "--tune",
+            )
+        near = [
+            one
+            for one, end in zip(knob.bounds, ends, strict=True)
+            if abs(end - restitution) <= NEAR
+        ]
+        found = (
+            near[0]
+            if near
+            else brentq(
+                lambda setting: dropped(setting)[0] - restitution,
+                *knob.bounds,
+                xtol=1e-5,
+                rtol=1e-5,
+            )
+        )
+        asked = friction
+        for _ in range(12):
+            way = _played(model, slide, {"restitution": found, "friction": asked}, step)[-1, 0]
+            slid = SLIDING**2 / (2.0 * G * float(way))
+            if abs(slid - friction) <= NEAR * friction:
+                break
+            asked *= friction / slid
+        rebound, deep = dropped(found)
+        used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
+        used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
+        words = {where: what.format_map(used) for where, what in knob.words.items()}
+        reached = (
+            abs(rebound - restitution) <= 5.0 * NEAR
+            and abs(slid - friction) <= 5.0 * NEAR * friction
+            and deep <= self.penetration
+        )
+        return Calibration(self.engine, step, words, rebound, slid, max(deep, 0.0), reached)
+
 
 @dataclass(frozen=True)
 class Tuning(Study):
@@ -256,11 +261,6 @@ class Tuning(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Tune]:
         """All at once."""
         return self.wanted
-
-    @staticmethod
-    def play(task: Tune) -> Calibration:
-        """Finds the parameters."""
-        return calibrate(**task.fields())
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
