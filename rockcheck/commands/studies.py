@@ -87,7 +87,7 @@ def stress(
     An interrupted run resumes where it ended.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from rockcheck.validation.studies.stress.players import PLAYERS
+    from rockcheck.validation.studies.stress.runs import PLAYERS
     from rockcheck.validation.studies.stress.study import Stress, What, places
 
     part: What = one_of("stress", what, get_args(What))

@@ -22,7 +22,7 @@ from rockcheck.validation.execute import pool, store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.studies.stress import runs, study
 from rockcheck.validation.studies.stress.invariants import CheckedRun
-from rockcheck.validation.studies.stress.players import PLAYERS, EventBased
+from rockcheck.validation.studies.stress.runs import PLAYERS, EventBased
 from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.

@@ -12,23 +12,22 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.studies.stress import invariants, players
+from rockcheck.validation.studies.stress import invariants, runs
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
     audited,
     check_run,
     energy_error,
+    energy_without_source,
     similar,
 )
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
-    arms,
+    Motion,
     integrals,
-    motion_of,
     tilted_forces,
 )
-from rockcheck.validation.studies.stress.players import PLAYERS, Approximate, energy_without_source
-from rockcheck.validation.studies.stress.runs import Chunk
+from rockcheck.validation.studies.stress.runs import PLAYERS, Approximate, Chunk
 
 SLIDES_AND_HITS = Scene(
     name="hits",
@@ -87,13 +86,13 @@ def test_forces_of_a_block_that_starts_from_a_tilt(block, sign, side):
     pivot, phi, u = block.pivot(side), 0.1, 0.2
     s = pivot.radius * math.sin(pivot.alpha - phi)
     c = pivot.radius * math.cos(pivot.alpha - phi)
-    at = arms(block, np.array([sign]), np.array([phi]))
 
     def forces(tip, slip):
         touching = np.array([[True], [tip], [False]])
-        given = np.zeros(1), np.array([u]), np.ones(1)
-        found = tilted_forces(at, 0.3, *given, touching, np.array([slip], dtype=np.int8))
-        return found.normal[0], found.friction[0], found.tip[0]
+        tilt, felt = (np.array([sign]), np.array([phi])), (np.array([u]), np.ones(1))
+        slips = np.array([slip], dtype=np.int8)
+        found, _ = tilted_forces(block, tilt, 0.3, np.zeros(1), felt, touching, slips)
+        return found[:3, 0]
 
     inertia = block.gyration_squared + pivot.radius**2
     top = 2.0 * block.half_height * math.cos(phi)  # of the top corner over the floor
@@ -198,7 +197,7 @@ def test_energy_balance_is_exact_to_rounding():
     ):
         fine = audited(scene)
         model = EventBasedModel(tolerance=1e-13)
-        assert energy_error(model, motion_of(fine, model.simulate(fine))) < 1e-11
+        assert energy_error(model, Motion(fine, model.simulate(fine))) < 1e-11
 
 
 def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
@@ -211,11 +210,11 @@ def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_pus
             size = yields * scene.block.radius
             model = EventBasedModel(friction="bouc-wen", yield_displacement=size, tolerance=1e-12)
             history = model.simulate(audited(scene))
-            assert energy_error(model, motion_of(audited(scene), history)) < 1e-9
+            assert energy_error(model, Motion(audited(scene), history)) < 1e-9
             without = model.model_copy(
                 update={"yield_displacement": 1e-30}
             )  # as if it could hold nothing
-            gains[name, yields] = energy_error(without, motion_of(audited(scene), history))
+            gains[name, yields] = energy_error(without, Motion(audited(scene), history))
     assert gains["steady", 1e-2] < 1e-9
     assert gains["steady", 1e-3] < 1e-9
     assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
@@ -225,14 +224,14 @@ def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
     """A history of too few rows, and one whose work is resolved nowhere: neither has an error of 0,
     and the run is counted."""
     model, short = EventBasedModel(), SLIDES_AND_HITS.replace(duration=0.2)
-    assert energy_error(model, motion_of(short, model.simulate(short))) is None
+    assert energy_error(model, Motion(short, model.simulate(short))) is None
     rough = SLIDES_AND_HITS.replace(
         excitation=Record.from_samples(8.0 * np.sin(np.arange(500.0)), time_step=0.008)
     )
     assert (
-        energy_error(model, motion_of(rough, model.simulate(rough))) is None
+        energy_error(model, Motion(rough, model.simulate(rough))) is None
     )  # five kinks between two rows
-    assert energy_error(model, motion_of(audited(rough), model.simulate(audited(rough)))) < 1e-9
+    assert energy_error(model, Motion(audited(rough), model.simulate(audited(rough)))) < 1e-9
     monkeypatch.setattr(invariants, "RESOLVED", 0.0)
     played = check_run(model, SLIDES_AND_HITS, audit=True)
     assert (played.unjudged, "energy" in played.figures, played.broken) == (("energy",), False, [])
@@ -296,17 +295,17 @@ def test_work_of_the_base_on_a_block_that_stands_or_flies():
     )
     slides = EventBasedModel().simulate(scene)
     assert np.ptp(slides.channels["x_dot"]) > 0.05
-    assert abs(energy_without_source(motion_of(scene, slides))) < 1e-14
+    assert abs(energy_without_source(Motion(scene, slides))) < 1e-14
     faster = dataclasses.replace(
         slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]}
     )
-    assert energy_without_source(motion_of(scene, faster)) > 1e-5
+    assert energy_without_source(Motion(scene, faster)) > 1e-5
     drops = scene.replace(
         block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0
     )  # and turns about the load
     flies = EventBasedModel(pivot="unilateral").simulate(drops)
     assert set(flies.channels["mode"]) == {"flight"}
-    assert abs(energy_without_source(motion_of(drops, flies))) < 1e-13
+    assert abs(energy_without_source(Motion(drops, flies))) < 1e-13
 
 
 def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
@@ -315,7 +314,7 @@ def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
     player = PLAYERS["mujoco"]
     scene = player.scene(1, 2)
     monkeypatch.setattr(
-        players,
+        runs,
         "energy_without_source",
         lambda motion: 0.08 * motion.scene.output_step / scene.output_step,
     )

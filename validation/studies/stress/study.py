@@ -32,13 +32,18 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, table_of, text
-from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
-from rockcheck.validation.studies.stress.mechanics import motion_of, not_finite
-from rockcheck.validation.studies.stress.players import PLAYERS, energy_without_source
+from rockcheck.validation.studies.stress.invariants import (
+    INVARIANTS,
+    CheckedRun,
+    energy_without_source,
+)
+from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
+    PLAYERS,
     Broken,
     Chunk,
+    EventBased,
     RunTotals,
     Shrinking,
     chunk,
@@ -185,7 +190,7 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
         return printable(error, 60)
     if not_finite(history):
         return "blows up"
-    motion = motion_of(scene, history)
+    motion = Motion(scene, history)
     speed = float(np.max(np.hypot(motion.channels["x_dot"], motion.channels["y_dot"])))
     if (
         motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius
@@ -336,7 +341,9 @@ class Stress(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """Chunks and places; smaller tasks for those that are lost; then failures are shrunk."""
         lost = [task for task, one in done.items() if isinstance(one, Failure)]
-        work: list[Task] = [*self._chunks(), *(self._places() if self.what != "runs" else ())]
+        work: list[Task] = [*self._chunks()]
+        if self.what != "runs":
+            work += places(self.quick, self.models)
         work += [part for task in lost for part in parts(task)]
         if any(task not in done for task in work):
             return work
@@ -359,16 +366,13 @@ class Stress(Study):
         for label in () if self.what == "maps" else self.models or every:
             player = PLAYERS[label]
             count = self.runs or (player.quick if self.quick else player.runs)
-            most = CHUNK if player.event_based else APPROXIMATE_CHUNK
+            most = CHUNK if isinstance(player, EventBased) else APPROXIMATE_CHUNK
             most = max(10, min(most, count // 4)) if self.quick else most
             found += [
                 chunk(label, self.seed, first, min(most, count - first))
                 for first in range(0, count, most)
             ]
-        return sorted(found, key=lambda one: PLAYERS[one.model].event_based)
-
-    def _places(self) -> list[Place]:
-        return places(self.quick, self.models)
+        return sorted(found, key=lambda one: isinstance(PLAYERS[one.model], EventBased))
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """Totals of the models; a run whose process was lost counts as one that does not end."""
@@ -385,11 +389,12 @@ class Stress(Study):
         """The tables, the maps, and the scenes of failures."""
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
-        at = [done[place] for place in self._places() if place in done]
+        at = [done[place] for place in places(self.quick, self.models) if place in done]
         stable = [one for one in at if isinstance(one, Stable)]
         still = [one for one in at if isinstance(one, Still)]
         runs = sum(one.counts["runs"] for one in totals)
-        broken = sum(len(one.failures) for one in totals if PLAYERS[one.model].event_based)
+        ours = [one for one in totals if isinstance(PLAYERS[one.model], EventBased)]
+        broken = sum(len(one.failures) for one in ours)
         said = f"failures of event-based models: {broken}"
         return Finding(
             self.name,
