@@ -178,7 +178,7 @@ def _check_engine(name: str, allow_code: Sequence[str], *, own: bool) -> None:
 def _tune(
     engines: Sequence[str], restitution: float, given: Mapping[str, Any], played: Played
 ) -> NoReturn:
-    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
+    from rockcheck.validation.studies.conformance.study import WANTED, Tune, Tuning
 
     settings = WANTED.keys() - {"restitution"}
     if unknown := given.keys() - settings:

@@ -23,13 +23,16 @@ from rockcheck.validation.execute.pool import guarded
 from rockcheck.validation.studies.conformance import study
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
 from rockcheck.validation.studies.conformance.study import (
+    KNOBS,
     Conformance,
+    Knob,
     Player,
+    Tune,
+    Tuning,
     changes,
     named,
     written,
 )
-from rockcheck.validation.studies.conformance.tuning import KNOBS, Knob, Tune, Tuning
 
 RIGHT, CONVEX = MuJoCo(time_step=1e-3), MuJoCo(time_step=1e-3, cone_correction=False)
 PLANTED = Player("planted", "best", 1e-3, "planted:Planted", {}, "1")

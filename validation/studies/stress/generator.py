@@ -80,9 +80,8 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         )
         for side in WALLED[int(r.integers(4))]
     ]
-    uplift = gravity * min(block.slope, max(mu, 0.05))
     own_period = 2.0 * math.pi / block.weaker_pivot.frequency_parameter(gravity)
-    excitation = _excitation(r, uplift, own_period)
+    excitation = _excitation(r, gravity * min(block.slope, max(mu, 0.05)), own_period)
     vertical: Excitation = Rest()
     if r.random() < 0.3:
         vertical = _excitation(r, gravity * (0.3 if r.random() < 0.5 else 0.03), own_period)
@@ -226,15 +225,29 @@ def _excitation(r: np.random.Generator, uplift: float, own_period: float) -> Exc
 def _samples(r: np.random.Generator, amplitude: float) -> NDArray[np.float64]:
     """A single sample, noise, levels with steps, or spikes in silence."""
     count = max(1, round(_log(r, 2.0, MOST_SAMPLES)))
-    shape = r.random()
-    if shape < 0.1:
-        return np.array([amplitude])
-    if shape < 0.4:
-        return amplitude * r.standard_normal(count)
-    if shape < 0.7:
-        levels = r.integers(0, count, size=max(1, count // 8))
-        return amplitude * r.standard_normal(count)[np.sort(np.resize(levels, count))]
-    return np.where(r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0)
+    return _one_of(
+        r.random(),
+        (0.1, lambda: np.array([amplitude])),
+        (0.4, lambda: amplitude * r.standard_normal(count)),
+        (
+            0.7,
+            lambda: (
+                amplitude
+                * np.take(  # the places are drawn first
+                    indices=np.sort(
+                        np.resize(r.integers(0, count, size=max(1, count // 8)), count)
+                    ),
+                    a=r.standard_normal(count),
+                )
+            ),
+        ),
+        (
+            1.0,
+            lambda: np.where(
+                r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0
+            ),
+        ),
+    )
 
 
 def _drawn(
@@ -310,12 +323,8 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     walls = _exact_walls(r, block)
     unit = math.sqrt(block.radius / gravity)
     duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * unit, 2)
-    still = (
-        excitation.kind == "rest"
-        and vertical.kind == "rest"
-        and all(wall.restitution <= 0.5 for wall in walls)
-    )
-    if still and r.random() < LONG:
+    still = excitation.kind == "rest" and vertical.kind == "rest"
+    if still and all(wall.restitution <= 0.5 for wall in walls) and r.random() < LONG:
         duration = LASTS
     start = _exact_start(r, block, excitation.kind == "rest")
     return _scene(
@@ -335,7 +344,7 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     )
 
 
-def _pick(r: np.random.Generator, values: tuple[float, ...]) -> float:
+def _pick(r: np.random.Generator, values: Sequence[Any]) -> Any:
     return values[int(r.integers(len(values)))]
 
 
@@ -368,18 +377,27 @@ def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Exci
     kind = r.random()
     level = _sign(r) * _pick(r, levels[1:])
     period = _pick(r, (0.25, 0.5, 1.0, 2.0))
-    if kind < 0.3 or level == 0.0:
-        return Rest()
-    if kind < 0.4:
-        return Ricker(amplitude=level, period=period)
-    if kind < 0.5:
-        return Sine(amplitude=level, period=period, cycles=2)
-    step = _pick(r, STEPS)
-    if kind < 0.7:  # held: from the first instant, or after a ramp
-        return Record.from_samples(np.full(round(4.0 / step), level), time_step=step)
-    few = np.array([0.0, level, -level, _sign(r) * _pick(r, levels)])
-    return Record.from_samples(
-        np.repeat(few[r.integers(0, 4, size=12)], int(r.integers(1, 4))), time_step=step
+    held = [  # from the first instant, or after a ramp
+        Record.from_samples(np.full(round(4.0 / step), level), time_step=step) for step in STEPS
+    ]
+    return _one_of(
+        kind if level != 0.0 else 0.0,
+        (0.3, Rest),
+        (0.4, lambda: Ricker(amplitude=level, period=period)),
+        (0.5, lambda: Sine(amplitude=level, period=period, cycles=2)),
+        (0.7, lambda: _pick(r, held)),
+        (
+            1.0,
+            lambda: Record.from_samples(
+                time_step=_pick(r, STEPS),
+                samples=np.repeat(
+                    np.array([0.0, level, -level, _sign(r) * _pick(r, levels)])[
+                        r.integers(0, 4, size=12)
+                    ],
+                    int(r.integers(1, 4)),
+                ),
+            ),
+        ),
     )
 
 

@@ -6,7 +6,6 @@ Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/
 relative to the energy at play.
 """
 
-import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -118,12 +117,6 @@ RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
 #: 10 is then far smaller.
 RESOLVED = 1e-10
-#: Kinds of motion by the contacts they have.
-ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
-STANDS = ("rest", "rock", "lean")
-
-EVEN = ("t", "y", "y_dot", "mode")
-ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
 SWAPPED = {"overturned left": "overturned right", "overturned right": "overturned left"}
 
 
@@ -221,14 +214,13 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     room = float(np.max(np.abs(np.diff(gaps)))) + SETTLED * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
         return False
-    walled = [
-        model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
-        for gap in (reach + room, reach - room)
-    ]
     struck = [
         "lands along a wall" in one.cost.rules
         or any(event.kind == "wall impact" for event in one.event_list)
-        for one in walled
+        for one in (
+            model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
+            for gap in (reach + room, reach - room)
+        )
     ]
     return struck != [False, True]
 
@@ -271,7 +263,7 @@ def _contradicts(scene: Scene, history: History) -> bool:
     kinds = [event.kind for event in history.event_list]
     falls = [kind for kind in kinds if kind.startswith("overturned")]
     times = [event.t for event in history.event_list] + [scene.duration * (1.0 + 1e-12)]
-    backward = any(later < earlier for earlier, later in itertools.pairwise(times))
+    backward = bool(np.any(np.diff(times) < 0.0))
     if history.outcome.startswith("overturned"):
         return backward or falls != [history.outcome] or kinds[-1] != history.outcome
     whole = len(history.channels["t"]) == len(scene.output_times)
@@ -286,13 +278,13 @@ def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
     depth = np.max([-motion.height, *(-gap - rounding for gap in motion.gaps.values())])
     found = {
         "penetration": max(0.0, float(depth)),
-        "floor": _largest(np.abs(motion.height), motion.within(*ON_FLOOR)),
+        "floor": _largest(np.abs(motion.height), ~motion.within("flight", "overturned")),
     }
     if model.friction == "bouc-wen":  # its pivot creeps, and its friction is not in a history
         return found
     drift = 1e-6 * np.abs(motion.channels["x_dot"]) * motion.unit / motion.radius
     speed = np.abs(motion.slip) / (1.0 + drift + np.abs(motion.w))
-    found["stick"] = _largest(speed, motion.within(*STANDS))
+    found["stick"] = _largest(speed, motion.within("rest", "rock", "lean"))
     friction, push = _force_conditions(model, motion)
     return found | {"coulomb": friction, "push": push}
 
@@ -300,13 +292,6 @@ def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
 def _largest(values: Floats, rows: Mask) -> float:
     """The largest of these rows, at least 0."""
     return float(np.max(values[rows], initial=0.0))
-
-
-def _clear(motion: Motion) -> Mask:
-    t, bases = motion.channels["t"], (motion.scene.excitation, motion.scene.vertical)
-    jumps = [time for one in bases if one.kind != "rest" for time in (0.0, one.quiet_after)]
-    near = NEAR * motion.unit + 1e-12 * np.abs(t)
-    return _free([*(event.t for event in motion.history.event_list), *jumps], t - near, t + near)
 
 
 def _free(times: Sequence[float], first: Floats, last: Floats) -> Mask:
@@ -317,7 +302,12 @@ def _free(times: Sequence[float], first: Floats, last: Floats) -> Mask:
 
 def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, float]:
     """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
-    scene, clear, theta = motion.scene, _clear(motion), motion.channels["theta"]
+    scene, t, theta = motion.scene, motion.channels["t"], motion.channels["theta"]
+    bases = [one for one in (scene.excitation, scene.vertical) if one.kind != "rest"]
+    breaks = [event.t for event in motion.history.event_list]
+    breaks += [time for one in bases for time in (0.0, one.quiet_after)]
+    near = NEAR * motion.unit + 1e-12 * np.abs(t)
+    clear = _free(breaks, t - near, t + near)
     u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
     unilateral = model.pivot == "unilateral"
@@ -465,8 +455,9 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
     ours, theirs = ((len(one.channels["t"]), len(one.event_list)) for one in (history, image))
     if ours != theirs:
         return math.inf
-    mirrored = {name: image.channels[name] for name in EVEN}
-    mirrored |= {name: -image.channels[name] for name in ODD}
+    mirrored = {name: image.channels[name] for name in ("t", "y", "y_dot", "mode")}
+    odd = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
+    mirrored |= {name: -image.channels[name] for name in odd}
     differ = [np.sum(motion.channels[name] != values) for name, values in mirrored.items()]
     differ += [
         replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b

@@ -133,8 +133,9 @@ class Motion:
     that of slip. `sign` is the sign of theta in each row; where theta is zero, the sign in the next
     row, as a block that is about to tilt has its pivot already. `energy` (J/kg) is kinetic plus
     potential; the mass's centre moves at `across` and `up`, m/s. `height` is the lowest corner's
-    over the floor, `gaps` are those to the walls. `tip` tells where the top corner touches the wall
-    it tips to, `far` where the lifted bottom corner touches the other.
+    over the floor, `gaps` are those to the walls, `deepest` is how deep a corner is in either.
+    `tip` tells where the top corner touches the wall it tips to, `far` where the lifted bottom
+    corner touches the other.
     """
 
     def __init__(self, scene: Scene, history: History) -> None:
@@ -159,15 +160,11 @@ class Motion:
             wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / self.radius
             for wall in scene.walls
         }
+        self.deepest = max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
         nowhere = np.full(len(t), np.inf)
         left, right = (self.gaps.get(side, nowhere) < CLOSED for side in ("left", "right"))
         self.tip = np.where(sign < 0.0, right, left)
         self.far = np.where(sign < 0.0, left, right)
-
-    @property
-    def deepest(self) -> float:
-        """How deep a corner is in floor or wall at most, R."""
-        return max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
 
     def within(self, *modes: str) -> Mask:
         """The rows in these modes of motion."""

@@ -118,9 +118,12 @@ class Approximate(Player):
 
     def settings(self, scene: Scene, number: int) -> dict[str, Any]:
         """The settings that the model is built with for this scene."""
-        if self.label == "cm":
-            return {"penetration": DEPTH * scene.block.radius}
-        return {"time_step": self.step * math.sqrt(scene.block.radius / scene.gravity)}
+        radius = scene.block.radius
+        return (
+            {"penetration": DEPTH * radius}
+            if self.label == "cm"
+            else {"time_step": self.step * math.sqrt(radius / scene.gravity)}
+        )
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Checks the run's end, finite numbers, depth and energy.
@@ -165,10 +168,8 @@ class Approximate(Player):
         bases = motion.scene.excitation, motion.scene.vertical
         shaken = sum(np.max(np.abs(base.acceleration(motion.channels["t"]))) for base in bases)
         level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
-        if self.label == "cm":
-            stated = speed * math.sqrt(DEPTH) + level * DEPTH
-        else:
-            stated = speed * self.step + level * self.step**2
+        way = math.sqrt(DEPTH) if self.label == "cm" else self.step
+        stated = speed * way + level * way**2
         return motion.deepest / (2.0 * stated + 1e-5)
 
 
@@ -226,7 +227,6 @@ _EVERY: tuple[EventBased | Approximate, ...] = (
 )
 PLAYERS = {player.label: player for player in _EVERY}
 
-Shows = Callable[[Scene], bool]
 Path = tuple[str | int, ...]
 #: Most scenes that are tried.
 MOST_TRIALS = 400
@@ -240,7 +240,7 @@ KEPT = ("name", "output_step")
 
 def shrink(
     scene: Scene,
-    shows: Shows,
+    shows: Callable[[Scene], bool],
     *,
     trials: int = MOST_TRIALS,
     seconds: float = math.inf,
@@ -280,10 +280,11 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     yield from (_with(tables, path) for path, _ in places)
     unit = math.sqrt(scene.block.radius / scene.gravity)
-    for factor in (0.25, 0.5, 0.9):
-        if factor * scene.duration > 0.01 * unit:
-            shorter = {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
-            yield tables | shorter
+    yield from (
+        tables | {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
+        for factor in (0.25, 0.5, 0.9)
+        if factor * scene.duration > 0.01 * unit
+    )
     yield from (
         _with(tables, path, value[:count])
         for path, value in places
@@ -448,8 +449,11 @@ class RunTotals:
     def shown(self) -> list[Broken]:
         """The first runs that break each invariant: their scenes are written."""
         ordered = sorted(self.failures, key=lambda one: one.number)
-        broken = {name: [one for one in ordered if one.invariant == name] for name in INVARIANTS}
-        return [one for some in broken.values() for one in some[:MOST_FILES]]
+        return [
+            one
+            for name in INVARIANTS
+            for one in [one for one in ordered if one.invariant == name][:MOST_FILES]
+        ]
 
 
 @dataclass(frozen=True)
@@ -492,11 +496,7 @@ class Shrinking(Task):
     broken: Broken
     budget: float
     trials: int = MOST_TRIALS
-
-    @property
-    def label(self) -> str:
-        """For progress."""
-        return "smallest scenes"
+    label = "smallest scenes"
 
     def play(self) -> str:
         """The file of the smallest scene that was found in time."""
@@ -545,8 +545,10 @@ def parts(task: Task) -> Sequence[Task]:
     """Smaller tasks in place of one whose process hangs or dies."""
     if isinstance(task, Chunk) and task.count > 1:
         half = task.count // 2
-        later = chunk(task.model, task.seed, task.first + half, task.count - half)
-        return [chunk(task.model, task.seed, task.first, half), later]
+        return [
+            chunk(task.model, task.seed, task.first, half),
+            chunk(task.model, task.seed, task.first + half, task.count - half),
+        ]
     if isinstance(task, Shrinking) and task.trials > 1:
         return [replace(task, trials=task.trials // 4)]
     return []

@@ -52,20 +52,13 @@ from rockcheck.validation.studies.stress.runs import (
 from rockcheck.validation.study import Study, Task
 
 SLOPE = math.tan(0.25)
-#: Values along each axis; all else is the paper's block beside a wall: R in m, friction,
-#: restitution of the wall, a_p/(g tan alpha).
-AXES: dict[str, tuple[float, ...]] = {
-    "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
-    "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
-    "restitution": (0.0, 0.25, 0.5, 0.75, 0.95),
-    "shaking": (0.5, 1.5, 3.0, 10.0, 30.0, 100.0),
-}
-USUAL: dict[str, float] = {"size": 1.6, "friction": 0.3, "restitution": 0.5, "shaking": 3.0}
-AXIS_WORDS: dict[str, str] = {
-    "size": "half diagonal R, m",
-    "friction": "friction of the floor",
-    "restitution": "restitution of the wall",
-    "shaking": "peak acceleration, g tan α",
+#: Axes: their words, the usual value, the values that are played; all else is the paper's block
+#: beside a wall. In m; 1; 1; g tan alpha.
+AXES: dict[str, tuple[str, float, tuple[float, ...]]] = {
+    "size": ("half diagonal R, m", 1.6, (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0)),
+    "friction": ("friction of the floor", 0.3, (0.0, 0.1, 0.3, 0.6, 0.9, 1.2)),
+    "restitution": ("restitution of the wall", 0.5, (0.0, 0.25, 0.5, 0.75, 0.95)),
+    "shaking": ("peak acceleration, g tan α", 3.0, (0.5, 1.5, 3.0, 10.0, 30.0, 100.0)),
 }
 #: Steps that are tried, sqrt(R/g), coarse to fine; and the limits of a stable run: depth in R,
 #: energy without source.
@@ -155,7 +148,7 @@ class Still:
 
 def scene_at(axis: str, value: float) -> Scene:
     """A block of the paper's shape beside a wall under a pulse, with one parameter changed."""
-    at = USUAL | {axis: value}
+    at = {name: usual for name, (_, usual, _) in AXES.items()} | {axis: value}
     radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
     own = 2.0 * math.pi * unit / math.sqrt(0.75)
     return Scene(
@@ -304,7 +297,7 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
     ]
     values = [
         (axis, one)
-        for axis, some in AXES.items()
+        for axis, (_, _, some) in AXES.items()
         for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)
     ]
     return still + [
@@ -348,8 +341,12 @@ class Stress(Study):
         if any(task not in done for task in work):
             return work
         gone = {(one.model, one.first) for one in lost if isinstance(one, Chunk) and one.count == 1}
-        found = [one for totals in self._totals(done) for one in totals.shown]
-        small = [one for one in found if (one.model, one.number) not in gone]
+        small = [
+            one
+            for totals in self._totals(done)
+            for one in totals.shown
+            if (one.model, one.number) not in gone
+        ]
         share = min(ONE_FAILURE, 1.0 / max(1, len(small)))
         budget = share * (SHRINKING_QUICK if self.quick else SHRINKING)
         return work + [
@@ -359,20 +356,17 @@ class Stress(Study):
             for one in small
         ]
 
-    def _chunks(self) -> list[Chunk]:
+    def _chunks(self) -> Iterator[Chunk]:
         """The runs, the slowest models first, so that all cores end together."""
-        found = []
         every = [label for label in PLAYERS if not not_installed(label.split()[0])]
-        for label in () if self.what == "maps" else self.models or every:
+        labels = () if self.what == "maps" else self.models or every
+        for label in sorted(labels, key=lambda label: isinstance(PLAYERS[label], EventBased)):
             player = PLAYERS[label]
             count = self.runs or (player.quick if self.quick else player.runs)
             most = CHUNK if isinstance(player, EventBased) else APPROXIMATE_CHUNK
             most = max(10, min(most, count // 4)) if self.quick else most
-            found += [
-                chunk(label, self.seed, first, min(most, count - first))
-                for first in range(0, count, most)
-            ]
-        return sorted(found, key=lambda one: isinstance(PLAYERS[one.model], EventBased))
+            for first in range(0, count, most):
+                yield chunk(label, self.seed, first, min(most, count - first))
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """Totals of the models; a run whose process was lost counts as one that does not end."""
@@ -389,7 +383,7 @@ class Stress(Study):
         """The tables, the maps, and the scenes of failures."""
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
-        at = [done[place] for place in places(self.quick, self.models) if place in done]
+        at = list(map(done.get, places(self.quick, self.models)))
         stable = [one for one in at if isinstance(one, Stable)]
         still = [one for one in at if isinstance(one, Still)]
         runs = sum(one.counts["runs"] for one in totals)
@@ -540,9 +534,7 @@ def _maps(found: Sequence[Stable], quick: bool) -> list[Plot | Table]:
     steps = QUICK_STEPS if quick else STEPS
     adaptive = min(one for one in steps if one >= ADAPTIVE_FINEST)
     lines = list(dict.fromkeys(one.line for one in found))
-    drawn = [
-        _by_axis(axis, lines, [one for one in found if one.axis == axis]) for axis in AXIS_WORDS
-    ]
+    drawn = [_by_axis(axis, lines, [one for one in found if one.axis == axis]) for axis in AXES]
     plot = Plot(
         "stable-steps",
         "Where engines and the continuous model break: largest stable step, √(R/g)",
@@ -562,6 +554,7 @@ def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[
     of = {(one.line, one.value): one for one in found}
     values = list(dict.fromkeys(one.value for one in found))
     rows = [[of.get((line, value)) for value in values] for line in lines]
+    words, _, _ = AXES[axis]
     table = Table(
         f"steps-{axis}",
         [text("line", "model"), *(text(f"{value:g}") for value in values)],
@@ -569,10 +562,10 @@ def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[
             [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
             for line, row in zip(lines, rows, strict=True)
         ],
-        f"Largest stable step, √(R/g), by {AXIS_WORDS[axis]}",
+        f"Largest stable step, √(R/g), by {words}",
         folded=True,
     )
-    return [AXIS_WORDS[axis], values, [[one and one.step for one in row] for row in rows]], table
+    return [words, values, [[one and one.step for one in row] for row in rows]], table
 
 
 def _stood(found: Sequence[Still]) -> Table:
