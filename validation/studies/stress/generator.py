@@ -278,7 +278,6 @@ SIDES = (
     (0.2, 1.0),
     (5.0, 12.0),
 )
-GRAVITIES = (9.81, 10.0, 1.0)
 FRICTIONS = (0.0, 0.1, 0.2, 0.25, 0.3, 0.5, 0.6, 0.75, 1.0, 1.2)
 RESTITUTIONS = (0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.9999999)
 STEPS = (0.01, 0.02, 0.1, 0.25)
@@ -299,7 +298,7 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     chance = np.random.default_rng([seed, number, 3])
     block = Block(half_width=width, half_height=height)
     block = loaded(block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS))
-    gravity = _pick(r, GRAVITIES)
+    gravity = _pick(r, (9.81, 10.0, 1.0))
     side = block.pivot("left" if chance.random() < 0.5 else "right")
     slope, most = side.arm / side.height, most_friction(block)
     mu = min(_pick(r, (*FRICTIONS, slope, 0.5 * slope, 3.0 * slope / (4.0 + slope * slope))), most)

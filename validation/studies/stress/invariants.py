@@ -110,8 +110,6 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 FINE, MOST_ROWS = 64, 4000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
-#: Motions below this (R) are not resolved: a contact that parts at the settling speed stays closed.
-SETTLED = 2.0 * SETTLE
 #: The reach of a block is known where it is this many times the largest change between two rows.
 RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
@@ -211,7 +209,8 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
         scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
     )
     reach = float(np.max(-gaps))
-    room = float(np.max(np.abs(np.diff(gaps)))) + SETTLED * scene.block.radius
+    # A contact that parts at the settling speed stays closed: what is smaller is not resolved.
+    room = float(np.max(np.abs(np.diff(gaps)))) + 2.0 * SETTLE * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
         return False
     struck = [

@@ -234,8 +234,6 @@ MOST_TRIALS = 400
 SHORT = 8
 #: What is dropped first, since a block that nothing moves is told soonest.
 FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
-#: Never dropped or rounded.
-KEPT = ("name", "output_step")
 
 
 def shrink(
@@ -313,8 +311,8 @@ def _tables(scene: Scene) -> dict[str, Any]:
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if path:
         yield path, part
-    if isinstance(part, dict):
-        inner: list[tuple[Any, Any]] = [(key, part[key]) for key in part if key not in KEPT]
+    if isinstance(part, dict):  # name and step are never dropped or rounded
+        inner = [(key, part[key]) for key in part if key not in ("name", "output_step")]
     else:
         inner = list(enumerate(part)) if isinstance(part, list) and len(part) <= SHORT else []
     for key, value in inner:
@@ -349,8 +347,7 @@ def scene_text(scene: Scene, remarks: str) -> str:
 
 #: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
 #: the time (s) that a task may take in addition.
-A_RUN, AN_APPROXIMATE_RUN, AMPLE = 0.2, 2.0, 50.0
-PATIENCE = 20.0
+A_RUN, AN_APPROXIMATE_RUN, AMPLE, PATIENCE = 0.2, 2.0, 50.0, 20.0
 #: Failures of a model and an invariant that are written as scenes.
 MOST_FILES = 20
 
