@@ -140,17 +140,12 @@ class Spoilt:
         return dataclasses.replace(history, channels=channels, outcome=outcome)
 
 
-def bent(column: np.ndarray) -> np.ndarray:
-    column[len(column) // 2] += 1e-6
-    return column
-
-
 FAULTS = {
     "finite": {"theta": lambda c: np.where(np.arange(len(c)) == 7, np.nan, c)},
     "outcome": {"outcome": "overturned left"},
     "penetration": {"y": lambda c: c - 1e-6},
     "floor": {"y": lambda c: np.where(np.arange(len(c)) == 3, c + 1e-6, c)},
-    "mirror": {"x": bent},
+    "mirror": {"x": lambda c: c + 1e-6 * (np.arange(len(c)) == len(c) // 2)},
     "stick": {"slip_rate": lambda c: c + 1e-6},
     "coulomb": {"mode": lambda c: np.where(c == "slide-rock", "rock", c)},
     "energy": {"theta_dot": lambda c: c * (1.0 + 1e-5 * np.sin(np.arange(len(c))))},

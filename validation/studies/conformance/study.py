@@ -452,7 +452,6 @@ TEXTS = Path(__file__).parents[2] / "data" / "export"
 #: Time step of the sampled base motion, s.
 BASE_STEP = 1e-3
 STATE = ("x_m", "y_m", "theta_rad", "x_dot_m_s", "y_dot_m_s", "theta_dot_rad_s")
-MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_acceleration_m_s2")
 
 
 def export(folder: Path) -> list[str]:
@@ -466,7 +465,19 @@ def export(folder: Path) -> list[str]:
             velocity = list(map(BaseMotion(scene).velocity, t.tolist()))
             accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
             rows = np.column_stack([t, velocity, *accelerations]).tolist()
-            write_whole(folder / f"{name}-base.csv", table_text(MOTION, rows))
+            write_whole(
+                folder / f"{name}-base.csv",
+                table_text(
+                    (
+                        "t_s",
+                        "x_velocity_m_s",
+                        "y_velocity_m_s",
+                        "x_acceleration_m_s2",
+                        "y_acceleration_m_s2",
+                    ),
+                    rows,
+                ),
+            )
     scenes: list[dict[str, Any]] = [
         {
             "scene": scene.name,

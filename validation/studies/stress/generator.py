@@ -50,16 +50,18 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     gravity = 9.81 if r.random() < 0.8 else _log(r, 1.0, 30.0)
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     chance = np.random.default_rng([seed, number, 2])
-    block = loaded(
+    block, most = loaded(
         block,
         chance,
         lambda: float(chance.uniform(*OFF_CENTRE)),
         lambda: float(chance.uniform(*INERTIA)),
     )
     unit = math.sqrt(block.radius / gravity)
-    most = most_friction(block)
-    edge = _edge(r, 0.05, (0.0, most, min(block.slope, most)))
-    mu = most / FRICTION[1] * float(r.uniform(*FRICTION)) if edge is None else edge
+    mu = _edge(
+        r,
+        (0.0, most, min(block.slope, most)),
+        lambda: most / FRICTION[1] * float(r.uniform(*FRICTION)),
+    )
     mu_s = min(mu * float(r.uniform(1.0, 1.5)), most) if r.random() < 0.3 else mu
     bounce = 0.0 if r.random() < 0.5 else float(r.uniform(0.0, 0.999))
     walls = [
@@ -93,7 +95,7 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         (
             "initial_rotation",
             math.inf if excitation.kind == "rest" else 0.3,  # without shaking it must move
-            lambda: _edge(r, 0.05, balance) or block.alpha * float(r.uniform(-1.0, 1.0)),
+            lambda: _edge(r, balance, lambda: block.alpha * float(r.uniform(-1.0, 1.0))),
         ),
         (
             "initial_angular_velocity",
@@ -151,15 +153,15 @@ def _scene(
 
 def loaded(
     block: Block, r: np.random.Generator, place: Callable[[], float], inertia: Callable[[], float]
-) -> Block:
-    """The block, in a share `LOADED` of the draws with a load.
+) -> tuple[Block, float]:
+    """The block, in a share `LOADED` of the draws with a load, and the largest friction of a scene.
 
     `place` draws how far the mass's centre is off, of the half sides; its height is off in half of
     the draws. In half of them the moment of inertia is given, too: `inertia` draws it, of the
-    largest possible.
+    largest possible. With more friction, but for a margin, a slipping pivot may jam.
     """
     if r.random() >= LOADED:
-        return block
+        return block, FRICTION[1]
     x, z = (
         float(r.choice([-1.0, 1.0])) * side * place()
         for side in (block.half_width, block.half_height)
@@ -170,26 +172,19 @@ def loaded(
         if r.random() < 0.5
         else None
     )
-    return block.replace(centre_of_mass=centre, moment_of_inertia=own)
-
-
-def most_friction(block: Block) -> float:
-    """Largest friction of a scene, but for a margin: with more a slipping pivot may jam."""
-    return (
-        FRICTION[1]
-        if block.homogeneous
-        else min(FRICTION[1], 0.999 * block.least_painleve_friction)
-    )
+    block = block.replace(centre_of_mass=centre, moment_of_inertia=own)
+    most = min(FRICTION[1], 0.999 * block.least_painleve_friction)
+    return block, FRICTION[1] if block.homogeneous else most
 
 
 def _log(r: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(r.uniform(math.log(low), math.log(high))))
 
 
-def _edge(r: np.random.Generator, share: float, values: tuple[float, ...]) -> float | None:
-    """One of the `values` in this share of the draws, else None."""
-    drawn = r.random(), int(r.integers(len(values)))
-    return values[drawn[1]] if drawn[0] < share else None
+def _edge(r: np.random.Generator, values: tuple[float, ...], usual: Callable[[], float]) -> float:
+    """One of the `values` in a twentieth of the draws, else what is `usual`."""
+    near, value = r.random() < 0.05, float(_pick(r, values))
+    return value if near else usual()
 
 
 def _sign(r: np.random.Generator) -> float:
@@ -297,10 +292,12 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     width, height = SIDES[int(r.integers(len(SIDES)))]
     chance = np.random.default_rng([seed, number, 3])
     block = Block(half_width=width, half_height=height)
-    block = loaded(block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS))
+    block, most = loaded(
+        block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS)
+    )
     gravity = _pick(r, (9.81, 10.0, 1.0))
     side = block.pivot("left" if chance.random() < 0.5 else "right")
-    slope, most = side.arm / side.height, most_friction(block)
+    slope = side.arm / side.height
     mu = min(_pick(r, (*FRICTIONS, slope, 0.5 * slope, 3.0 * slope / (4.0 + slope * slope))), most)
     mu_s = min(1.25 * mu, most) if r.random() < 0.2 and kind != "bouc-wen" else mu
     bounce = _pick(r, (0.0, 0.0, 0.0, 0.5, 0.9)) if kind == "unilateral" else 0.0
@@ -325,7 +322,21 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     still = excitation.kind == "rest" and vertical.kind == "rest"
     if still and all(wall.restitution <= 0.5 for wall in walls) and r.random() < LONG:
         duration = LASTS
-    start = _exact_start(r, block, excitation.kind == "rest")
+
+    def tilt() -> float:
+        sign = _sign(r)
+        alpha = block.pivot("left" if sign > 0.0 else "right").alpha
+        size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
+        return sign * (size if size < 1.5 else 0.1)
+
+    low = tuple(size for size in SIZES if size < 1)
+    start = _drawn(
+        r,
+        ("initial_rotation", 1.0 if excitation.kind == "rest" else 0.4, tilt),
+        ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
+        ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
+        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
+    )
     return _scene(
         kind,
         start,
@@ -397,21 +408,4 @@ def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Exci
                 ),
             ),
         ),
-    )
-
-
-def _exact_start(r: np.random.Generator, block: Block, must_move: bool) -> dict[str, Any]:
-    def tilt() -> float:
-        sign = _sign(r)
-        alpha = block.pivot("left" if sign > 0.0 else "right").alpha
-        size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
-        return sign * (size if size < 1.5 else 0.1)
-
-    low = tuple(size for size in SIZES if size < 1)
-    return _drawn(
-        r,
-        ("initial_rotation", 1.0 if must_move else 0.4, tilt),
-        ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
     )

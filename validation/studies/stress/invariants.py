@@ -562,8 +562,7 @@ def _differences(a: History, b: History) -> Floats:
 
 def _agree(a: History, b: History, seen: float) -> int:
     """Number of rows, from the first on, in which theta differs by no more than `seen`, rad."""
-    apart = _differences(a, b) > seen
-    return int(np.argmax(apart)) if apart.any() else len(apart)
+    return int(np.argmax(np.append(_differences(a, b) > seen, True)))
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:

@@ -75,8 +75,9 @@ def tilted_forces(
     matrix[asked, 1, 0] *= -1.0
     other_sign = forces.copy()
     other_sign[asked] = _solved(matrix[asked], given[asked])
-    walls_push = other_sign[:, 2:].min(axis=1) >= 0.0
-    pulls = asked & ((forces[:, 0] < 0.0) | ((other_sign[:, 0] < 0.0) & walls_push))
+    pulls = asked & (
+        (forces[:, 0] < 0.0) | ((other_sign[:, 0] < 0.0) & (other_sign[:, 2:].min(axis=1) >= 0.0))
+    )
     forces[pulls] = other_sign[pulls]
     return forces.T, spin * (c * forces[:, 1] - s * forces[:, 0])
 

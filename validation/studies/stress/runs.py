@@ -84,15 +84,15 @@ class EventBased(Player):
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
-        fixed: dict[str, Any] = {
+        settings: dict[str, Any] = {
             "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
             "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
             "most_steps": MOST_STEPS,
             "most_events": MOST_EVENTS,
+            **self.settings(scene, number),
         }
-        model = EventBasedModel(**fixed | self.settings(scene, number))
         audit = only in ("energy", "clearance") or (not only and number % AUDIT == 0)
-        return check_run(model, scene, seed=seed, audit=audit, only=only)
+        return check_run(EventBasedModel(**settings), scene, seed=seed, audit=audit, only=only)
 
 
 @dataclass(frozen=True)
