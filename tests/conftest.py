@@ -21,8 +21,8 @@ from rockcheck.scenes.errors import NotInstalled
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import not_installed
 
-# What tests of several folders share beside fixtures.
-sys.path.insert(0, str(Path(__file__).parent / "ebm"))
+# What tests of several folders share beside fixtures, and what is a program of its own, too.
+sys.path[:0] = [str(Path(__file__).parent / folder) for folder in ("ebm", "stress")]
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page

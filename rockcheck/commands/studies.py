@@ -87,7 +87,7 @@ def stress(
     An interrupted run resumes where it ended.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from rockcheck.validation.studies.stress.players import PLAYERS
+    from rockcheck.validation.studies.stress.runs import PLAYERS
     from rockcheck.validation.studies.stress.study import Stress, What, places
 
     part: What = one_of("stress", what, get_args(What))
@@ -178,7 +178,7 @@ def _check_engine(name: str, allow_code: Sequence[str], *, own: bool) -> None:
 def _tune(
     engines: Sequence[str], restitution: float, given: Mapping[str, Any], played: Played
 ) -> NoReturn:
-    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
+    from rockcheck.validation.studies.conformance.study import WANTED, Tune, Tuning
 
     settings = WANTED.keys() - {"restitution"}
     if unknown := given.keys() - settings:

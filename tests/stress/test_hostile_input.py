@@ -15,26 +15,22 @@ import math
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import nasty
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import History, InputError, load_scene
+from rockcheck.scenes import History, InputError, Scene, load_scene
 from rockcheck.scenes.recordings import read_components
 from rockcheck.validation.discrepancy.measured import read_measured
 from rockcheck.validation.execute.models import build
 from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, name_of
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.suites import load_suite
-
-sys.path.insert(0, str(Path(__file__).parent))
-import nasty
-
-sys.path.pop(0)
 
 fuzzed = settings(
     max_examples=1000,
@@ -71,35 +67,36 @@ def result_or_line(read: Callable[[], Any]) -> Any:
         return None
 
 
-def feed_record(content: bytes, folder: Path, name: str) -> None:
+def feed_file(
+    content: bytes,
+    folder: Path,
+    *,
+    name: str,
+    reads: Sequence[Callable[[Path], Any]],
+    check: Callable[[Any], object] = lambda found: None,
+) -> None:
+    """What can be read of a file of that name passes the check."""
     path = folder / name
     path.write_bytes(content)
-    for found in result_or_line(lambda: read_components(path)) or []:
-        assert len(found.samples) >= 1
-        assert all(map(math.isfinite, found.samples))
-        assert 0.0 < found.time_step < math.inf
+    for read in reads:
+        if found := result_or_line(lambda read=read: read(path)):
+            check(found)
 
 
-def feed_scene(content: bytes, folder: Path) -> None:
-    path = folder / "a.toml"
-    path.write_bytes(content)
-    if scene := result_or_line(lambda: load_scene(path)):
-        assert 0.0 < scene.duration < math.inf
-        assert len(scene.output_times) <= 5_000_001
+def check_record(found: list[Any]) -> None:
+    for one in found:
+        assert len(one.samples) >= 1
+        assert all(map(math.isfinite, one.samples))
+        assert 0.0 < one.time_step < math.inf
 
 
-def feed_suite(content: bytes, folder: Path) -> None:
-    path = folder / "a.toml"
-    path.write_bytes(content)
-    result_or_line(lambda: load_suite(str(path)))
+def check_scene(scene: Scene) -> None:
+    assert 0.0 < scene.duration < math.inf
+    assert len(scene.output_times) <= 5_000_001
 
 
-def feed_history(content: bytes, folder: Path) -> None:
-    path = folder / "h.csv"
-    path.write_bytes(content)
-    for read in (History.load, read_measured):
-        if history := result_or_line(lambda read=read: read(path)):
-            assert all(map(math.isfinite, history.channels["theta"]))
+def check_history(history: History) -> None:
+    assert all(map(math.isfinite, history.channels["theta"]))
 
 
 @functools.cache
@@ -136,11 +133,6 @@ def stored_files() -> dict[str, bytes]:
         cells=(cell,),
     )
     return {"run.json": run.model_dump_json().encode(), "record": record, **files}
-
-
-def feed_stored_run(content: bytes, folder: Path) -> None:
-    (folder / "run.json").write_bytes(content)
-    result_or_line(lambda: Run.load(folder))
 
 
 def feed_stored_record(content: bytes, folder: Path) -> None:
@@ -186,6 +178,8 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         assert_one_clear_line(line)
 
 
+feed_record = functools.partial(feed_file, reads=[read_components], check=check_record)
+feed_scene = functools.partial(feed_file, name="a.toml", reads=[load_scene], check=check_scene)
 #: Of each reader: what feeds it, and a valid input.
 READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "at2": (functools.partial(feed_record, name="a.AT2"), lambda: nasty.AT2),
@@ -195,9 +189,20 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "record_knet": (functools.partial(feed_record, name="a.NS"), lambda: nasty.KNET),
     "record_columns": (functools.partial(feed_record, name="a.txt"), lambda: nasty.COLUMNS),
     "scene_toml": (feed_scene, lambda: nasty.SCENE),
-    "suite_toml": (feed_suite, lambda: nasty.SUITE),
-    "history_csv": (feed_history, lambda: nasty.HISTORY),
-    "stored_run": (feed_stored_run, lambda: stored_files()["run.json"].decode()),
+    "suite_toml": (
+        functools.partial(feed_file, name="a.toml", reads=[lambda path: load_suite(str(path))]),
+        lambda: nasty.SUITE,
+    ),
+    "history_csv": (
+        functools.partial(
+            feed_file, name="h.csv", reads=[History.load, read_measured], check=check_history
+        ),
+        lambda: nasty.HISTORY,
+    ),
+    "stored_run": (
+        functools.partial(feed_file, name="run.json", reads=[lambda path: Run.load(path.parent)]),
+        lambda: stored_files()["run.json"].decode(),
+    ),
     "stored_record": (feed_stored_record, lambda: stored_files()["record"].decode()),
     "command_line": (
         feed_command_line,
@@ -245,11 +250,6 @@ def test_any_input(tmp_path, reader):
         feed(content, tmp_path)
 
     fed()
-
-
-@pytest.fixture(scope="module")
-def stored() -> dict[str, str]:
-    return stored_files()
 
 
 _PLAY_BOMBS = """
@@ -302,10 +302,10 @@ def test_names_are_told_from_paths_and_from_markup(tmp_path, name):
     assert name_of(name, "ebm").isascii()
 
 
-def test_a_stored_path_does_not_leave_the_run(tmp_path, stored, refused):
+def test_a_stored_path_does_not_leave_the_run(tmp_path, refused):
     """A run's file whose history lies elsewhere is refused, before any page is written."""
-    data = json.loads(stored["run.json"])
-    (tmp_path / "secret.csv").write_bytes(gzip.decompress(stored[TABLE]))
+    data = json.loads(stored_files()["run.json"])
+    (tmp_path / "secret.csv").write_bytes(gzip.decompress(stored_files()[TABLE]))
     run = tmp_path / "run"
     run.mkdir()
     for path in ("../secret.csv", str(tmp_path / "secret.csv"), "histories/../../secret.csv"):
@@ -315,10 +315,10 @@ def test_a_stored_path_does_not_leave_the_run(tmp_path, stored, refused):
         assert not list(run.glob("**/*.html"))
 
 
-def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
+def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
     """Descriptions, reasons and versions of a run that somebody sent are escaped; no text of theirs
     is a tag."""
-    data = json.loads(stored["run.json"])
+    data = json.loads(stored_files()["run.json"])
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
     data |= {
         "description": evil,
@@ -332,7 +332,7 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
     data["scenes"]["short"]["description"] = evil
     (tmp_path / "run.json").write_text(json.dumps(data))
     store = Store(tmp_path)
-    store.put("short--ebm--0", {suffix: stored[suffix] for suffix in SUFFIXES}, {})
+    store.put("short--ebm--0", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
     assert main(["report", str(tmp_path)]) == 0
     pages = [*tmp_path.glob("**/*.html"), *tmp_path.glob("**/data/*.js")]
     assert pages
@@ -343,11 +343,11 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path, stored):
     assert "&lt;script&gt;alert" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
-def test_a_record_names_no_file_but_its_own(tmp_path, stored):
+def test_a_record_names_no_file_but_its_own(tmp_path):
     """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good
     as none."""
     store = Store(tmp_path)
-    store.put("a", {suffix: stored[suffix] for suffix in SUFFIXES}, {})
+    store.put("a", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
     assert store.get("a") == {}
     record = tmp_path / "histories" / "a.json"
     files = json.loads(record.read_text())["content"]["files"]

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from hostile import LIMITED, ROCKCHECK
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
@@ -22,23 +23,12 @@ from rockcheck.validation.execute import pool, store as stores
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.studies.stress import runs, study
 from rockcheck.validation.studies.stress.invariants import CheckedRun
-from rockcheck.validation.studies.stress.players import PLAYERS, EventBased
+from rockcheck.validation.studies.stress.runs import PLAYERS, EventBased
 from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
-ROCKCHECK = [sys.executable, "-m", "rockcheck"]
-
 SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
-
-#: A process that can write files of at most so many bytes: what a full disk does, without one.
-_LIMITED = """
-import resource, signal, sys
-signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
-from rockcheck.commands.cli import main
-sys.exit(main(sys.argv[2:]))
-"""
 
 
 def one_line(stderr: str) -> str:
@@ -57,7 +47,7 @@ def leavings(folder: Path) -> list[Path]:
 def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
     """rockcheck where no file can be larger than `size` bytes; without coverage.py and
     Python's own caches (-B), which would be cut off at that size."""
-    command = [sys.executable, "-B", "-c", _LIMITED, str(size), *words]
+    command = [sys.executable, "-B", "-c", LIMITED, "RLIMIT_FSIZE", str(size), *words]
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")
     }
@@ -72,11 +62,11 @@ def test_disk_full(tmp_path):
     its events as they were."""
     out, events = tmp_path / "out.csv", tmp_path / "out.events.csv"
     words = ("simulate", "fig4a", "--model", "ebm", "-o", str(out))
-    for old in (False, True):
+    for old in ({}, {out, events}):
         if old:
             assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
         before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-        assert set(before) == ({out, events} if old else set())
+        assert before.keys() == set(old)
         done = limited(4096, *words)
         assert done.returncode == 2
         assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
@@ -201,11 +191,14 @@ def test_two_versions_share_a_store(tmp_path):
 def deadly(monkeypatch):
     """Studies whose workers fail, and little patience with them."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
-    monkeypatch.setattr(pool, "COMPILING", 0.0)
-    monkeypatch.setattr(runs, "A_RUN", 0.0)
-    monkeypatch.setattr(runs, "PATIENCE", 4.0)
-    monkeypatch.setattr(study, "SHRINKING", 12.0)
-    monkeypatch.setattr(study, "HANGING", 1.0)
+    for module, name, value in (
+        (pool, "COMPILING", 0.0),
+        (runs, "A_RUN", 0.0),
+        (runs, "PATIENCE", 4.0),
+        (study, "SHRINKING", 12.0),
+        (study, "HANGING", 1.0),
+    ):
+        monkeypatch.setattr(module, name, value)
     import deadly
 
     return deadly
@@ -230,24 +223,16 @@ def test_shrinking_that_hangs(tmp_path, deadly):
     found = run(deadly.Stubborn("runs", models=("ebm",), runs=20), tmp_path, jobs=2)
     assert time.monotonic() - began < 90.0
     publish(found, tmp_path)
-    small = {
-        number: load_scene(tmp_path / "failures" / f"ebm-mirror-1-{number}.toml")
-        for number in deadly.FAILING
-    }
-    before = {number: PLAYERS["ebm"].scene(1, number) for number in deadly.FAILING}
+    names = {number: f"failures/ebm-mirror-1-{number}.toml" for number in deadly.FAILING}
+    small = {number: load_scene(tmp_path / name) for number, name in names.items()}
+    before = {number: PLAYERS["ebm"].scene(1, number) for number in names}
     assert small[3].walls  # the trial without one is the one that hangs
     assert small[3].excitation.kind == "rest" != before[3].excitation.kind
     assert small[4].excitation != before[4].excitation
     assert small[5].duration < 0.1 * before[5].duration
     assert small[13].excitation == before[13].excitation
-    remarks = {
-        number: found.files[f"failures/ebm-mirror-1-{number}.toml"].partition("rockcheck simulate")[
-            0
-        ]
-        for number in deadly.FAILING
-    }
-    assert {number for number, said in remarks.items() if "not the smallest" in said} == {3, 4}
-    assert {number for number, said in remarks.items() if "not shrunk" in said} == {13}
+    for remark, numbers in (("not the smallest", {3, 4}), ("not shrunk", {13})):
+        assert {n for n, name in names.items() if remark in found.files[name]} == numbers
 
 
 def test_shrinking_interrupted(tmp_path, monkeypatch):

@@ -100,8 +100,7 @@ def test_exact_scenes_hold_what_they_are_for():
     """Numbers of few digits, starts that are noise, walls on both sides, a vertical base that may
     take all weight, long rest."""
     scenes = [exact_scene(5, number) for number in range(400)]
-    digits = [len(repr(one)) for s in scenes for one in (s.block.half_width, s.gravity)]
-    assert max(digits) < 8
+    assert max(len(repr(one)) for s in scenes for one in (s.block.half_width, s.gravity)) < 8
     assert [name for name, has in EXACT.items() if not any(map(has, scenes))] == []
 
 

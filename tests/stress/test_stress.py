@@ -14,9 +14,9 @@ from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.stress.generator import random_scene
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
-from rockcheck.validation.studies.stress.players import PLAYERS
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
+    PLAYERS,
     Broken,
     Chunk,
     RunTotals,

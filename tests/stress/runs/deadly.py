@@ -7,8 +7,7 @@ from typing import Any
 
 from rockcheck.scenes import Scene
 from rockcheck.validation.studies.stress.invariants import CheckedRun
-from rockcheck.validation.studies.stress.players import EventBased
-from rockcheck.validation.studies.stress.runs import Broken, Chunk, RunTotals
+from rockcheck.validation.studies.stress.runs import Broken, Chunk, EventBased, RunTotals
 from rockcheck.validation.studies.stress.study import Stress
 
 FAILING = (3, 4, 5, 13)

@@ -12,10 +12,6 @@ from rockcheck.validation.studies.spectrum import agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
 
 
-def panel_of(name):
-    return next(panel for panel in paper_panels() if panel.name == name)
-
-
 def made(panel, outcomes, size=40):
     return Spectrum(
         outcomes=np.asarray(outcomes, dtype=np.int8),
@@ -49,15 +45,13 @@ class Answers(Book):
         self.letter, self.played = letter, {}
 
     def ask(self, tasks):
-        records = []
-        for task in tasks:
-            seen = self.played.setdefault((task.scene.name, task.model), [])
-            nodes = list(zip(task.amplitudes, task.frequencies, strict=True))
-            records.append(
-                Played("".join(self.letter(task, len(seen) + n) for n in range(len(nodes))))
-            )
-            seen += nodes
-        return records
+        return [Played("".join(self.letters(task))) for task in tasks]
+
+    def letters(self, task):
+        seen = self.played.setdefault((task.scene.name, task.model), [])
+        for node in zip(task.amplitudes, task.frequencies, strict=True):
+            seen.append(node)
+            yield self.letter(task, len(seen) - 1)
 
 
 def test_agreement_counts_equal_outcomes(monkeypatch):
@@ -109,7 +103,8 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(monkeypa
     flat, bouncing = "figure-8-gap-3-e-0", "figure-8-gap-3-e-1"
     grid = np.zeros((20, 20), dtype=np.int8)
     grid[10:] = -1
-    spectra = {panel: made(panel, grid, 20) for panel in map(panel_of, (flat, bouncing))}
+    panels = {panel.name: panel for panel in paper_panels()}
+    spectra = {panels[name]: made(panels[name], grid, 20) for name in (flat, bouncing)}
     book = Answers(lambda *_: "S")
     found = agreement.agree(book, spectra, Request(20), 40)
     counted = {

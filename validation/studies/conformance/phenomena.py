@@ -101,30 +101,7 @@ def _apart(one: FloatArray, other: FloatArray) -> float:
 SLIDE = Scene(
     name="slide", block=SQUAT, floor=Floor(friction=0.3), initial_velocity=1.5, duration=1.0
 )
-COAST = Scene(
-    name="coast",
-    block=SQUAT,
-    floor=Floor(friction=0.0),
-    initial_velocity=5.0,
-    duration=10.0,
-    output_step=0.05,
-)
 RAMP_TIME = 4.0  # s: from nothing to two and a half times the cone
-CONE = Scene(
-    name="cone",
-    block=SQUAT,
-    floor=Floor(friction=0.4),
-    excitation=Record.from_samples([0.0, -G], time_step=RAMP_TIME),
-    duration=RAMP_TIME,
-)
-CREEP = Scene(
-    name="creep",
-    block=SQUAT,
-    floor=Floor(friction=0.4),
-    excitation=Record.from_samples([-0.36 * G, -0.36 * G], time_step=10.0),
-    duration=10.0,
-    output_step=0.05,
-)
 
 
 def cone(m: Motion) -> float:
@@ -164,9 +141,6 @@ def _hit(e: float) -> Scene:
     )
 
 
-DROPS, HITS = (tuple(make(e) for e in RESTITUTIONS) for make in (_drop, _hit))
-
-
 def _rebound(m: Motion) -> float:
     after = m.t > math.sqrt(2.0 * DROP / G) + 0.01
     return math.sqrt(max(float(np.max(m.y[after])) - 0.5, 0.0) / DROP)
@@ -183,13 +157,6 @@ def _worst(seen: Callable[[Motion], float], *motions: Motion) -> float:
 
 # Rocking.
 
-UPLIFT = Scene(
-    name="uplift",
-    block=SLENDER,
-    floor=Floor(friction=0.6),
-    excitation=Record.from_samples([0.0, 0.4 * G], time_step=RAMP_TIME),
-    duration=RAMP_TIME,
-)
 TILT = 0.5 * SLENDER.alpha
 ROCK = Scene(
     name="rock",
@@ -265,23 +232,7 @@ TUMBLE = Scene(
     initial_velocity=1.0,
     duration=3.0,
 )
-MIRRORED = TUMBLE.mirrored().replace(name="tumble-mirrored")
-REST = Scene(name="rest", block=SLENDER, floor=Floor(friction=0.5), duration=10.0, output_step=0.05)
 SHAKE = Sine(amplitude=2.0, period=0.5, cycles=4)
-LOOSE = Scene(name="loose", block=SQUAT, floor=Floor(friction=0.0), excitation=SHAKE, duration=2.0)
-LIGHT = ROCK.replace(name="light", gravity=0.5 * G)
-FALLING = ROCK.replace(
-    name="falling-base", vertical=Record.from_samples([-0.5 * G, -0.5 * G], time_step=2.5)
-)
-FLUSH = Scene(
-    name="flush",
-    block=SLENDER,
-    floor=Floor(friction=0.6),
-    initial_height=0.1,
-    initial_velocity=1.0,
-    duration=0.25,
-    output_step=1e-3,
-)
 #: When it lands, s.
 LANDS = math.sqrt(2.0 * 0.1 / G)
 
@@ -337,21 +288,7 @@ def _rectangle(size: float, length: float) -> Record:
     return Record.from_samples([size, size], time_step=length)
 
 
-STEPS = tuple(
-    _pulsed(
-        f"step-{part:g}", STUBBY, _rectangle(part * overturning_velocity(STUBBY, G) / KICK, KICK)
-    )
-    for part in MARGINS
-)
 LENGTH = 0.4  # s
-RECTANGLES = tuple(
-    _pulsed(
-        f"rectangle-{part:g}",
-        NEEDLE,
-        _rectangle(part * rectangular_pulse_ratio(LENGTH, NEEDLE_P) * G * NEEDLE.slope, LENGTH),
-    )
-    for part in MARGINS
-)
 #: One sine of four times the block's frequency, just below the threshold amplitude and above.
 SINES = tuple(
     _pulsed(
@@ -363,35 +300,6 @@ SINES = tuple(
 )
 #: Towers of one shape under one sine: the two small ones fall.
 SIZES = {0.25: True, 0.5: True, 1.0: False, 2.0: False, 4.0: False}  # R, m
-TOWERS = tuple(
-    _pulsed(
-        f"tower-{radius:g}",
-        Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2)),
-        Sine(amplitude=2.0 * 9.80665 * math.tan(0.2), period=0.5, cycles=1),
-        gravity=9.80665,
-    )
-    for radius in SIZES
-)
-NEWMARK = _pulsed(
-    "newmark", SQUAT, _rectangle(PUSH, PUSHED), floor=Floor(friction=0.3), duration=1.5
-)
-WAKE = _pulsed(
-    "wake",
-    SQUAT,
-    Record.from_samples(PUSH * (np.arange(0.0, RESTED + PUSHED, 5e-4) >= RESTED), time_step=5e-4),
-    floor=Floor(friction=0.3),
-    duration=RESTED + 1.5,
-)
-ALMOST_FLUSH = tuple(
-    Scene(
-        name=f"almost-flush-{tilt:g}",
-        block=SLENDER,
-        floor=Floor(friction=0.6),
-        initial_rotation=tilt,
-        duration=1.0,
-    )
-    for tilt in (1e-5, 1e-4, 1e-3)
-)
 
 
 def _direct(m: Motion) -> float:
@@ -408,11 +316,6 @@ def _integral(scene: Scene) -> bool:
     t = np.linspace(0.0, scene.excitation.quiet_after, 20001)
     ratios = scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
     return overturns_without_impact(NEEDLE_P * t, ratios)
-
-
-def _lift(*motions: Motion) -> float:
-    """Largest rise of the block's centre above its place of release, mm."""
-    return 1e3 * max(float(np.max(m.y) - m.y[0]) for m in motions)
 
 
 COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
@@ -436,7 +339,15 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-02",
             "friction cone: where slip begins",
-            (CONE,),
+            (
+                Scene(
+                    name="cone",
+                    block=SQUAT,
+                    floor=Floor(friction=0.4),
+                    excitation=Record.from_samples([0.0, -G], time_step=RAMP_TIME),
+                    duration=RAMP_TIME,
+                ),
+            ),
             cone,
             1.0,
             0.02,
@@ -448,7 +359,16 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-03",
             "static creep at 0.9 of the cone",
-            (CREEP,),
+            (
+                Scene(
+                    name="creep",
+                    block=SQUAT,
+                    floor=Floor(friction=0.4),
+                    excitation=Record.from_samples([-0.36 * G, -0.36 * G], time_step=10.0),
+                    duration=10.0,
+                    output_step=0.05,
+                ),
+            ),
             lambda m: 3.6e6 * _between(m, "x", 5.0, 10.0) / 5.0,
             0.0,
             1.0,
@@ -473,7 +393,16 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-05",
             "nothing slows what nothing holds",
-            (COAST,),
+            (
+                Scene(
+                    name="coast",
+                    block=SQUAT,
+                    floor=Floor(friction=0.0),
+                    initial_velocity=5.0,
+                    duration=10.0,
+                    output_step=0.05,
+                ),
+            ),
             lambda m: (m.x[-1] - m.x[0]) / (5.0 * (m.t[-1] - m.t[0])),
             1.0,
             1e-5,
@@ -485,7 +414,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-06",
             "rebound from the floor at e = 0.25 … 1",
-            DROPS,
+            tuple(map(_drop, RESTITUTIONS)),
             partial(_worst, _rebound),
             0.0,
             0.03,
@@ -498,7 +427,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-07",
             "rebound from a wall at e = 0.25 … 1",
-            HITS,
+            tuple(map(_hit, RESTITUTIONS)),
             partial(_worst, _speed_back),
             0.0,
             0.03,
@@ -523,7 +452,15 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-09",
             "uplift at g tan α",
-            (UPLIFT,),
+            (
+                Scene(
+                    name="uplift",
+                    block=SLENDER,
+                    floor=Floor(friction=0.6),
+                    excitation=Record.from_samples([0.0, 0.4 * G], time_step=RAMP_TIME),
+                    duration=RAMP_TIME,
+                ),
+            ),
             uplift,
             1.0,
             0.02,
@@ -595,7 +532,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-15",
             "mirror image",
-            (TUMBLE, MIRRORED),
+            (TUMBLE, TUMBLE.mirrored().replace(name="tumble-mirrored")),
             lambda one, other: _apart(one.theta, -other.theta) / TUMBLE.block.alpha,
             0.0,
             0.01,
@@ -607,7 +544,15 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-16",
             "rest stays rest",
-            (REST,),
+            (
+                Scene(
+                    name="rest",
+                    block=SLENDER,
+                    floor=Floor(friction=0.5),
+                    duration=10.0,
+                    output_step=0.05,
+                ),
+            ),
             restlessness,
             0.0,
             0.1,
@@ -619,7 +564,20 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-17",
             "the same from a moving base",
-            (LOOSE, LIGHT, FALLING),
+            (
+                Scene(
+                    name="loose",
+                    block=SQUAT,
+                    floor=Floor(friction=0.0),
+                    excitation=SHAKE,
+                    duration=2.0,
+                ),
+                ROCK.replace(name="light", gravity=0.5 * G),
+                ROCK.replace(
+                    name="falling-base",
+                    vertical=Record.from_samples([-0.5 * G, -0.5 * G], time_step=2.5),
+                ),
+            ),
             moving_base,
             0.0,
             0.01,
@@ -631,7 +589,17 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-18",
             "flush landing: which law",
-            (FLUSH,),
+            (
+                Scene(
+                    name="flush",
+                    block=SLENDER,
+                    floor=Floor(friction=0.6),
+                    initial_height=0.1,
+                    initial_velocity=1.0,
+                    duration=0.25,
+                    output_step=1e-3,
+                ),
+            ),
             lambda m: _between(m, "theta", LANDS + 0.01, LANDS + 0.03) / 0.02,
             0.0,
             None,
@@ -644,7 +612,14 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-19",
             "a step of the base's velocity overturns",
-            STEPS,
+            tuple(
+                _pulsed(
+                    f"step-{part:g}",
+                    STUBBY,
+                    _rectangle(part * overturning_velocity(STUBBY, G) / KICK, KICK),
+                )
+                for part in MARGINS
+            ),
             partial(_wrong, (False, True), falls),
             0.0,
             0.0,
@@ -656,7 +631,15 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-20",
             "slip under a pulse of the base",
-            (NEWMARK,),
+            (
+                _pulsed(
+                    "newmark",
+                    SQUAT,
+                    _rectangle(PUSH, PUSHED),
+                    floor=Floor(friction=0.3),
+                    duration=1.5,
+                ),
+            ),
             lambda m: abs(m.x[-1] - m.x[0]) / PUSH_SLIP,
             1.0,
             0.02,
@@ -668,7 +651,16 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-21",
             "a rectangular pulse overturns a slender block",
-            RECTANGLES,
+            tuple(
+                _pulsed(
+                    f"rectangle-{part:g}",
+                    NEEDLE,
+                    _rectangle(
+                        part * rectangular_pulse_ratio(LENGTH, NEEDLE_P) * G * NEEDLE.slope, LENGTH
+                    ),
+                )
+                for part in MARGINS
+            ),
             partial(_wrong, (False, True), falls),
             0.0,
             0.0,
@@ -692,7 +684,15 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-23",
             "of five sizes the two small ones fall",
-            TOWERS,
+            tuple(
+                _pulsed(
+                    f"tower-{radius:g}",
+                    Block(half_width=radius * math.sin(0.2), half_height=radius * math.cos(0.2)),
+                    Sine(amplitude=2.0 * 9.80665 * math.tan(0.2), period=0.5, cycles=1),
+                    gravity=9.80665,
+                )
+                for radius in SIZES
+            ),
             partial(_wrong, SIZES.values(), falls),
             0.0,
             0.0,
@@ -704,7 +704,17 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-24",
             "what rests wakes when the base moves",
-            (WAKE,),
+            (
+                _pulsed(
+                    "wake",
+                    SQUAT,
+                    Record.from_samples(
+                        PUSH * (np.arange(0.0, RESTED + PUSHED, 5e-4) >= RESTED), time_step=5e-4
+                    ),
+                    floor=Floor(friction=0.3),
+                    duration=RESTED + 1.5,
+                ),
+            ),
             lambda m: abs(m.x[-1] - m.x[0]) / PUSH_SLIP,
             1.0,
             0.05,
@@ -716,8 +726,17 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-25",
             "almost flush: nothing is thrown up",
-            ALMOST_FLUSH,
-            _lift,
+            tuple(
+                Scene(
+                    name=f"almost-flush-{tilt:g}",
+                    block=SLENDER,
+                    floor=Floor(friction=0.6),
+                    initial_rotation=tilt,
+                    duration=1.0,
+                )
+                for tilt in (1e-5, 1e-4, 1e-3)
+            ),
+            lambda *ms: 1e3 * max(float(np.max(m.y) - m.y[0]) for m in ms),
             0.0,
             0.05,
             "mm",

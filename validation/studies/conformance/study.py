@@ -1,14 +1,15 @@
 """`rockcheck conformance`: engines, user-defined models and histories, judged by phenomena.
 
 Each phenomenon has a certain answer; histories may be written elsewhere. `export` writes the scenes
-for an engine elsewhere.
+for an engine elsewhere. `Tuning` (`--tune`) finds engines' parameters for a wanted restitution and
+friction, by dropping a block and by sliding it.
 """
 
 import math
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -17,15 +18,16 @@ import numpy as np
 from junitparser import Error, Failure as Failed, JUnitXml, Skipped, TestCase, TestSuite
 
 from rockcheck.engines.base_motion import BaseMotion
-from rockcheck.scenes import History, InputError, ModelFailure, Scene
+from rockcheck.engines.steps import march_fixed
+from rockcheck.scenes import Floor, History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.observation import scene_notes
 from rockcheck.scenes.reading import read_json
 from rockcheck.scenes.writing import table_text, write_whole
-from rockcheck.validation.execute.models import build, build_own, family, is_own
+from rockcheck.validation.execute.models import build, build_own, family, home, is_own
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.execute.provenance import cell_key, version_of
+from rockcheck.validation.execute.provenance import cell_key, code_digest, version_of
 from rockcheck.validation.finding import (
     Block,
     Column,
@@ -36,7 +38,15 @@ from rockcheck.validation.finding import (
     Verdict,
     text,
 )
-from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES, Motion
+from rockcheck.validation.studies.conformance.phenomena import (
+    DROP,
+    PHENOMENA,
+    SCENES,
+    SQUAT,
+    FloatArray,
+    G,
+    Motion,
+)
 from rockcheck.validation.study import Study, Task
 
 #: The file that describes a folder of histories; the name of unnamed settings.
@@ -46,12 +56,12 @@ STEP, A_STEP = 1e-3, 1e-4
 #: A value that moved by more than this share of its limit has changed.
 SHARE = 0.1
 #: Verdicts, their words, their colours, and their JUnit results.
-VERDICTS: dict[str, tuple[str, Verdict, Any]] = {
-    "pass": ("conforms", "pass", None),
-    "fail": ("fails", "fail", Failed),
-    "lacks": ("has none", "incomplete", Skipped),
-    "reported": ("reported", "", Skipped),
-    "error": ("error", "error", Error),
+VERDICTS: dict[str, tuple[str, Verdict, tuple[Any, ...]]] = {
+    "pass": ("conforms", "pass", ()),
+    "fail": ("fails", "fail", (Failed,)),
+    "lacks": ("has none", "incomplete", (Skipped,)),
+    "reported": ("reported", "", (Skipped,)),
+    "error": ("error", "error", (Error,)),
 }
 
 
@@ -128,6 +138,17 @@ def written(folder: Path) -> Player:
 
 
 @dataclass(frozen=True)
+class Seen:
+    """The result of a player: a value, or None where it lacks a part or no value could be read."""
+
+    value: float | None
+    verdict: str
+    reason: str
+    version: str
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Trial(Task):
     """One player and one phenomenon, whose scenes it plays."""
 
@@ -145,38 +166,9 @@ class Trial(Task):
         cells = [cell_key(scene, who.model, who.given, who.search) for scene in scenes]
         return {**super().depends(), "cells": cells}
 
-
-@dataclass(frozen=True)
-class Seen:
-    """The result of a player: a value, or None where it lacks a part or no value could be read."""
-
-    value: float | None
-    verdict: str
-    reason: str
-    version: str
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Conformance(Study):
-    """The players whose conformance is judged."""
-
-    players: tuple[Player, ...]
-    name = "conformance"
-    record = Seen
-
-    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Trial]:
-        """Player by player."""
-        return [
-            Trial(player, id, expected=player.cost * sum(scene.duration for scene in what.scenes))
-            for player in self.players
-            for id, what in PHENOMENA.items()
-        ]
-
-    @staticmethod
-    def play(task: Trial) -> Seen:
+    def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
-        who, what = task.player, PHENOMENA[task.id]
+        who, what = self.player, PHENOMENA[self.id]
         sys.path.extend(path for path in who.search if path not in sys.path)
         model: Any = build_own(who.model, who.given)
         version = who.version or str(getattr(model, "version", ""))
@@ -194,8 +186,26 @@ class Conformance(Study):
         told = set(chain.from_iterable(map(scene_notes, what.scenes)))  # of our own scenes
         said = chain.from_iterable(history.notes for history in histories)
         notes = dict.fromkeys(note for note in said if note not in told)
-        shown = value if math.isfinite(value) else None
-        return Seen(shown, *what.judge(value), version, tuple(notes))
+        return Seen(
+            value if math.isfinite(value) else None, *what.judge(value), version, tuple(notes)
+        )
+
+
+@dataclass(frozen=True)
+class Conformance(Study):
+    """The players whose conformance is judged."""
+
+    players: tuple[Player, ...]
+    name = "conformance"
+    record = Seen
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Trial]:
+        """Player by player."""
+        return [
+            Trial(player, id, expected=player.cost * sum(scene.duration for scene in what.scenes))
+            for player in self.players
+            for id, what in PHENOMENA.items()
+        ]
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """A card a player. Raises `InputError` where one cannot be built at all."""
@@ -226,8 +236,7 @@ def _in_units(scene: Scene, history: History) -> None:
     As a rule a column is then in other units than its name says.
     """
     t, size = history.channels["t"], scene.block.radius
-    begins = dict(zip(("x", "y", "theta"), scene.initial_state, strict=False))
-    for name, value in begins.items():
+    for name, value in zip(("x", "y", "theta"), scene.initial_state, strict=False):
         first = float(history.channels.get(name, [value])[0])
         if not abs(first - value) <= 0.02 * (1.0 if name == "theta" else size):
             raise ModelFailure(
@@ -352,8 +361,7 @@ def junit(cards: Sequence[Card]) -> str:
         suite = TestSuite(card["title"])
         for row in card["phenomena"]:
             case = TestCase(f"{row['id']} {row['name']}", suite.name)
-            kind = VERDICTS[row["verdict"]][2]
-            case.result = [kind(row["reason"])] if kind else []
+            case.result = [kind(row["reason"]) for kind in VERDICTS[row["verdict"]][2]]
             suite.add_testcase(case)
         document.add_testsuite(suite)
     return str(document.tostring(), "utf-8")
@@ -392,24 +400,29 @@ def changes(before: Path, after: Path) -> Finding:
         if _changed(was, now)
     ]
     worse = sum(row[-1] for row in rows)
-    columns = [
-        Column("engine", kind="model"),
-        text("settings"),
-        text("id", "no."),
-        text("phenomenon", brief=False),
-        text("version_before", brief=False),
-        text("version_after", brief=False),
-        text("verdict_before"),
-        text("verdict_after"),
-        Column("value_before"),
-        Column("value_after"),
-        text("worse", brief=False),
-    ]
     return Finding(
         "conformance-changes",
         "Conformance: what changed",
         f"{len(rows)} changes, {worse} for the worse",
-        [Table("changes", columns, rows)],
+        [
+            Table(
+                "changes",
+                [
+                    Column("engine", kind="model"),
+                    text("settings"),
+                    text("id", "no."),
+                    text("phenomenon", brief=False),
+                    text("version_before", brief=False),
+                    text("version_after", brief=False),
+                    text("verdict_before"),
+                    text("verdict_after"),
+                    Column("value_before"),
+                    Column("value_after"),
+                    text("worse", brief=False),
+                ],
+                rows,
+            )
+        ],
         verdict="fail" if worse else "changed" if rows else "pass",
         exit_code=int(worse > 0),
     )
@@ -439,7 +452,6 @@ TEXTS = Path(__file__).parents[2] / "data" / "export"
 #: Time step of the sampled base motion, s.
 BASE_STEP = 1e-3
 STATE = ("x_m", "y_m", "theta_rad", "x_dot_m_s", "y_dot_m_s", "theta_dot_rad_s")
-MOTION = ("t_s", "x_velocity_m_s", "y_velocity_m_s", "x_acceleration_m_s2", "y_acceleration_m_s2")
 
 
 def export(folder: Path) -> list[str]:
@@ -449,10 +461,44 @@ def export(folder: Path) -> list[str]:
     """
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
-            write_whole(folder / f"{name}-base.csv", table_text(MOTION, _motion(scene)))
-    rows = [_row(scene) for scene in SCENES.values()]
+            t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
+            velocity = list(map(BaseMotion(scene).velocity, t.tolist()))
+            accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
+            rows = np.column_stack([t, velocity, *accelerations]).tolist()
+            write_whole(
+                folder / f"{name}-base.csv",
+                table_text(
+                    (
+                        "t_s",
+                        "x_velocity_m_s",
+                        "y_velocity_m_s",
+                        "x_acceleration_m_s2",
+                        "y_acceleration_m_s2",
+                    ),
+                    rows,
+                ),
+            )
+    scenes: list[dict[str, Any]] = [
+        {
+            "scene": scene.name,
+            "duration_s": scene.duration,
+            "output_step_s": scene.output_step,
+            "gravity_m_s2": scene.gravity,
+            "half_width_m": scene.block.half_width,
+            "half_height_m": scene.block.half_height,
+            "friction": scene.floor.friction,
+            "floor_restitution": scene.floor.restitution,
+            **{
+                f"{side}_wall_{name}": getattr(scene.wall(side), key, "")
+                for side in ("left", "right")
+                for name, key in (("gap_m", "gap"), ("restitution", "restitution"))
+            },
+            **dict(zip(STATE, map(float, scene.initial_state), strict=True)),
+        }
+        for scene in SCENES.values()
+    ]
     write_whole(
-        folder / "scenes.csv", table_text(tuple(rows[0]), (tuple(row.values()) for row in rows))
+        folder / "scenes.csv", table_text(tuple(scenes[0]), [tuple(row.values()) for row in scenes])
     )
     played = [
         f"- {one.id} {one.name}: {', '.join(scene.name for scene in one.scenes)}"
@@ -465,29 +511,288 @@ def export(folder: Path) -> list[str]:
     return list(SCENES)
 
 
-def _motion(scene: Scene) -> Iterable[Any]:
-    base = BaseMotion(scene)
-    t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
-    velocity = np.array([base.velocity(time) for time in t.tolist()])
-    accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
-    return np.column_stack([t, velocity, *accelerations]).tolist()
+#: Tolerance of the restitution, absolute, and of the friction, relative.
+NEAR = 2e-3
+SLIDING = 1.5  # m/s
+#: Allowed values of what is wanted: least and most.
+WANTED = {
+    "restitution": (0.0, 1.0),
+    "friction": (1e-6, 1.3),
+    "time_step": (1e-6, 0.01),
+    "penetration": (0.0, math.inf),
+}
 
 
-def _row(scene: Scene) -> dict[str, Any]:
-    walls = {wall.side: wall for wall in scene.walls}
-    return {
-        "scene": scene.name,
-        "duration_s": scene.duration,
-        "output_step_s": scene.output_step,
-        "gravity_m_s2": scene.gravity,
-        "half_width_m": scene.block.half_width,
-        "half_height_m": scene.block.half_height,
-        "friction": scene.floor.friction,
-        "floor_restitution": scene.floor.restitution,
-        **{
-            f"{side}_wall_{name}": getattr(walls.get(side), key, "")
-            for side in ("left", "right")
-            for name, key in (("gap_m", "gap"), ("restitution", "restitution"))
+@dataclass(frozen=True)
+class Knob:
+    """The parameter that sets an engine's restitution.
+
+    `bounds` are its limits; `words` are all parameters in the engine's own words, in which
+    `Tune` fills in the numbers.
+    """
+
+    bounds: tuple[float, float]
+    words: Mapping[str, str]
+
+
+KNOBS: dict[str, Knob] = {
+    "mujoco": Knob(
+        (0.5, 2.2),
+        {
+            "geom solref": "{push:.6g} {damp:.6g}",
+            "geom solimp": "0.9999 0.9999 0.001 0.5 1",
+            "geom friction": "{friction:.4g} 0 0",
+            "option": 'timestep="{step:g}" integrator="Euler" cone="elliptic"',
         },
-        **dict(zip(STATE, map(float, scene.initial_state), strict=True)),
-    }
+    ),
+    "pybullet": Knob(
+        (0.0, 1.2),
+        {
+            "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they"
+            " multiply)",
+            "changeDynamics(floor)": "restitution={restitution:.4g},"
+            " lateralFriction={friction:.4g}",
+            "setPhysicsEngineParameter": "restitutionVelocityThreshold=0.2 (slower contacts do not"
+            " bounce), contactERP=0.2",
+        },
+    ),
+    "pymunk": Knob(
+        (0.0, 1.2),
+        {
+            "block": "elasticity=1, friction=1 (of two shapes they multiply)",
+            "floor": "elasticity={restitution:.4g}, friction={friction:.4g}",
+            "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
+        },
+    ),
+    "dart": Knob(
+        (0.0, 1.0),
+        {
+            "block": "setRestitutionCoeff(1), setFrictionCoeff({friction:.4g}) (restitutions"
+            " multiply, the smaller friction counts)",
+            "floor": "setRestitutionCoeff({restitution:.4g}), setFrictionCoeff({friction:.4g})",
+            "world": "contacts below 0.1 m/s do not bounce; the error reduction of 0.01 cannot be"
+            " set from Python",
+        },
+    ),
+    "drake": Knob(
+        (0.0, 20.0),
+        {
+            "AddContactMaterial": "dissipation={restitution:.4g} s/m, point_stiffness="
+            "{stiffness:.4g} N/m a kg, each body",
+            "CoulombFriction": "{friction:.4g}, {friction:.4g}",
+            "MultibodyPlant": "time_step={step:g}, DiscreteContactApproximation.kTamsi",
+            "remark": "dissipation, not restitution: it holds for this speed of approach, 2 m/s,"
+            " and this mass",
+        },
+    ),
+    "box2d": Knob(
+        (0.0, 1.0),
+        {
+            "block": "restitution=0, friction={friction:.4g} (of two restitutions the larger"
+            " counts, of two frictions the geometric mean)",
+            "floor": "restitution={restitution:.4g}, friction={friction:.4g}",
+            "world": "restitution_threshold=1 (slower contacts do not bounce), contact_hertz=30, 4"
+            " substeps",
+        },
+    ),
+    "physx": Knob(
+        (0.0, 2.0),
+        {
+            "PhysxMaterial(block)": "{friction:.4g}, {friction:.4g}, 0 (of two materials the mean"
+            " counts)",
+            "PhysxMaterial(floor)": "{friction:.4g}, {friction:.4g}, {restitution:.4g}",
+            "set_scene_config": "bounce_threshold=2 (slower contacts do not bounce)",
+        },
+    ),
+    "jolt": Knob(
+        (0.0, 1.2),
+        {
+            "create_body(block)": "friction={friction:.4g}, restitution=0 (of two restitutions the"
+            " larger counts, of two frictions the geometric mean)",
+            "create_body(floor)": "friction={friction:.4g}, restitution={restitution:.4g}",
+            "remark": "contacts below about 1 m/s do not bounce",
+        },
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Parameters in the engine's own words, and the contact reached with them.
+
+    Reached are `restitution`, `friction` and `penetration` (m) at a `step` (s); `reached` tells
+    whether they are near enough to the wanted ones.
+    """
+
+    engine: str
+    step: float
+    parameters: dict[str, str]
+    restitution: float
+    friction: float
+    penetration: float
+    reached: bool
+
+
+def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
+    times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
+    world = model.tuned_world(scene, parameters, step)
+    try:
+        return march_fixed(world, scene, times, np.tile([0.0, -G], (len(times) - 1, 1)))[1]
+    except ModelFailure as error:
+        raise InputError(
+            f"{model.name} cannot play a drop with these parameters: {error}", "--set time_step"
+        ) from None
+    finally:
+        world.close()
+
+
+@dataclass(frozen=True)
+class Tune(Task):
+    """An engine's wanted restitution and friction, and largest penetration (m), at a step (s)."""
+
+    engine: str
+    restitution: float
+    friction: float = 0.3
+    time_step: float = 1e-3
+    penetration: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name, (least, most) in WANTED.items():
+            value = getattr(self, name)
+            if not isinstance(value, int | float) or not least <= value <= most:
+                reason = f"{printable(value)} is not allowed: give {least:g} to {most:g}"
+                raise InputError(reason, "--tune" if name == "restitution" else f"--set {name}")
+
+    def depends(self) -> Any:
+        """Also the engine's code."""
+        return {**super().depends(), "home": code_digest(home(self.engine))}
+
+    def play(self) -> Calibration:
+        """Parameters in the engine's own words, and the contact reached with them.
+
+        The rebound of a block dropped from 0.2 m gives the restitution, the way of one sliding at
+        1.5 m/s the friction. Raises `InputError` where the engine cannot reach the restitution,
+        naming what it can.
+        """
+        from scipy.optimize import brentq
+
+        knob, step, friction = KNOBS[self.engine], self.time_step, self.friction
+        model: Any = build(self.engine, {"time_step": step, "settings": "default"})
+        drop = Scene(
+            name="drop",
+            block=SQUAT,
+            floor=Floor(friction=friction),
+            initial_height=DROP,
+            duration=0.65,
+        )
+        slide = Scene(
+            name="slide",
+            block=SQUAT,
+            floor=Floor(friction=friction),
+            initial_velocity=SLIDING,
+            duration=SLIDING / (friction * G) + 0.3,
+        )
+
+        def dropped(setting: float) -> tuple[float, float]:
+            """Restitution of the rebound, and penetration, m."""
+            parameters = {"restitution": setting, "friction": friction}
+            heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
+            later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
+            return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
+
+        restitution, ends = self.restitution, [dropped(end)[0] for end in knob.bounds]
+        if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
+            raise InputError(
+                f"{restitution:g} cannot be reached by {self.engine} at a step of {step:g} s:"
+                f" {min(ends):.3g} to {max(ends):.3g} can",
+                "--tune",
+            )
+        near = [
+            one
+            for one, end in zip(knob.bounds, ends, strict=True)
+            if abs(end - restitution) <= NEAR
+        ]
+        found = (
+            near[0]
+            if near
+            else brentq(
+                lambda setting: dropped(setting)[0] - restitution,
+                *knob.bounds,
+                xtol=1e-5,
+                rtol=1e-5,
+            )
+        )
+        asked = friction
+        for _ in range(12):
+            way = _played(model, slide, {"restitution": found, "friction": asked}, step)[-1, 0]
+            slid = SLIDING**2 / (2.0 * G * float(way))
+            if abs(slid - friction) <= NEAR * friction:
+                break
+            asked *= friction / slid
+        rebound, deep = dropped(found)
+        used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
+        used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
+        words = {where: what.format_map(used) for where, what in knob.words.items()}
+        reached = (
+            abs(rebound - restitution) <= 5.0 * NEAR
+            and abs(slid - friction) <= 5.0 * NEAR * friction
+            and deep <= self.penetration
+        )
+        return Calibration(self.engine, step, words, rebound, slid, max(deep, 0.0), reached)
+
+
+@dataclass(frozen=True)
+class Tuning(Study):
+    """The wanted restitution and friction of each engine."""
+
+    wanted: tuple[Tune, ...]
+    name = "tuning"
+    record = Calibration
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Tune]:
+        """All at once."""
+        return self.wanted
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
+        ended = list(map(done.get, self.wanted))
+        found = [one for one in ended if isinstance(one, Calibration)]
+        refused = [one for one in ended if isinstance(one, Failure) and one.refused]
+        if refused and not found:
+            raise InputError(refused[0].reason)
+        reached = sum(one.reached for one in found)
+        return Finding(
+            self.name,
+            "Parameters for a wanted restitution",
+            f"{reached} of {len(self.wanted)} engines reach what is wanted.",
+            [
+                Table(
+                    "parameters",
+                    [Column("engine", kind="model"), text("where"), text("what")],
+                    [[one.engine, *pair] for one in found for pair in one.parameters.items()],
+                    "Parameters",
+                ),
+                Table(
+                    "reached",
+                    [
+                        Column("engine", kind="model"),
+                        Column("step", unit="s"),
+                        Column("restitution"),
+                        Column("friction"),
+                        Column("penetration", unit="m", digits=2),
+                        text("reached"),
+                    ],
+                    [
+                        [
+                            *(one.engine, one.step, one.restitution, one.friction, one.penetration),
+                            Mark(one.reached, "pass" if one.reached else "fail"),
+                        ]
+                        for one in found
+                    ],
+                    "Reached",
+                ),
+            ],
+            {"engines": {one.engine: asdict(one) for one in found}},
+            "pass" if reached == len(self.wanted) else "fail",
+            int(reached < len(self.wanted)),
+        )

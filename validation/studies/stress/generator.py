@@ -50,41 +50,70 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     gravity = 9.81 if r.random() < 0.8 else _log(r, 1.0, 30.0)
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     chance = np.random.default_rng([seed, number, 2])
-    block = loaded(
+    block, most = loaded(
         block,
         chance,
         lambda: float(chance.uniform(*OFF_CENTRE)),
         lambda: float(chance.uniform(*INERTIA)),
     )
     unit = math.sqrt(block.radius / gravity)
-    most = most_friction(block)
-    edge = _edge(r, 0.05, (0.0, most, min(block.slope, most)))
-    mu = most / FRICTION[1] * float(r.uniform(*FRICTION)) if edge is None else edge
+    mu = _edge(
+        r,
+        (0.0, most, min(block.slope, most)),
+        lambda: most / FRICTION[1] * float(r.uniform(*FRICTION)),
+    )
     mu_s = min(mu * float(r.uniform(1.0, 1.5)), most) if r.random() < 0.3 else mu
     bounce = 0.0 if r.random() < 0.5 else float(r.uniform(0.0, 0.999))
-    walls = _walls(r, radius)
-    uplift = gravity * min(block.slope, max(mu, 0.05))
+    walls = [
+        Wall(
+            side=side,
+            gap=_one_of(
+                r.random(),
+                (0.1, lambda: 0.0),
+                (0.7, lambda: _log(r, 1e-6, 1.0) * min(radius, 1.0)),
+                (1.0, lambda: r.uniform(0.0, 1.0)),
+            ),
+            restitution=_one_of(
+                r.random(),
+                (0.3, lambda: 0.0),
+                (0.4, lambda: 1.0),
+                (1.0, lambda: r.uniform(0.0, 1.0)),
+            ),
+        )
+        for side in WALLED[int(r.integers(4))]
+    ]
     own_period = 2.0 * math.pi / block.weaker_pivot.frequency_parameter(gravity)
-    excitation = _excitation(r, uplift, own_period)
+    excitation = _excitation(r, gravity * min(block.slope, max(mu, 0.05)), own_period)
     vertical: Excitation = Rest()
     if r.random() < 0.3:
         vertical = _excitation(r, gravity * (0.3 if r.random() < 0.5 else 0.03), own_period)
     lasts = max(excitation.quiet_after, vertical.quiet_after) + unit * float(r.uniform(1.0, 20.0))
     duration = min(lasts, unit * LONGEST * float(r.uniform(0.1, 1.0)) ** 2 + unit)
-    start = _start(r, block, unit, excitation.kind == "rest")
-    if kind != "unilateral":
-        bounce = 0.0
-        start.pop("initial_height", None)
-    if kind == "bouc-wen":
-        mu_s = mu
-    if kind == "no-slip":
-        start.pop("initial_velocity", None)
+    balance = block.pivot("left").alpha, -block.pivot("right").alpha
+    start = _drawn(
+        r,
+        (
+            "initial_rotation",
+            math.inf if excitation.kind == "rest" else 0.3,  # without shaking it must move
+            lambda: _edge(r, balance, lambda: block.alpha * float(r.uniform(-1.0, 1.0))),
+        ),
+        (
+            "initial_angular_velocity",
+            0.3,
+            lambda: float(r.uniform(-1.5, 1.5)) * (block.alpha if r.random() < 0.5 else 1.0) / unit,
+        ),
+        ("initial_velocity", 0.2, lambda: float(r.uniform(-1.0, 1.0)) * (block.radius / unit)),
+        ("initial_height", 0.1, lambda: block.radius * _log(r, 1e-6, 1.0)),
+    )
     return _scene(
+        kind,
         start,
         ["initial_rotation"],  # it would start inside a wall: let it stand
+        mu,
+        mu_s,
+        bounce,
         name=f"stress {seed} {number}",
         block=block,
-        floor=_floor(mu, mu_s, bounce),
         walls=walls,
         excitation=excitation,
         vertical=vertical,
@@ -93,13 +122,26 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     )
 
 
-def _floor(mu: float, mu_s: float, bounce: float) -> Floor:
-    static = None if mu_s == mu else mu_s
-    return Floor(friction=mu, static_friction=static, restitution=bounce)
+def _scene(
+    kind: Kind,
+    start: dict[str, Any],
+    doubtful: Sequence[str],
+    mu: float,
+    mu_s: float,
+    bounce: float,
+    **settings: Any,
+) -> Scene:
+    """A scene with as much of its start as the kind can play and is valid.
 
-
-def _scene(start: dict[str, Any], doubtful: Sequence[str], **settings: Any) -> Scene:
-    """A scene with as much of its start as is valid; `doubtful` settings are dropped first."""
+    `doubtful` parts are dropped first. `mu`, `mu_s` and `bounce` are the floor's.
+    """
+    if kind != "unilateral":
+        bounce = 0.0
+        start.pop("initial_height", None)
+    if kind == "no-slip":
+        start.pop("initial_velocity", None)
+    static = None if mu_s == mu or kind == "bouc-wen" else mu_s
+    settings["floor"] = Floor(friction=mu, static_friction=static, restitution=bounce)
     settings["output_step"] = settings["duration"] / ROWS
     for key in doubtful:
         try:
@@ -111,15 +153,15 @@ def _scene(start: dict[str, Any], doubtful: Sequence[str], **settings: Any) -> S
 
 def loaded(
     block: Block, r: np.random.Generator, place: Callable[[], float], inertia: Callable[[], float]
-) -> Block:
-    """The block, in a share `LOADED` of the draws with a load.
+) -> tuple[Block, float]:
+    """The block, in a share `LOADED` of the draws with a load, and the largest friction of a scene.
 
     `place` draws how far the mass's centre is off, of the half sides; its height is off in half of
     the draws. In half of them the moment of inertia is given, too: `inertia` draws it, of the
-    largest possible.
+    largest possible. With more friction, but for a margin, a slipping pivot may jam.
     """
     if r.random() >= LOADED:
-        return block
+        return block, FRICTION[1]
     x, z = (
         float(r.choice([-1.0, 1.0])) * side * place()
         for side in (block.half_width, block.half_height)
@@ -130,99 +172,87 @@ def loaded(
         if r.random() < 0.5
         else None
     )
-    return block.replace(centre_of_mass=centre, moment_of_inertia=own)
-
-
-def most_friction(block: Block) -> float:
-    """Largest friction of a scene, but for a margin: with more a slipping pivot may jam."""
-    return (
-        FRICTION[1]
-        if block.homogeneous
-        else min(FRICTION[1], 0.999 * block.least_painleve_friction)
-    )
+    block = block.replace(centre_of_mass=centre, moment_of_inertia=own)
+    most = min(FRICTION[1], 0.999 * block.least_painleve_friction)
+    return block, FRICTION[1] if block.homogeneous else most
 
 
 def _log(r: np.random.Generator, low: float, high: float) -> float:
     return float(math.exp(r.uniform(math.log(low), math.log(high))))
 
 
-def _edge(r: np.random.Generator, share: float, values: tuple[float, ...]) -> float | None:
-    """One of the `values` in this share of the draws, else None."""
-    drawn = r.random(), int(r.integers(len(values)))
-    return values[drawn[1]] if drawn[0] < share else None
+def _edge(r: np.random.Generator, values: tuple[float, ...], usual: Callable[[], float]) -> float:
+    """One of the `values` in a twentieth of the draws, else what is `usual`."""
+    near, value = r.random() < 0.05, float(_pick(r, values))
+    return value if near else usual()
 
 
 def _sign(r: np.random.Generator) -> float:
     return 1.0 if r.random() < 0.5 else -1.0
 
 
-def _walls(r: np.random.Generator, radius: float) -> list[Wall]:
-    walls = []
-    for side in WALLED[int(r.integers(4))]:
-        gap, kind = 0.0, r.random()
-        if kind >= 0.1:
-            near = kind < 0.7
-            gap = _log(r, 1e-6, 1.0) * min(radius, 1.0) if near else float(r.uniform(0.0, 1.0))
-        edge = r.random()
-        restitution = 0.0 if edge < 0.3 else 1.0 if edge < 0.4 else float(r.uniform(0.0, 1.0))
-        walls.append(Wall(side=side, gap=gap, restitution=restitution))
-    return walls
+def _one_of(drawn: float, *options: tuple[float, Callable[[], Any]]) -> Any:
+    """What the first option makes whose bound is above the number drawn."""
+    return next(make for bound, make in options if drawn < bound)()
 
 
 def _excitation(r: np.random.Generator, uplift: float, own_period: float) -> Excitation:
     amplitude = uplift * _log(r, *AMPLITUDE) * _sign(r)
     period = own_period * _log(r, *PERIOD)
-    kind = r.random()
-    if kind < 0.1:
-        return Rest()
-    if kind < 0.45:
-        return Ricker(amplitude=amplitude, period=period, symmetric=bool(r.random() < 0.3))
-    if kind < 0.6:
-        return Sine(amplitude=amplitude, period=period, cycles=int(r.integers(1, 9)))
-    return Record.from_samples(_samples(r, amplitude), time_step=_log(r, *RECORD_STEP))
+    return _one_of(
+        r.random(),
+        (0.1, Rest),
+        (
+            0.45,
+            lambda: Ricker(amplitude=amplitude, period=period, symmetric=bool(r.random() < 0.3)),
+        ),
+        (
+            0.6,
+            lambda: Sine(amplitude=amplitude, period=period, cycles=int(r.integers(1, 9))),
+        ),
+        (
+            1.0,
+            lambda: Record.from_samples(_samples(r, amplitude), time_step=_log(r, *RECORD_STEP)),
+        ),
+    )
 
 
 def _samples(r: np.random.Generator, amplitude: float) -> NDArray[np.float64]:
     """A single sample, noise, levels with steps, or spikes in silence."""
     count = max(1, round(_log(r, 2.0, MOST_SAMPLES)))
-    shape = r.random()
-    if shape < 0.1:
-        return np.array([amplitude])
-    if shape < 0.4:
-        return amplitude * r.standard_normal(count)
-    if shape < 0.7:
-        levels = r.integers(0, count, size=max(1, count // 8))
-        return amplitude * np.repeat(r.standard_normal(count), 1)[np.sort(np.resize(levels, count))]
-    return np.where(r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0)
+    return _one_of(
+        r.random(),
+        (0.1, lambda: np.array([amplitude])),
+        (0.4, lambda: amplitude * r.standard_normal(count)),
+        (
+            0.7,
+            lambda: (
+                amplitude
+                * np.take(  # the places are drawn first
+                    indices=np.sort(
+                        np.resize(r.integers(0, count, size=max(1, count // 8)), count)
+                    ),
+                    a=r.standard_normal(count),
+                )
+            ),
+        ),
+        (
+            1.0,
+            lambda: np.where(
+                r.random(count) < 0.1, amplitude * r.standard_normal(count) * 3.0, 0.0
+            ),
+        ),
+    )
 
 
-#: Part of a scene's start: its key, the share of the draws that have it, and what draws it.
-Part = tuple[str, float, Callable[[], float]]
+def _drawn(
+    r: np.random.Generator, *parts: tuple[str, float, Callable[[], float]]
+) -> dict[str, Any]:
+    """A start of some of the parts: a key, the share of the draws that have it, what draws it.
 
-
-def _drawn(r: np.random.Generator, parts: Sequence[Part]) -> dict[str, Any]:
-    """A start of some of the parts; no number decides about a part that every start has."""
+    No number decides about a part that every start has.
+    """
     return {key: draw() for key, share, draw in parts if share > 1.0 or r.random() < share}
-
-
-def _start(r: np.random.Generator, block: Block, unit: float, must_move: bool) -> dict[str, Any]:
-    alpha, radius = block.alpha, block.radius
-    balance = block.pivot("left").alpha, -block.pivot("right").alpha
-    parts: list[Part] = [
-        (
-            "initial_rotation",
-            math.inf if must_move else 0.3,
-            lambda: _edge(r, 0.05, balance) or alpha * float(r.uniform(-1.0, 1.0)),
-        ),
-        (
-            "initial_angular_velocity",
-            0.3,
-            lambda: float(r.uniform(-1.5, 1.5)) * (alpha if r.random() < 0.5 else 1.0) / unit,
-        ),
-        ("initial_velocity", 0.2, lambda: float(r.uniform(-1.0, 1.0)) * (radius / unit)),
-        ("initial_height", 0.1, lambda: radius * _log(r, 1e-6, 1.0)),
-    ]
-    return _drawn(r, parts)
 
 
 # Scenes at which rounding decides: round numbers, equal lengths, accelerations exactly at a limit,
@@ -243,7 +273,6 @@ SIDES = (
     (0.2, 1.0),
     (5.0, 12.0),
 )
-GRAVITIES = (9.81, 10.0, 1.0)
 FRICTIONS = (0.0, 0.1, 0.2, 0.25, 0.3, 0.5, 0.6, 0.75, 1.0, 1.2)
 RESTITUTIONS = (0.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.9999999)
 STEPS = (0.01, 0.02, 0.1, 0.25)
@@ -263,43 +292,60 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     width, height = SIDES[int(r.integers(len(SIDES)))]
     chance = np.random.default_rng([seed, number, 3])
     block = Block(half_width=width, half_height=height)
-    block = loaded(block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS))
-    gravity = _pick(r, GRAVITIES)
+    block, most = loaded(
+        block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS)
+    )
+    gravity = _pick(r, (9.81, 10.0, 1.0))
     side = block.pivot("left" if chance.random() < 0.5 else "right")
-    slope, most = side.arm / side.height, most_friction(block)
+    slope = side.arm / side.height
     mu = min(_pick(r, (*FRICTIONS, slope, 0.5 * slope, 3.0 * slope / (4.0 + slope * slope))), most)
     mu_s = min(1.25 * mu, most) if r.random() < 0.2 and kind != "bouc-wen" else mu
     bounce = _pick(r, (0.0, 0.0, 0.0, 0.5, 0.9)) if kind == "unilateral" else 0.0
-    levels = (
-        0.0,
-        gravity,
-        gravity * slope,
-        gravity * mu,
-        gravity * mu_s,
-        2.0 * gravity * slope,
-        0.5 * gravity,
+    excitation = _exact_excitation(
+        r,
+        (
+            0.0,
+            gravity,
+            gravity * slope,
+            gravity * mu,
+            gravity * mu_s,
+            2.0 * gravity * slope,
+            0.5 * gravity,
+        ),
     )
-    excitation = _exact_excitation(r, levels)
     vertical: Excitation = Rest()
     if r.random() < 0.3:
         vertical = _exact_excitation(r, (0.0, gravity, gravity, 0.5 * gravity, 2.0 * gravity))
     walls = _exact_walls(r, block)
     unit = math.sqrt(block.radius / gravity)
     duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * unit, 2)
-    still = (
-        excitation.kind == "rest"
-        and vertical.kind == "rest"
-        and all(wall.restitution <= 0.5 for wall in walls)
-    )
-    if still and r.random() < LONG:
+    still = excitation.kind == "rest" and vertical.kind == "rest"
+    if still and all(wall.restitution <= 0.5 for wall in walls) and r.random() < LONG:
         duration = LASTS
-    start = _exact_start(r, block, kind, excitation.kind == "rest")
+
+    def tilt() -> float:
+        sign = _sign(r)
+        alpha = block.pivot("left" if sign > 0.0 else "right").alpha
+        size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
+        return sign * (size if size < 1.5 else 0.1)
+
+    low = tuple(size for size in SIZES if size < 1)
+    start = _drawn(
+        r,
+        ("initial_rotation", 1.0 if excitation.kind == "rest" else 0.4, tilt),
+        ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
+        ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
+        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
+    )
     return _scene(
+        kind,
         start,
         [*reversed(start)],
+        mu,
+        mu_s,
+        bounce,
         name=f"exact {seed} {number}",
         block=block,
-        floor=_floor(mu, mu_s, bounce),
         walls=walls,
         excitation=excitation,
         vertical=vertical,
@@ -308,7 +354,7 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     )
 
 
-def _pick(r: np.random.Generator, values: tuple[float, ...]) -> float:
+def _pick(r: np.random.Generator, values: Sequence[Any]) -> Any:
     return values[int(r.integers(len(values)))]
 
 
@@ -341,39 +387,25 @@ def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Exci
     kind = r.random()
     level = _sign(r) * _pick(r, levels[1:])
     period = _pick(r, (0.25, 0.5, 1.0, 2.0))
-    if kind < 0.3 or level == 0.0:
-        return Rest()
-    if kind < 0.4:
-        return Ricker(amplitude=level, period=period)
-    if kind < 0.5:
-        return Sine(amplitude=level, period=period, cycles=2)
-    step = _pick(r, STEPS)
-    if kind < 0.7:  # held: from the first instant, or after a ramp
-        return Record.from_samples(np.full(round(4.0 / step), level), time_step=step)
-    few = np.array([0.0, level, -level, _sign(r) * _pick(r, levels)])
-    return Record.from_samples(
-        np.repeat(few[r.integers(0, 4, size=12)], int(r.integers(1, 4))), time_step=step
-    )
-
-
-def _exact_start(
-    r: np.random.Generator, block: Block, kind: Kind, must_move: bool
-) -> dict[str, Any]:
-    def tilt() -> float:
-        sign = _sign(r)
-        alpha = block.pivot("left" if sign > 0.0 else "right").alpha
-        size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
-        return sign * (size if size < 1.5 else 0.1)
-
-    low = tuple(size for size in SIZES if size < 1)
-    parts: list[Part] = [
-        ("initial_rotation", 1.0 if must_move else 0.4, tilt),
-        ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        (
-            "initial_velocity",
-            0.3 * (kind != "no-slip"),
-            lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES)),
-        ),
-        ("initial_height", 0.2 * (kind == "unilateral"), lambda: 10.0 ** int(_pick(r, low))),
+    held = [  # from the first instant, or after a ramp
+        Record.from_samples(np.full(round(4.0 / step), level), time_step=step) for step in STEPS
     ]
-    return _drawn(r, parts)
+    return _one_of(
+        kind if level != 0.0 else 0.0,
+        (0.3, Rest),
+        (0.4, lambda: Ricker(amplitude=level, period=period)),
+        (0.5, lambda: Sine(amplitude=level, period=period, cycles=2)),
+        (0.7, lambda: _pick(r, held)),
+        (
+            1.0,
+            lambda: Record.from_samples(
+                time_step=_pick(r, STEPS),
+                samples=np.repeat(
+                    np.array([0.0, level, -level, _sign(r) * _pick(r, levels)])[
+                        r.integers(0, 4, size=12)
+                    ],
+                    int(r.integers(1, 4)),
+                ),
+            ),
+        ),
+    )

@@ -6,9 +6,8 @@ Figures are in natural units (lengths in R, accelerations in g, times in sqrt(R/
 relative to the energy at play.
 """
 
-import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -23,13 +22,13 @@ from rockcheck.scenes import (
     InputError,
     ModelFailure,
     Record,
-    Rest,
     Ricker,
     Scene,
     Sine,
     Wall,
     kinematics,
 )
+from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
@@ -38,7 +37,6 @@ from rockcheck.validation.studies.stress.mechanics import (
     Mask,
     Motion,
     integrals,
-    motion_of,
     not_finite,
 )
 
@@ -112,19 +110,11 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 FINE, MOST_ROWS = 64, 4000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
-#: Motions below this (R) are not resolved: a contact that parts at the settling speed stays closed.
-SETTLED = 2.0 * SETTLE
 #: The reach of a block is known where it is this many times the largest change between two rows.
 RESOLVES = 4.0
 #: An integral is used where rules of order 6 and 10 agree to this, relatively: the error of order
 #: 10 is then far smaller.
 RESOLVED = 1e-10
-#: Kinds of motion by the contacts they have.
-ON_FLOOR = ("rest", "slide", "rock", "slide-rock", "lean", "ladder")
-STANDS = ("rest", "rock", "lean")
-
-EVEN = ("t", "y", "y_dot", "mode")
-ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
 SWAPPED = {"overturned left": "overturned right", "overturned right": "overturned left"}
 
 
@@ -166,9 +156,8 @@ def check_run(
     figures = {"ends": 0.0, "finite": not_finite(history)}
     if figures["finite"]:
         return CheckedRun(figures=figures, outcome=history.outcome)
-    motion, cost = motion_of(played, history), history.cost
-    figures["outcome"] = float(_contradicts(played, history))
-    figures |= conditions(model, motion)
+    motion, cost = Motion(played, history), history.cost
+    figures |= {"outcome": float(_contradicts(played, history)), **conditions(model, motion)}
     if audit:  # at the finer tolerance, whose error does not disturb the balance
         with suppress(ModelFailure):
             energy = _energy(finer(model), played)
@@ -213,25 +202,24 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     if len(rows) < 2:
         return False
     scene = scene.replace(duration=float(rows[-1]))  # what follows has no row
-    free = scene.replace(walls=())
-    history = model.simulate(free)
+    history = model.simulate(scene.replace(walls=()))
     if history.overturned_at is not None:
         return False
     gaps = kinematics.clearance(
         scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
     )
     reach = float(np.max(-gaps))
-    room = float(np.max(np.abs(np.diff(gaps)))) + SETTLED * scene.block.radius
+    # A contact that parts at the settling speed stays closed: what is smaller is not resolved.
+    room = float(np.max(np.abs(np.diff(gaps)))) + 2.0 * SETTLE * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
         return False
-    walled = [
-        model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
-        for gap in (reach + room, reach - room)
-    ]
     struck = [
         "lands along a wall" in one.cost.rules
         or any(event.kind == "wall impact" for event in one.event_list)
-        for one in walled
+        for one in (
+            model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
+            for gap in (reach + room, reach - room)
+        )
     ]
     return struck != [False, True]
 
@@ -242,10 +230,10 @@ def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     If it is too large, or cannot be judged, it is computed again from rows four times as dense.
     That removes an error of the integral, but not one of the motion.
     """
-    error = energy_error(model, motion_of(scene, model.simulate(scene)))
+    error = energy_error(model, Motion(scene, model.simulate(scene)))
     if error is None or error > INVARIANTS["energy"].bound:
         near = scene.replace(output_step=scene.output_step / 4.0)
-        closer = energy_error(model, motion_of(near, model.simulate(near)))
+        closer = energy_error(model, Motion(near, model.simulate(near)))
         error = error if closer is None else closer
     return error
 
@@ -271,36 +259,31 @@ def audited(scene: Scene) -> Scene:
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
-    falls = [event for event in history.event_list if event.kind.startswith("overturned")]
-    rows, theta = len(history.channels["t"]), history.channels["theta"]
-    times = [event.t for event in history.event_list]
-    if any(b < a for a, b in itertools.pairwise(times)) or (
-        times and times[-1] > scene.duration * (1.0 + 1e-12)
-    ):
-        return True
+    kinds = [event.kind for event in history.event_list]
+    falls = [kind for kind in kinds if kind.startswith("overturned")]
+    times = [event.t for event in history.event_list] + [scene.duration * (1.0 + 1e-12)]
+    backward = bool(np.any(np.diff(times) < 0.0))
     if history.outcome.startswith("overturned"):
-        return [event.kind for event in falls] != [history.outcome] or history.event_list[
-            -1
-        ] is not falls[0]
-    return (
-        bool(falls) or rows != len(scene.output_times) or bool(np.any(np.abs(theta) >= math.pi / 2))
-    )
+        return backward or falls != [history.outcome] or kinds[-1] != history.outcome
+    whole = len(history.channels["t"]) == len(scene.output_times)
+    upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
+    return backward or bool(falls) or not (whole and upright)
 
 
 def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
     """Contacts, Coulomb's law and the signs of forces in every row, away from events."""
     # Rounding of x does not count as depth.
     rounding = 4e-16 * np.abs(motion.channels["x"]) / motion.radius
-    depth = [-motion.height, *(-gap - rounding for gap in motion.gaps.values())]
+    depth = np.max([-motion.height, *(-gap - rounding for gap in motion.gaps.values())])
     found = {
-        "penetration": max(0.0, *(float(np.max(one)) for one in depth)),
-        "floor": _largest(np.abs(motion.height), motion.within(*ON_FLOOR)),
+        "penetration": max(0.0, float(depth)),
+        "floor": _largest(np.abs(motion.height), ~motion.within("flight", "overturned")),
     }
     if model.friction == "bouc-wen":  # its pivot creeps, and its friction is not in a history
         return found
     drift = 1e-6 * np.abs(motion.channels["x_dot"]) * motion.unit / motion.radius
     speed = np.abs(motion.slip) / (1.0 + drift + np.abs(motion.w))
-    found["stick"] = _largest(speed, motion.within(*STANDS))
+    found["stick"] = _largest(speed, motion.within("rest", "rock", "lean"))
     friction, push = _force_conditions(model, motion)
     return found | {"coulomb": friction, "push": push}
 
@@ -310,47 +293,43 @@ def _largest(values: Floats, rows: Mask) -> float:
     return float(np.max(values[rows], initial=0.0))
 
 
-def _clear(motion: Motion) -> Mask:
-    t, bases = motion.channels["t"], (motion.scene.excitation, motion.scene.vertical)
-    jumps = [time for one in bases if one.kind != "rest" for time in (0.0, one.quiet_after)]
-    events = [event.t for event in motion.history.event_list]
-    places = np.sort(np.array([*events, *jumps, -math.inf, math.inf]))
-    after = np.searchsorted(places, t)
-    near = NEAR * motion.unit + 1e-12 * np.abs(t)
-    return np.asarray((t - places[after - 1] > near) & (places[after] - t > near))
+def _free(times: Sequence[float], first: Floats, last: Floats) -> Mask:
+    """Where none of the times lies between `first` and `last`."""
+    before, until = np.searchsorted(np.sort(times), (first, last))
+    return np.asarray(before == until)
 
 
 def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, float]:
     """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
-    scene, clear, theta = motion.scene, _clear(motion), motion.channels["theta"]
+    scene, t, theta = motion.scene, motion.channels["t"], motion.channels["theta"]
+    bases = [one for one in (scene.excitation, scene.vertical) if one.kind != "rest"]
+    breaks = [event.t for event in motion.history.event_list]
+    breaks += [time for one in bases for time in (0.0, one.quiet_after)]
+    near = NEAR * motion.unit + 1e-12 * np.abs(t)
+    clear = _free(breaks, t - near, t + near)
     u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
     unilateral = model.pivot == "unilateral"
-    touching = motion.tip | motion.far
     pivots = scene.block.pivot("left"), scene.block.pivot("right")
     # A base that accelerates to the right tips the block to the left.
     tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
-    rest = clear & motion.within("rest") & ~touching
+    rest = clear & motion.within("rest") & ~(motion.tip | motion.far)
     excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)
-    flat = clear & motion.within("rest", "slide") & unilateral
-    tension = _largest(-g / scale, flat)
+    tension = _largest(-g / scale, clear & motion.within("rest", "slide") & unilateral)
     tilted = clear & motion.within("rock", "slide-rock", "lean", "ladder") & (theta != 0.0)
     tilted &= ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
     slides = motion.within("slide-rock", "ladder")
     tilted &= ~(slides & (np.abs(motion.slip) < SLIPS))
-    if not tilted.any():
-        return excess, tension
     direction = np.where(slides, np.sign(motion.sign * motion.slip), 0.0)
     beyond, pulls = [], []
     # What happens within NEAR is one event, in the core and here: a spinning block passes through
     # its friction cone in less time. So a condition is broken only where it is broken for that long
     # before and after.
     for moment in (0.0, -NEAR, NEAR):
-        _, forces = motion.forces(tilted, direction, later=moment)
-        beyond.append(np.abs(forces.friction) - mu_s * np.abs(forces.normal))
-        floor = -forces.normal if unilateral else -math.inf
-        pulls.append(np.maximum(np.maximum(-forces.tip, -forces.far), floor))
+        (normal, friction, tip, far), _ = motion.forces(tilted, direction, later=moment)
+        beyond.append(np.abs(friction) - mu_s * np.abs(normal))
+        pulls.append(np.maximum(np.maximum(-tip, -far), -normal if unilateral else -math.inf))
     over, pull = (np.min(one, axis=0) / scale[tilted] for one in (beyond, pulls))
     if model.friction != "no-slip":
         excess = max(excess, _largest(over, direction[tilted] == 0))
@@ -366,16 +345,12 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     the history has fewer, events or kinks lie in all of them, or the work is not resolved in any.
     """
     scene, radius, vg = motion.scene, motion.radius, motion.vertical
-    if len(motion.channels["t"]) <= GROUP:
-        return None
     energy = motion.energy / (scene.gravity * radius)
     speed = radius / motion.unit
     power = -(motion.u * motion.across + vg * motion.up) / speed
     if model.friction != "bouc-wen":
         power = power + _friction_power(motion)
     whole, quiet = _whole_groups(scene, motion.history)
-    if not whole.any():
-        return None
     step = scene.output_step / motion.unit
     work, moved = integrals(step, power), integrals(step, np.abs(power))
     rough = integrals(step, power, BOOLE)
@@ -388,14 +363,50 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     beside = np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1])
     whole &= np.maximum(doubt, np.maximum(*beside)) < RESOLVED
     if model.friction == "bouc-wen":
-        rise = (
-            np.abs(np.diff(motion.up)) / speed / step
-        )  # per row; with gravity it is the floor's force
+        # Of `up`, per row; with gravity it is the floor's force.
+        rise = np.abs(np.diff(motion.up)) / speed / step
         force = 2.0 + np.max(np.abs(vg)) + rise[: len(work) * GROUP].reshape(-1, GROUP).max(axis=1)
         held = scene.floor.friction * model.yield_displacement / radius * force
         return _largest(off - held / size, whole) if whole.any() else None
     whole &= quiet
     return _largest(np.abs(off), whole) if whole.any() else None
+
+
+def energy_without_source(motion: Motion) -> float:
+    """Largest energy beyond the initial one and the work of the base, relative to that at play.
+
+    At play are g R, the initial energy and all work done by then.
+
+    The base's acceleration acts on the block as a force. Its work between two rows is its impulse
+    times the mean of the velocities before and after. It is exact however the acceleration changes
+    between the rows (a record can be finer than they are) where the block stands, and where nothing
+    but the base changes its velocity.
+    """
+    scene, energy = motion.scene, motion.energy
+    work, moved = np.zeros(len(energy)), np.zeros(len(energy))
+    bases = scene.excitation, scene.vertical
+    for excitation, velocity in zip(bases, (motion.across, motion.up), strict=True):
+        impulse = -np.diff(_base_velocity(excitation, motion.channels["t"]))
+        part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
+        work[1:] += np.cumsum(part)
+        moved[1:] += np.cumsum(np.abs(part))
+    size = scene.gravity * motion.radius + np.abs(energy[0]) + moved
+    return float(np.max((energy - energy[0] - work) / size))
+
+
+def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
+    """Integral of the base acceleration from the first of the times `t` on.
+
+    Exact for a record, which is linear between samples.
+    """
+    times = t
+    if isinstance(excitation, Record):
+        kinks = excitation.time_step * np.arange(len(excitation.unscaled))
+        kinks = np.append(kinks, np.nextafter(kinks[-1], np.inf))  # where it ends
+        times = np.union1d(t, kinks[kinks < t[-1]])
+    acceleration = excitation.acceleration(times)
+    steps = 0.5 * np.diff(times) * (acceleration[1:] + acceleration[:-1])
+    return np.asarray(np.concatenate([[0.0], np.cumsum(steps)])[np.searchsorted(times, t)])
 
 
 def _friction_power(motion: Motion) -> Floats:
@@ -404,9 +415,8 @@ def _friction_power(motion: Motion) -> Floats:
     flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(along)
     power = np.where(motion.within("slide"), flat, 0.0)
     tilted = motion.within("slide-rock", "ladder")
-    if tilted.any():
-        _, forces = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
-        power[tilted] = forces.friction * along[tilted]
+    forces, _ = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
+    power[tilted] = forces[1] * along[tilted]
     return power
 
 
@@ -422,16 +432,11 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     ends = [one.quiet_after for one in bases if isinstance(one, Ricker | Sine)]
     near = 1e-9 * scene.output_step
 
-    def without(times: list[float], margin: float) -> Mask:
-        """Groups, widened by `margin` on both sides, in which none of the times lies."""
-        places = np.sort(np.array([*times, math.inf]))
-        first, last = edges[:-1] - margin, edges[1:] + margin
-        return np.asarray(np.searchsorted(places, first) == np.searchsorted(places, last))
-
     # An event at an edge itself: the row there is from before or after it. The base acceleration
     # jumps where a record ends.
-    whole = without([*events, *kinks, *ends], -near)
-    whole &= without([*events, *(one.quiet_after for one in records)], 1e3 * near)
+    whole = _free([*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near)
+    jumps = [one.quiet_after for one in records]
+    whole &= _free([*events, *jumps], edges[:-1] - 1e3 * near, edges[1:] + 1e3 * near)
     nodes = mode[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
@@ -449,8 +454,9 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
     ours, theirs = ((len(one.channels["t"]), len(one.event_list)) for one in (history, image))
     if ours != theirs:
         return math.inf
-    mirrored = {name: image.channels[name] for name in EVEN}
-    mirrored |= {name: -image.channels[name] for name in ODD}
+    mirrored = {name: image.channels[name] for name in ("t", "y", "y_dot", "mode")}
+    odd = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
+    mirrored |= {name: -image.channels[name] for name in odd}
     differ = [np.sum(motion.channels[name] != values) for name, values in mirrored.items()]
     differ += [
         replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
@@ -505,8 +511,8 @@ class _Horizon:
             self.failure = f"{self.failure}; {error}".strip("; ")
             return math.inf
         difference = _differences(history, other)
-        rows = {len(difference), len(history.channels["t"]), len(other.channels["t"])}
-        whole = len(rows) == 1 and not np.any(difference > SEEN)
+        ended = len(history.channels["t"]) == len(other.channels["t"])
+        whole = ended and not np.any(difference > SEEN)
         return float(np.max(difference if whole else difference[: self.row], initial=0.0))
 
     @cached_property
@@ -540,12 +546,9 @@ def _amplified(motion: Motion) -> Floats:
     theta, slip, step = motion.channels["theta"], motion.slip, 1e-4
     slides = motion.within("slide-rock") & (theta != 0.0) & (np.abs(slip) > SLIPS)
     rate = np.zeros(len(theta))
-    if slides.any():
-        turns = []
-        for change in (step, -step):
-            at, forces = motion.forces(slides, np.sign(motion.sign * slip), faster=change)
-            turns.append(at.spin * (at.pivot[1] * forces.friction - at.pivot[0] * forces.normal))
-        rate[slides] = (turns[0] - turns[1]) / (2.0 * step)
+    direction = np.sign(motion.sign * slip)
+    faster, slower = (motion.forces(slides, direction, faster=by)[1] for by in (step, -step))
+    rate[slides] = (faster - slower) / (2.0 * step)
     grown, times = np.zeros(len(theta)), np.diff(motion.channels["t"]) / motion.unit
     for k in np.flatnonzero(slides[1:]).tolist():
         grown[k + 1] = max(0.0, grown[k] + 0.5 * (rate[k] + rate[k + 1]) * times[k])
@@ -559,8 +562,7 @@ def _differences(a: History, b: History) -> Floats:
 
 def _agree(a: History, b: History, seen: float) -> int:
     """Number of rows, from the first on, in which theta differs by no more than `seen`, rad."""
-    apart = _differences(a, b) > seen
-    return int(np.argmax(apart)) if apart.any() else len(apart)
+    return int(np.argmax(np.append(_differences(a, b) > seen, True)))
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
@@ -572,10 +574,8 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
             1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0))
         )
 
-    def stronger(excitation: Rest | Ricker | Sine | Record) -> Rest | Ricker | Sine | Record:
-        return excitation if excitation.kind == "rest" else excitation.scaled(by(1.0))
-
     block, floor = scene.block, scene.floor
+    bases = {"excitation": scene.excitation, "vertical": scene.vertical}
     for _ in range(DISTURBED):
         kinetic = by(floor.friction)
         static = None if floor.static_friction is None else max(by(floor.static_friction), kinetic)
@@ -594,8 +594,10 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
                     wall.replace(gap=by(wall.gap), restitution=min(by(wall.restitution), 1.0))
                     for wall in scene.walls
                 ),
-                "excitation": stronger(scene.excitation),
-                "vertical": stronger(scene.vertical),
+                **{
+                    name: base if base.kind == "rest" else base.scaled(by(1.0))
+                    for name, base in bases.items()
+                },
                 **{
                     name: by(getattr(scene, name))
                     for name in ("initial_angular_velocity", "initial_velocity", "initial_height")

@@ -3,7 +3,7 @@
 It is solved by other means than in `ebm`. Natural units: lengths in R, accelerations in g, unit
 mass; xi and y are those of the mass's centre. As in `ebm.core.motion`, a tilted block is seen in
 the frame of its pivot, which is then the lower-left corner: with S = sign theta and phi = |theta|,
-that corner is s to the left of the mass's centre and c below it (`Arms`). The top corner is s' to
+that corner is s to the left of the mass's centre and c below it. The top corner is s' to
 the left and c' above, the lifted bottom corner s' to the right and c' below. Four contact forces
 can act: P and Q of the floor on the pivot, N of the wall that the top corner touches, M of the wall
 that the lifted bottom corner touches. The gap of each contact, its row J (xi, y, phi) and the part
@@ -16,9 +16,6 @@ of its acceleration that the velocities alone give:
 """
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,59 +28,35 @@ Mask = NDArray[np.bool_]
 CLOSED, SLIPS = 1e-8, 1e-9
 
 
-@dataclass(frozen=True)
-class Forces:
-    """Contact forces per unit weight, one value a row; zero where there is no contact."""
+def tilted_forces(
+    block: Block,
+    tilt: tuple[Floats, Floats],
+    mu: float,
+    w: Floats,
+    felt: tuple[Floats, Floats],
+    touching: tuple[Mask, Mask, Mask],
+    slip: NDArray[np.int8],
+) -> tuple[Floats, Floats]:
+    """Forces P, Q, N, M of a tilted block per unit weight (4, ...), and what P and Q turn it by.
 
-    normal: Floats
-    friction: Floats
-    tip: Floats
-    far: Floats
-
-
-@dataclass(frozen=True)
-class Arms:
-    """Where three corners are from the mass's centre, one value a row, and 1/I."""
-
-    pivot: tuple[Floats, Floats]
-    tip: tuple[Floats, Floats]
-    far: tuple[Floats, Floats]
-    spin: float
-
-
-def arms(block: Block, sign: Floats, phi: Floats) -> Arms:
-    """The arms of a block whose rotation has the sign `sign` and the size `phi`."""
-    unit, left, right = block.radius, block.pivot("left"), block.pivot("right")
+    The second is the part of phi's acceleration that the floor's forces give. `tilt`: sign and size
+    of the rotation; `w`: its rate; `felt`: base acceleration and gravity felt; all but the sign in
+    the pivot's frame. `touching`: pivot on the floor, top corner on its wall, bottom corner on its
+    wall; no force where there is no contact. `slip`: direction in which the pivot slips, 0 where it
+    sticks. A slipping pivot has Q = -mu d |P|: where P would pull, the sign of its friction turns
+    with it. Near Painleve's limit both signs of P can solve this; it is then the pull that is
+    returned where only with it the walls push.
+    """
+    (sign, phi), unit = tilt, block.radius
+    left, right = block.pivot("left"), block.pivot("right")
     near = np.where(sign > 0.0, left.arm, right.arm) / unit
     other = (left.arm + right.arm) / unit - near
     low, top = left.height / unit, (2.0 * block.half_height - left.height) / unit
     sine, cosine = np.sin(phi), np.cos(phi)
-    return Arms(
-        pivot=(near * cosine - low * sine, near * sine + low * cosine),
-        tip=(near * cosine + top * sine, top * cosine - near * sine),
-        far=(other * cosine + low * sine, low * cosine - other * sine),
-        spin=unit**2 / block.gyration_squared,
-    )
-
-
-def tilted_forces(
-    at: Arms,
-    mu: float,
-    w: Floats,
-    u: Floats,
-    g: Floats,
-    touching: tuple[Mask, Mask, Mask],
-    slip: NDArray[np.int8],
-) -> Forces:
-    """Forces of a tilted block.
-
-    `w`: rate of rotation; `u`, `g`: base acceleration and gravity felt, all in the pivot's frame.
-    `touching`: pivot on the floor, top corner on its wall, bottom corner on its wall. `slip`:
-    direction in which the pivot slips, 0 where it sticks. A slipping pivot has Q = -mu d |P|: where
-    P would pull, the sign of its friction turns with it. Near Painleve's limit both signs of P can
-    solve this; it is then the pull that is returned where only with it the walls push.
-    """
-    (s, c), (tip_s, tip_c), (far_s, far_c) = at.pivot, at.tip, at.far
+    s, c = near * cosine - low * sine, near * sine + low * cosine
+    tip_s, tip_c = near * cosine + top * sine, top * cosine - near * sine
+    far_s, far_c = other * cosine + low * sine, low * cosine - other * sine
+    spin = unit**2 / block.gyration_squared
     zero, one = np.zeros_like(w), np.ones_like(w)
     jacobian = (zero, one, -s), (one, zero, c), (one, zero, -tip_c), (-one, zero, -far_c)
     rows = np.stack([np.stack(row, axis=1) for row in jacobian], axis=1)
@@ -91,25 +64,22 @@ def tilted_forces(
     floor, tip, far = touching
     closed = np.stack([floor, floor & (slip == 0), tip, far], axis=1)
     # J M^-1 J^T lambda = -(J a0 + bias), with an open contact's row replaced by "no force".
-    inverse_mass = np.array([1.0, 1.0, at.spin])
-    matrix = np.einsum("nik,k,njk->nij", rows, inverse_mass, rows)
-    free = np.stack([-u, -g, zero], axis=1)
-    right = -(np.einsum("nik,nk->ni", rows, free) + bias)
+    matrix = np.einsum("nik,k,njk->nij", rows, np.array([1.0, 1.0, spin]), rows)
+    free = np.stack([-felt[0], -felt[1], zero], axis=1)
+    given = np.where(closed, -(np.einsum("nik,nk->ni", rows, free) + bias), 0.0)
     matrix = np.where(closed[:, :, None], matrix, np.eye(4))
-    right = np.where(closed, right, 0.0)
     slipping = floor & (slip != 0)
     matrix[slipping, 1, 0] = mu * slip[slipping]
-    forces = _solved(matrix, right)
+    forces = _solved(matrix, given)
     asked = slipping & ((forces[:, 0] < 0.0) | (forces[:, 2:].min(axis=1) < 0.0))
-    if asked.any():
-        matrix[asked, 1, 0] *= -1.0
-        other = forces.copy()
-        other[asked] = _solved(matrix[asked], right[asked])
-        pulls = asked & (
-            (forces[:, 0] < 0.0) | ((other[:, 0] < 0.0) & (other[:, 2:].min(axis=1) >= 0.0))
-        )
-        forces[pulls] = other[pulls]
-    return Forces(*forces.T)
+    matrix[asked, 1, 0] *= -1.0
+    other_sign = forces.copy()
+    other_sign[asked] = _solved(matrix[asked], given[asked])
+    pulls = asked & (
+        (forces[:, 0] < 0.0) | ((other_sign[:, 0] < 0.0) & (other_sign[:, 2:].min(axis=1) >= 0.0))
+    )
+    forces[pulls] = other_sign[pulls]
+    return forces.T, spin * (c * forces[:, 1] - s * forces[:, 0])
 
 
 def _solved(matrix: Floats, right: Floats) -> Floats:
@@ -147,44 +117,55 @@ def integrals(step: float, values: Floats, rule: Floats = NEWTON_COTES) -> Float
 
 def not_finite(history: History) -> float:
     """The number of values that are not finite."""
-    columns = (one for one in history.channels.values() if one.dtype.kind == "f")
-    return float(sum(np.sum(~np.isfinite(column)) for column in columns))
+    return float(
+        sum(
+            np.sum(~np.isfinite(column))
+            for column in history.channels.values()
+            if column.dtype.kind == "f"
+        )
+    )
 
 
-class Motion(NamedTuple):
-    """A history as the invariants see it, one value a row, in natural units.
+class Motion:
+    """A history of finite values as the invariants see it, one value a row, in natural units.
 
     Only `channels`, those of the history, keep its units. `radius` (m) and `unit` (s) are the units
     of length and time. `u` and `vertical` accelerate the base; `w` is the rate of rotation, `slip`
     that of slip. `sign` is the sign of theta in each row; where theta is zero, the sign in the next
     row, as a block that is about to tilt has its pivot already. `energy` (J/kg) is kinetic plus
     potential; the mass's centre moves at `across` and `up`, m/s. `height` is the lowest corner's
-    over the floor, `gaps` are those to the walls. `tip` tells where the top corner touches the wall
-    it tips to, `far` where the lifted bottom corner touches the other.
+    over the floor, `gaps` are those to the walls, `deepest` is how deep a corner is in either.
+    `tip` tells where the top corner touches the wall it tips to, `far` where the lifted bottom
+    corner touches the other.
     """
 
-    scene: Scene
-    history: History
-    channels: Mapping[str, Any]
-    radius: float
-    unit: float
-    u: Floats
-    vertical: Floats
-    w: Floats
-    slip: Floats
-    sign: Floats
-    energy: Floats
-    across: Floats
-    up: Floats
-    height: Floats
-    gaps: dict[str, Floats]
-    tip: Mask
-    far: Mask
-
-    @property
-    def deepest(self) -> float:
-        """How deep a corner is in floor or wall at most, R."""
-        return max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
+    def __init__(self, scene: Scene, history: History) -> None:
+        block, gravity, channels = scene.block, scene.gravity, history.channels
+        t, theta = channels["t"], channels["theta"]
+        self.scene, self.history, self.channels = scene, history, channels
+        self.radius = block.radius
+        self.unit = math.sqrt(block.radius / gravity)
+        self.u: Floats = scene.excitation.acceleration(t) / gravity
+        self.vertical: Floats = scene.vertical.acceleration(t) / gravity
+        self.w: Floats = channels["theta_dot"] * self.unit
+        self.slip: Floats = channels["slip_rate"] * self.unit / self.radius
+        sign = np.sign(theta)
+        standing = np.flatnonzero(sign[:-1] == 0.0)
+        sign[standing] = sign[standing + 1]
+        self.sign = np.where(sign < 0.0, -1.0, 1.0)
+        state = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
+        self.energy: Floats = kinematics.energy(block, gravity, *state)
+        self.across, self.up = kinematics.mass_motion(block, *state)[1:]
+        self.height: Floats = kinematics.pivot_height(block, channels["y"], theta) / self.radius
+        self.gaps: dict[str, Floats] = {
+            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / self.radius
+            for wall in scene.walls
+        }
+        self.deepest = max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
+        nowhere = np.full(len(t), np.inf)
+        left, right = (self.gaps.get(side, nowhere) < CLOSED for side in ("left", "right"))
+        self.tip = np.where(sign < 0.0, right, left)
+        self.far = np.where(sign < 0.0, left, right)
 
     def within(self, *modes: str) -> Mask:
         """The rows in these modes of motion."""
@@ -192,58 +173,21 @@ class Motion(NamedTuple):
 
     def forces(
         self, rows: Mask, slip: Floats, *, later: float = 0.0, faster: float = 0.0
-    ) -> tuple[Arms, Forces]:
-        """The arms and forces in these rows, in which the block is tilted.
+    ) -> tuple[Floats, Floats]:
+        """What `tilted_forces` says of these rows, in which the block is tilted.
 
-        `slip` is as in `tilted_forces`. The block is turned on by its rate for the time `later`;
-        for the forces, `faster` is added to the rate.
+        `slip` is as there. The block is turned on by its rate for the time `later`; for the forces,
+        `faster` is added to the rate.
         """
         sign, walls, on = self.sign, self.within("lean", "ladder"), np.ones(int(rows.sum()), bool)
         w = (sign * self.w)[rows]
-        at = arms(self.scene.block, sign[rows], np.abs(self.channels["theta"])[rows] + later * w)
         tip, far = ((contact & walls)[rows] for contact in (self.tip, self.far))
-        felt = (sign * self.u)[rows], (1.0 + self.vertical)[rows]
-        friction, direction = self.scene.floor.friction, slip[rows].astype(np.int8)
-        return at, tilted_forces(at, friction, w + faster, *felt, (on, tip, far), direction)
-
-
-def motion_of(scene: Scene, history: History) -> Motion:
-    """The `Motion` of a history whose values are finite."""
-    channels, block, radius, gravity = (
-        history.channels,
-        scene.block,
-        scene.block.radius,
-        scene.gravity,
-    )
-    unit, t, theta = math.sqrt(radius / gravity), channels["t"], channels["theta"]
-    state = [channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
-    sign = np.sign(theta)
-    standing = np.flatnonzero(sign[:-1] == 0.0)
-    sign[standing] = sign[standing + 1]
-    sign = np.where(sign < 0.0, -1.0, 1.0)
-    gaps: dict[str, Floats] = {
-        wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / radius
-        for wall in scene.walls
-    }
-    nowhere = np.full(len(t), np.inf)
-    left, right = (gaps.get(side, nowhere) < CLOSED for side in ("left", "right"))
-    _, across, up = kinematics.mass_motion(block, *state)
-    return Motion(
-        scene=scene,
-        history=history,
-        channels=channels,
-        radius=radius,
-        unit=unit,
-        u=scene.excitation.acceleration(t) / gravity,
-        vertical=scene.vertical.acceleration(t) / gravity,
-        w=channels["theta_dot"] * unit,
-        slip=channels["slip_rate"] * unit / radius,
-        sign=sign,
-        energy=np.asarray(kinematics.energy(block, gravity, *state)),
-        across=np.asarray(across),
-        up=np.asarray(up),
-        height=np.asarray(kinematics.pivot_height(block, channels["y"], theta) / radius),
-        gaps=gaps,
-        tip=np.where(sign > 0, left, right),
-        far=np.where(sign > 0, right, left),
-    )
+        return tilted_forces(
+            self.scene.block,
+            (sign[rows], np.abs(self.channels["theta"])[rows] + later * w),
+            self.scene.floor.friction,
+            w + faster,
+            ((sign * self.u)[rows], (1.0 + self.vertical)[rows]),
+            (on, tip, far),
+            slip[rows].astype(np.int8),
+        )

@@ -1,4 +1,4 @@
-"""Runs of one model under stress: chunks, totals, and smaller scenes that still fail.
+"""One model under stress: its settings and scenes, runs, totals, smaller scenes that still fail.
 
 To find these, parts are dropped, shortened or rounded as long as the failure stays.
 """
@@ -9,19 +9,224 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
 import tomlkit
 
-from rockcheck.scenes import InputError, Scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.model import ImpactLaw
+from rockcheck.scenes import InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
-from rockcheck.validation.studies.stress.players import PLAYERS
+from rockcheck.validation.execute.models import build
+from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
+from rockcheck.validation.studies.stress.invariants import (
+    INVARIANTS,
+    CheckedRun,
+    check_run,
+    energy_without_source,
+)
+from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.study import Task
 
-Shows = Callable[[Scene], bool]
+#: Caps of an event-based run: the Zeno rule ends endless bouncing after some 1e5 impacts, each of
+#: up to 18 steps with Bouc-Wen.
+MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
+#: One run in this many is audited: sampled so finely that its energy can be integrated.
+AUDIT = 10
+#: Penetration of the CM under the block's weight, R; longest run of it and of engines, sqrt(R/g).
+DEPTH, LONGEST = 1e-8, 5.0
+
+
+@dataclass(frozen=True)
+class Player:
+    """A model under stress: its label, which begins with the model's name, and what it plays.
+
+    `runs` is the number of scenes in a whole run, `quick` in a quick one.
+    """
+
+    label: str
+    runs: int
+    quick: int
+    words: str
+
+
+@dataclass(frozen=True)
+class EventBased(Player):
+    """A variant of the event-based model, for the kind of scenes that it can play.
+
+    A broken invariant fails the command. `exact` scenes are those at which rounding decides.
+    """
+
+    kind: Kind
+    impacts: ImpactLaw = "moreau"
+    exact: bool = False
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """Its scene of that number."""
+        return (exact_scene if self.exact else random_scene)(seed, number, self.kind)
+
+    def settings(self, scene: Scene, number: int) -> dict[str, Any]:
+        """The settings that the model is built with for this scene, besides those in its name.
+
+        Every other unilateral run has the energy cap, Bouc-Wen yields within R/1000.
+        """
+        every: dict[str, tuple[bool, Any]] = {
+            "friction": (self.kind == "no-slip", self.kind),
+            "impacts": (self.impacts != "moreau", self.impacts),
+            "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
+            "yield_displacement": (self.kind == "bouc-wen", 1e-3 * scene.block.radius),
+        }
+        return {key: value for key, (given, value) in every.items() if given}
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
+        settings: dict[str, Any] = {
+            "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
+            "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
+            "most_steps": MOST_STEPS,
+            "most_events": MOST_EVENTS,
+            **self.settings(scene, number),
+        }
+        audit = only in ("energy", "clearance") or (not only and number % AUDIT == 0)
+        return check_run(EventBasedModel(**settings), scene, seed=seed, audit=audit, only=only)
+
+
+@dataclass(frozen=True)
+class Approximate(Player):
+    """The continuous model or an engine.
+
+    It may sink no deeper than it states, and gain energy from the base only. Lengths and times of
+    its settings are in R and sqrt(R/g), so that they mean the same for every block.
+    """
+
+    step: float = 2e-3
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """The scene of that number, no longer than affordable, with a row a step.
+
+        Between two rows the base may do any work.
+        """
+        scene = random_scene(seed, number)
+        unit = math.sqrt(scene.block.radius / scene.gravity)
+        return scene.replace(
+            duration=min(scene.duration, LONGEST * unit), output_step=self.step * unit
+        )
+
+    def settings(self, scene: Scene, number: int) -> dict[str, Any]:
+        """The settings that the model is built with for this scene."""
+        radius = scene.block.radius
+        return (
+            {"penetration": DEPTH * radius}
+            if self.label == "cm"
+            else {"time_step": self.step * math.sqrt(radius / scene.gravity)}
+        )
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        """Checks the run's end, finite numbers, depth and energy.
+
+        If an engine breaks one of the last two, `failure` gives the figures with half the step.
+        """
+        played = self._check(scene, number)
+        broken = [name for name in played.broken if name in ("depth", "source")]
+        if broken and self.label != "cm":
+            finer = replace(self, step=0.5 * self.step)._check(
+                scene.replace(output_step=0.5 * scene.output_step), number
+            )
+            words = (
+                f"{name} {played.figures[name]:.2g}, with half the step"
+                f" {finer.figures.get(name, math.nan):.2g}"
+                for name in broken
+            )
+            return replace(played, failure="; ".join(words))
+        return played
+
+    def _check(self, scene: Scene, number: int) -> CheckedRun:
+        try:
+            history = build(self.label, self.settings(scene, number)).simulate(scene)
+        except (ModelFailure, InputError) as error:
+            return CheckedRun(figures={"ends": 1.0}, failure=str(error))
+        figures = {"ends": 0.0, "finite": not_finite(history)}
+        if not figures["finite"]:
+            motion = Motion(scene, history)
+            figures |= {"depth": self.depth(motion), "source": energy_without_source(motion)}
+        return CheckedRun(
+            figures=figures, outcome=history.outcome, counts={"events": len(history.event_list)}
+        )
+
+    def depth(self, motion: Motion) -> float:
+        """Deepest penetration over what the model states.
+
+        An engine states the distance moved in a step, the CM the deflection of its spring.
+        """
+        spin = float(np.max(np.abs(motion.channels["theta_dot"])))
+        ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
+        speed = ways * motion.unit / motion.radius + spin * motion.unit
+        bases = motion.scene.excitation, motion.scene.vertical
+        shaken = sum(np.max(np.abs(base.acceleration(motion.channels["t"]))) for base in bases)
+        level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
+        way = math.sqrt(DEPTH) if self.label == "cm" else self.step
+        stated = speed * way + level * way**2
+        return motion.deepest / (2.0 * stated + 1e-5)
+
+
+ROUNDING = "scenes at which rounding decides"
+_EVERY: tuple[EventBased | Approximate, ...] = (
+    EventBased("ebm", 100_000, 1000, "the paper's pivot, Coulomb friction", "bilateral"),
+    EventBased("ebm no-slip", 100_000, 500, "the paper's pivot, which never slips", "no-slip"),
+    EventBased(
+        "ebm-unilateral",
+        100_000,
+        1000,
+        "a floor that can only push; every other run with the energy cap",
+        "unilateral",
+    ),
+    EventBased(
+        "ebm-bouc-wen",
+        100_000,
+        300,
+        "regularised friction, which yields within R/1000",
+        "bouc-wen",
+    ),
+    EventBased(
+        "ebm-unilateral floor-first",
+        20_000,
+        200,
+        "one contact after another",
+        "unilateral",
+        "floor-first",
+    ),
+    EventBased(
+        "ebm-unilateral leading-first",
+        20_000,
+        100,
+        "lands flat on one corner",
+        "unilateral",
+        "leading-first",
+    ),
+    EventBased(
+        "ebm-unilateral trailing-first",
+        20_000,
+        100,
+        "on the other one",
+        "unilateral",
+        "trailing-first",
+    ),
+    EventBased("ebm exact", 20_000, 200, ROUNDING, "bilateral", exact=True),
+    EventBased("ebm no-slip exact", 20_000, 200, ROUNDING, "no-slip", exact=True),
+    EventBased("ebm-unilateral exact", 20_000, 200, ROUNDING, "unilateral", exact=True),
+    EventBased("ebm-bouc-wen exact", 5000, 50, ROUNDING, "bouc-wen", exact=True),
+    Approximate("cm", 2000, 40, "continuous model, standing 1e-8 R deep"),
+    *(
+        Approximate(engine.lower(), 2000, 40, f"{engine}, best settings, steps of 0.002 sqrt(R/g)")
+        for engine in ("MuJoCo", "PyBullet")
+    ),
+)
+PLAYERS = {player.label: player for player in _EVERY}
+
 Path = tuple[str | int, ...]
 #: Most scenes that are tried.
 MOST_TRIALS = 400
@@ -29,13 +234,11 @@ MOST_TRIALS = 400
 SHORT = 8
 #: What is dropped first, since a block that nothing moves is told soonest.
 FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
-#: Never dropped or rounded.
-KEPT = ("name", "output_step")
 
 
 def shrink(
     scene: Scene,
-    shows: Shows,
+    shows: Callable[[Scene], bool],
     *,
     trials: int = MOST_TRIALS,
     seconds: float = math.inf,
@@ -59,12 +262,10 @@ def shrink(
 def _simpler(scene: Scene) -> Iterator[Scene]:
     """The scene with one simplification each, the greatest first."""
     for tables in _changes(scene):
-        try:
+        with suppress(InputError):
             simpler = Scene(**tables)
-        except InputError:
-            continue
-        if simpler != scene:
-            yield simpler
+            if simpler != scene:
+                yield simpler
 
 
 def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
@@ -77,10 +278,11 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     yield from (_with(tables, path) for path, _ in places)
     unit = math.sqrt(scene.block.radius / scene.gravity)
-    for factor in (0.25, 0.5, 0.9):
-        if factor * scene.duration > 0.01 * unit:
-            shorter = {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
-            yield tables | shorter
+    yield from (
+        tables | {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
+        for factor in (0.25, 0.5, 0.9)
+        if factor * scene.duration > 0.01 * unit
+    )
     yield from (
         _with(tables, path, value[:count])
         for path, value in places
@@ -109,8 +311,8 @@ def _tables(scene: Scene) -> dict[str, Any]:
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if path:
         yield path, part
-    if isinstance(part, dict):
-        inner: list[tuple[Any, Any]] = [(key, part[key]) for key in part if key not in KEPT]
+    if isinstance(part, dict):  # name and step are never dropped or rounded
+        inner = [(key, part[key]) for key in part if key not in ("name", "output_step")]
     else:
         inner = list(enumerate(part)) if isinstance(part, list) and len(part) <= SHORT else []
     for key, value in inner:
@@ -134,19 +336,18 @@ def scene_text(scene: Scene, remarks: str) -> str:
 
     Samples stand in the file itself.
     """
-    tables = {
-        key: value for key, value in _tables(scene).items() if key != "name"
-    }  # the file's own
-    # Plain values come before tables.
-    ordered = sorted(tables.items(), key=lambda item: isinstance(item[1], dict | list))
+    # The name is the file's own. Plain values come before tables.
+    ordered = sorted(
+        ((key, value) for key, value in _tables(scene).items() if key != "name"),
+        key=lambda item: isinstance(item[1], dict | list),
+    )
     lines = "".join(f"# {line}\n" for line in remarks.splitlines())
     return lines + tomlkit.dumps(dict(ordered))
 
 
 #: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
 #: the time (s) that a task may take in addition.
-A_RUN, AN_APPROXIMATE_RUN, AMPLE = 0.2, 2.0, 50.0
-PATIENCE = 20.0
+A_RUN, AN_APPROXIMATE_RUN, AMPLE, PATIENCE = 0.2, 2.0, 50.0, 20.0
 #: Failures of a model and an invariant that are written as scenes.
 MOST_FILES = 20
 
@@ -174,11 +375,17 @@ class Broken:
 
     def text(self, scene: Scene, remark: str) -> str:
         """Its scene file with a scene that shows it."""
+        settings = PLAYERS[self.model].settings(scene, self.number)
+        model = "ebm:EventBasedModel" if "friction" in settings else self.model.split()[0]
+        options = [
+            f"--set {key}={value if isinstance(value, str) else repr(value).lower()}"
+            for key, value in settings.items()
+        ]
         words = (
             f"{self.invariant}: {INVARIANTS[self.invariant].words}",
             printable(self.words, 200),
             remark,
-            f"rockcheck simulate {self.name} {PLAYERS[self.model].command(scene, self.number)}",
+            " ".join([f"rockcheck simulate {self.name} --model {model}", *options]),
         )
         return scene_text(scene, "\n".join(filter(None, words)))
 
@@ -239,8 +446,11 @@ class RunTotals:
     def shown(self) -> list[Broken]:
         """The first runs that break each invariant: their scenes are written."""
         ordered = sorted(self.failures, key=lambda one: one.number)
-        broken = {name: [one for one in ordered if one.invariant == name] for name in INVARIANTS}
-        return [one for some in broken.values() for one in some[:MOST_FILES]]
+        return [
+            one
+            for name in INVARIANTS
+            for one in [one for one in ordered if one.invariant == name][:MOST_FILES]
+        ]
 
 
 @dataclass(frozen=True)
@@ -283,11 +493,7 @@ class Shrinking(Task):
     broken: Broken
     budget: float
     trials: int = MOST_TRIALS
-
-    @property
-    def label(self) -> str:
-        """For progress."""
-        return "smallest scenes"
+    label = "smallest scenes"
 
     def play(self) -> str:
         """The file of the smallest scene that was found in time."""
@@ -320,7 +526,7 @@ def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
 
     Its time limit is far more than it takes, and short enough for a hang to be found soon.
     """
-    a_run = A_RUN if PLAYERS[model].event_based else AN_APPROXIMATE_RUN
+    a_run = A_RUN if isinstance(PLAYERS[model], EventBased) else AN_APPROXIMATE_RUN
     return Chunk(
         model,
         seed,
@@ -336,8 +542,10 @@ def parts(task: Task) -> Sequence[Task]:
     """Smaller tasks in place of one whose process hangs or dies."""
     if isinstance(task, Chunk) and task.count > 1:
         half = task.count // 2
-        later = chunk(task.model, task.seed, task.first + half, task.count - half)
-        return [chunk(task.model, task.seed, task.first, half), later]
+        return [
+            chunk(task.model, task.seed, task.first, half),
+            chunk(task.model, task.seed, task.first + half, task.count - half),
+        ]
     if isinstance(task, Shrinking) and task.trials > 1:
         return [replace(task, trials=task.trials // 4)]
     return []

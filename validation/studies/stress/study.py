@@ -32,13 +32,18 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, table_of, text
-from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
-from rockcheck.validation.studies.stress.mechanics import motion_of, not_finite
-from rockcheck.validation.studies.stress.players import PLAYERS, energy_without_source
+from rockcheck.validation.studies.stress.invariants import (
+    INVARIANTS,
+    CheckedRun,
+    energy_without_source,
+)
+from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
+    PLAYERS,
     Broken,
     Chunk,
+    EventBased,
     RunTotals,
     Shrinking,
     chunk,
@@ -47,20 +52,13 @@ from rockcheck.validation.studies.stress.runs import (
 from rockcheck.validation.study import Study, Task
 
 SLOPE = math.tan(0.25)
-#: Values along each axis; all else is the paper's block beside a wall: R in m, friction,
-#: restitution of the wall, a_p/(g tan alpha).
-AXES: dict[str, tuple[float, ...]] = {
-    "size": (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0),
-    "friction": (0.0, 0.1, 0.3, 0.6, 0.9, 1.2),
-    "restitution": (0.0, 0.25, 0.5, 0.75, 0.95),
-    "shaking": (0.5, 1.5, 3.0, 10.0, 30.0, 100.0),
-}
-USUAL: dict[str, float] = {"size": 1.6, "friction": 0.3, "restitution": 0.5, "shaking": 3.0}
-AXIS_WORDS: dict[str, str] = {
-    "size": "half diagonal R, m",
-    "friction": "friction of the floor",
-    "restitution": "restitution of the wall",
-    "shaking": "peak acceleration, g tan α",
+#: Axes: their words, the usual value, the values that are played; all else is the paper's block
+#: beside a wall. In m; 1; 1; g tan alpha.
+AXES: dict[str, tuple[str, float, tuple[float, ...]]] = {
+    "size": ("half diagonal R, m", 1.6, (1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0, 1000.0)),
+    "friction": ("friction of the floor", 0.3, (0.0, 0.1, 0.3, 0.6, 0.9, 1.2)),
+    "restitution": ("restitution of the wall", 0.5, (0.0, 0.25, 0.5, 0.75, 0.95)),
+    "shaking": ("peak acceleration, g tan α", 3.0, (0.5, 1.5, 3.0, 10.0, 30.0, 100.0)),
 }
 #: Steps that are tried, sqrt(R/g), coarse to fine; and the limits of a stable run: depth in R,
 #: energy without source.
@@ -72,8 +70,6 @@ ADAPTIVE_FINEST = 3e-3
 #: takes a millisecond), and in a quick run, s; and the step (s).
 HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
-#: Time limit of a place, s: far more than it needs.
-MOST_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
@@ -150,7 +146,7 @@ class Still:
 
 def scene_at(axis: str, value: float) -> Scene:
     """A block of the paper's shape beside a wall under a pulse, with one parameter changed."""
-    at = USUAL | {axis: value}
+    at = {name: usual for name, (_, usual, _) in AXES.items()} | {axis: value}
     radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
     own = 2.0 * math.pi * unit / math.sqrt(0.75)
     return Scene(
@@ -185,7 +181,7 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
         return printable(error, 60)
     if not_finite(history):
         return "blows up"
-    motion = motion_of(scene, history)
+    motion = Motion(scene, history)
     speed = float(np.max(np.hypot(motion.channels["x_dot"], motion.channels["y_dot"])))
     if (
         motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius
@@ -287,7 +283,8 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
         for label, setup in SETUPS.items()
         if not not_installed(setup.family) and (not wanted or setup.family in wanted)
     ]
-    how: dict[str, Any] = {"seconds": MOST_SECONDS, "expected": 0.5 if quick else 4.0}
+    # A place takes far less than its time limit.
+    how: dict[str, Any] = {"seconds": 600.0, "expected": 0.5 if quick else 4.0}
     still = [
         Place(
             line,
@@ -299,7 +296,7 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
     ]
     values = [
         (axis, one)
-        for axis, some in AXES.items()
+        for axis, (_, _, some) in AXES.items()
         for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)
     ]
     return still + [
@@ -336,13 +333,19 @@ class Stress(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """Chunks and places; smaller tasks for those that are lost; then failures are shrunk."""
         lost = [task for task, one in done.items() if isinstance(one, Failure)]
-        work: list[Task] = [*self._chunks(), *(self._places() if self.what != "runs" else ())]
+        work: list[Task] = [*self._chunks()]
+        if self.what != "runs":
+            work += places(self.quick, self.models)
         work += [part for task in lost for part in parts(task)]
         if any(task not in done for task in work):
             return work
         gone = {(one.model, one.first) for one in lost if isinstance(one, Chunk) and one.count == 1}
-        found = [one for totals in self._totals(done) for one in totals.shown]
-        small = [one for one in found if (one.model, one.number) not in gone]
+        small = [
+            one
+            for totals in self._totals(done)
+            for one in totals.shown
+            if (one.model, one.number) not in gone
+        ]
         share = min(ONE_FAILURE, 1.0 / max(1, len(small)))
         budget = share * (SHRINKING_QUICK if self.quick else SHRINKING)
         return work + [
@@ -352,23 +355,17 @@ class Stress(Study):
             for one in small
         ]
 
-    def _chunks(self) -> list[Chunk]:
+    def _chunks(self) -> Iterator[Chunk]:
         """The runs, the slowest models first, so that all cores end together."""
-        found = []
         every = [label for label in PLAYERS if not not_installed(label.split()[0])]
-        for label in () if self.what == "maps" else self.models or every:
+        labels = () if self.what == "maps" else self.models or every
+        for label in sorted(labels, key=lambda label: isinstance(PLAYERS[label], EventBased)):
             player = PLAYERS[label]
             count = self.runs or (player.quick if self.quick else player.runs)
-            most = CHUNK if player.event_based else APPROXIMATE_CHUNK
+            most = CHUNK if isinstance(player, EventBased) else APPROXIMATE_CHUNK
             most = max(10, min(most, count // 4)) if self.quick else most
-            found += [
-                chunk(label, self.seed, first, min(most, count - first))
-                for first in range(0, count, most)
-            ]
-        return sorted(found, key=lambda one: PLAYERS[one.model].event_based)
-
-    def _places(self) -> list[Place]:
-        return places(self.quick, self.models)
+            for first in range(0, count, most):
+                yield chunk(label, self.seed, first, min(most, count - first))
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """Totals of the models; a run whose process was lost counts as one that does not end."""
@@ -385,21 +382,20 @@ class Stress(Study):
         """The tables, the maps, and the scenes of failures."""
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
-        at = [done[place] for place in self._places() if place in done]
+        at = list(map(done.get, places(self.quick, self.models)))
         stable = [one for one in at if isinstance(one, Stable)]
         still = [one for one in at if isinstance(one, Still)]
-        runs = sum(one.counts["runs"] for one in totals)
-        broken = sum(len(one.failures) for one in totals if PLAYERS[one.model].event_based)
+        ours = [one for one in totals if isinstance(PLAYERS[one.model], EventBased)]
+        broken = sum(len(one.failures) for one in ours)
         said = f"failures of event-based models: {broken}"
         return Finding(
             self.name,
             "Stress: random scenes against what must always hold",
-            f"seed {self.seed}: {runs:,} runs,"
+            f"seed {self.seed}: {sum(one.counts['runs'] for one in totals):,} runs,"
             f" {said if broken else 'no failure of an event-based model'}",
             [
                 *(_runs(totals) if totals else ()),
-                *(_maps(stable, self.quick) if stable else ()),
-                *([_stood(still)] if still else ()),
+                *_maps(stable, still, self.quick),
             ],
             data={
                 "seed": self.seed,
@@ -531,32 +527,53 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     ]
 
 
-def _maps(found: Sequence[Stable], quick: bool) -> list[Plot | Table]:
-    steps = QUICK_STEPS if quick else STEPS
-    adaptive = min(one for one in steps if one >= ADAPTIVE_FINEST)
-    lines = list(dict.fromkeys(one.line for one in found))
-    drawn = [
-        _by_axis(axis, lines, [one for one in found if one.axis == axis]) for axis in AXIS_WORDS
-    ]
-    plot = Plot(
-        "stable-steps",
-        "Where engines and the continuous model break: largest stable step, √(R/g)",
-        "stable-steps",
-        data={"tried": STEPS, "models": lines, "panels": [panel for panel, _ in drawn]},
-        note="All finer steps that were tried are stable, too. The paper's shape of block beside a"
-        " wall, R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of 3 g tan α, one thing"
-        " changed. A run is stable if it does not blow up, no corner sinks deeper than 0.02 R and"
-        " the distance of a step, and the energy gained without a source is below a tenth of all"
-        f" work. “none”: not even the finest step is stable ({steps[-1]:g}, with adaptive steps"
-        f" {adaptive:g}).",
-    )
-    return [plot, *(table for _, table in drawn), table_of("stable-steps", Stable, found)]
+def _maps(stable: Sequence[Stable], still: Sequence[Still], quick: bool) -> Iterator[Plot | Table]:
+    if stable:
+        steps = QUICK_STEPS if quick else STEPS
+        adaptive = min(one for one in steps if one >= ADAPTIVE_FINEST)
+        lines = list(dict.fromkeys(one.line for one in stable))
+        drawn = [_by_axis(axis, lines, stable) for axis in AXES]
+        yield Plot(
+            "stable-steps",
+            "Where engines and the continuous model break: largest stable step, √(R/g)",
+            "stable-steps",
+            data={"tried": STEPS, "models": lines, "panels": [panel for panel, _ in drawn]},
+            note="All finer steps that were tried are stable, too. The paper's shape of block"
+            " beside a wall, R 1.6 m, friction 0.3, restitution of the wall 0.5, pulse of"
+            " 3 g tan α, one thing changed. A run is stable if it does not blow up, no corner sinks"
+            " deeper than 0.02 R and the distance of a step, and the energy gained without a source"
+            " is below a tenth of all work. “none”: not even the finest step is stable"
+            f" ({steps[-1]:g}, with adaptive steps {adaptive:g}).",
+        )
+        yield from (table for _, table in drawn)
+        yield table_of("stable-steps", Stable, stable)
+    if still:
+        yield Table(
+            "stand-still",
+            [
+                text("case", "block"),
+                text("line", "model"),
+                Column("simulated", "for", "s", digits=4),
+                Column("step", unit="s", digits=2, brief=False),
+                *(Column(name, unit=unit, digits=1) for name, unit in MOVES.items()),
+                text("fault", " ", brief=False),
+            ],
+            [
+                [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]
+                for one in still
+            ],
+            "What should stand still",
+            "The paper's block on friction 0.3: left alone, pushed by half of what would move it,"
+            " or shaken at 1 Hz by 0.8 of it; the largest of each in the run, jitter the RMS speed"
+            " of its second half. A perfect model has zero everywhere.",
+        )
 
 
 def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[list[Any], Table]:
-    of = {(one.line, one.value): one for one in found}
-    values = list(dict.fromkeys(one.value for one in found))
+    of = {(one.line, one.value): one for one in found if one.axis == axis}
+    values = list(dict.fromkeys(value for _, value in of))
     rows = [[of.get((line, value)) for value in values] for line in lines]
+    words, _, _ = AXES[axis]
     table = Table(
         f"steps-{axis}",
         [text("line", "model"), *(text(f"{value:g}") for value in values)],
@@ -564,29 +581,7 @@ def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[
             [line, *(one and f"{one.step:g} {one.fault}".strip() for one in row)]
             for line, row in zip(lines, rows, strict=True)
         ],
-        f"Largest stable step, √(R/g), by {AXIS_WORDS[axis]}",
+        f"Largest stable step, √(R/g), by {words}",
         folded=True,
     )
-    return [AXIS_WORDS[axis], values, [[one and one.step for one in row] for row in rows]], table
-
-
-def _stood(found: Sequence[Still]) -> Table:
-    return Table(
-        "stand-still",
-        [
-            text("case", "block"),
-            text("line", "model"),
-            Column("simulated", "for", "s", digits=4),
-            Column("step", unit="s", digits=2, brief=False),
-            *(Column(name, unit=unit, digits=1) for name, unit in MOVES.items()),
-            text("fault", " ", brief=False),
-        ],
-        [
-            [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]
-            for one in found
-        ],
-        "What should stand still",
-        "The paper's block on friction 0.3: left alone, pushed by half of what would move it, or"
-        " shaken at 1 Hz by 0.8 of it; the largest of each in the run, jitter the RMS speed of its"
-        " second half. A perfect model has zero everywhere.",
-    )
+    return [words, values, [[one and one.step for one in row] for row in rows]], table
