@@ -11,17 +11,15 @@ the number of its line.
 
 import base64
 import math
-import re
 import zlib
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from rockcheck.reports.show.words import number
-from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, figure_style, save
+from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, figure_style
 from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import IMPACTS, WindowedHistory
@@ -135,22 +133,6 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
     return figure
 
 
-def write_figures(view: SceneView, folder: Path) -> None:
-    """Write the figures of a scene into `folder`.
-
-    A thumbnail of all rotations, and where the run asks for them those for a paper, one a
-    reference.
-    """
-    curves = [
-        (view.t, view.drawn[model]["theta"], look)
-        for model, look in view.looks.items()
-        if model in view.values
-    ]
-    save(thumbnail(curves), folder / f"{view.slug}-small", ["svg"])
-    for against in view.figure_references if view.printed else ():
-        save(histories_figure(view, against), folder / figure_stem(view, against))
-
-
 def packed_lines(lines: Sequence[ArrayLike]) -> str:
     """Lines of values as base64 of a deflated stream.
 
@@ -238,13 +220,6 @@ def summary(view: SceneView) -> str:
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
-
-
-def figure_stem(view: SceneView, against: str | None) -> str:
-    """File name, without its suffix, of the figure whose differences are from `against`."""
-    if against is None or against == view.figure_references[0]:
-        return view.slug
-    return f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", against)
 
 
 def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:

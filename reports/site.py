@@ -16,12 +16,10 @@ from rockcheck.reports.document import FIGURES, PAGES, csv, row_cells, write_ass
 from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
-    figure_stem,
     histories_figure,
     payload,
     summary,
     thumbnail,
-    write_figures,
 )
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import looks, save, save_as, stamp_in, stamp_of
@@ -171,8 +169,26 @@ class _Pages:
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
-        """Write a scene's figures and data; returns what its page shows beside the view."""
-        write_figures(view, made(self.folder, PAGES, FIGURES))
+        """Write a scene's figures and data; returns what its page shows beside the view.
+
+        The figures are a thumbnail of all rotations, and where the run asks for them those for a
+        paper, one a reference.
+        """
+        figures = made(self.folder, PAGES, FIGURES)
+        curves = [
+            (view.t, view.drawn[model]["theta"], look)
+            for model, look in view.looks.items()
+            if model in view.values
+        ]
+        save(thumbnail(curves), figures / f"{view.slug}-small", ["svg"])
+        stems = {
+            against: f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", str(against))
+            if number
+            else view.slug
+            for number, against in enumerate(view.figure_references)
+        }
+        for against, stem in stems.items() if view.printed else ():
+            save(histories_figure(view, against), figures / stem)
         write_whole(
             made(self.folder, PAGES, "data") / f"{view.slug}.js",
             script_text("window.rockcheck", payload(view)),
@@ -187,7 +203,7 @@ class _Pages:
             "facts": scene_facts(view.scene),
             "beyond": experience.outside(view.scene),
             "summary": summary(view),
-            "figure_stem": figure_stem,
+            "stems": stems,
         }
 
     def _write_ensemble(self, view: EnsembleView) -> dict[str, Any]:

@@ -170,10 +170,9 @@ class SceneView(View):
 
         NaN outside them and where there is no such column.
         """
-        if name not in history.channels:
-            return np.full(len(self.t), math.nan)
         times = np.asarray(history.channels["t"], dtype=float)
-        values = np.asarray(history.channels[name], dtype=float)
+        unknown = np.full(len(times), math.nan)
+        values = np.asarray(history.channels.get(name, unknown), dtype=float)
         inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
         return np.where(inside, np.interp(self.t, times, values), math.nan)
 

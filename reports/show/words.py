@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from html import escape
-from itertools import takewhile
+from itertools import chain, repeat, takewhile
 
 import numpy as np
 
@@ -33,20 +33,21 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[object] = ()) -> str:
     """A small HTML table; all text is escaped. Without `head` the first column names the rows."""
-
-    def line(row: Sequence[object], first: str, other: str) -> str:
-        tags = [first, *[other] * (len(row) - 1)]
-        return "".join(
+    first = "td" if head else 'th scope="row"'
+    tagged = [
+        *((row, repeat('th scope="col"')) for row in [head] if row),
+        *((row, chain([first], repeat("td"))) for row in rows),
+    ]
+    lines = (
+        "".join(
             f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>'
-            for cell, tag in zip(row, tags, strict=True)
+            for cell, tag in zip(row, tags, strict=False)
         )
-
-    column, row_name = 'th scope="col"', 'th scope="row"'
-    lines = [line(head, column, column)] if head else []
-    lines += [line(row, "td" if head else row_name, "td") for row in rows]
+        for row, tags in tagged
+    )
     return (
         f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>'
-        f"{''.join(f'<tr>{one}</tr>' for one in lines)}</table>"
+        f"{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
     )
 
 
