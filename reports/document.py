@@ -8,19 +8,19 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
-from functools import cache
+from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
-from rockcheck.reports.drawers import figure_of, live_data, scripts_of, side_by_side
+from rockcheck.reports.drawers import figure_of, live_data, side_by_side
+from rockcheck.reports.show.spectrum import write_scripts
 from rockcheck.reports.show.words import (
     dash_array,
     duration,
@@ -55,30 +55,32 @@ from rockcheck.scenes.writing import (
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
-#: The sign of a verdict, beside its colour.
-SIGNS = {"pass": "✓", "changed": "△", "incomplete": "–", "fail": "✕", "error": "!", "": ""}
 #: The folder of a page's figures.
 FIGURES = "figures"
 #: The data of a figure, and limits of drawing it anew: s, and MB.
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
-#: The folder of the scenes that show a failure.
-FAILING = "failures"
-COLOURS = {
-    "pass": "green",
-    "changed": "yellow",
-    "incomplete": "yellow",
-    "fail": "red",
-    "error": "red",
+#: The tables of a finding in its run.json: their rows by the names of the columns.
+TABLES = TypeAdapter(dict[str, list[dict[str, Any]]])
+#: Of a verdict: its sign, and its colour on a terminal.
+VERDICTS = {
+    "": ("", ""),
+    "pass": ("✓", "green"),
+    "changed": ("△", "yellow"),
+    "incomplete": ("–", "yellow"),
+    "fail": ("✕", "red"),
+    "error": ("!", "red"),
 }
 
 
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
-    if isinstance(cell, Mark) and cell.digits:
-        column = replace(column, digits=cell.digits)
-    shown = _value(plain(cell), column, write)
-    sign = SIGNS[cell.verdict] if isinstance(cell, Mark) else ""
-    return f"{sign} {shown}".strip()
+    mark = _mark(cell)
+    column = replace(column, digits=mark.digits or column.digits)
+    return f"{VERDICTS[mark.verdict][0]} {_value(mark.value, column, write)}".strip()
+
+
+def _mark(cell: Any) -> Mark:
+    return cell if isinstance(cell, Mark) else Mark(cell)
 
 
 def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> str:
@@ -97,33 +99,17 @@ def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> st
 
 def _share(value: float, column: Column) -> str:
     if column.kind == "used" and value > 1.0:
-        return f"{_typed(value, 3)}×" if value < math.inf else "beyond"
+        return f"{value:.3g}×" if value < math.inf else "beyond"
     after = max(column.digits - 2, 0) if column.kind == "percent" else 0
     return f"{100.0 * value:.{after}f} %"
 
 
-def _typed(value: float, digits: int) -> str:
-    return f"{value:.{digits}g}"
-
-
-def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[dict[str, Any]]:
-    """The cells of a row for the page."""
-    return [_for_page(cell, column) for cell, column in zip(row, columns, strict=True)]
-
-
-def _for_page(cell: Any, column: Column) -> dict[str, Any]:
-    mark = cell if isinstance(cell, Mark) else Mark(cell)
-    numeric = column.kind not in ("text", "model")
-    return {
-        "words": words(cell, column),
-        "css": " ".join(filter(None, ["n" if numeric else column.kind, mark.verdict])),
-        "verdict": mark.verdict,
-        "tip": mark.words,
-        "link": mark.link,
-        "model": mark.value if column.kind == "model" else "",
-        "more": mark.more,
-        "used": mark.value if column.kind == "used" and mark.value is not None else None,
-    }
+def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[tuple[Mark, Column, str]]:
+    """The cells of a row for the page: each as a mark, its column, and its words."""
+    return [
+        (_mark(cell), column, words(cell, column))
+        for cell, column in zip(row, columns, strict=True)
+    ]
 
 
 def show(found: Finding, screen: Console) -> None:
@@ -135,7 +121,7 @@ def show(found: Finding, screen: Console) -> None:
                 screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
         elif isinstance(block, Text):
             for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
-                screen.print(line, style=COLOURS.get(block.verdict, ""), soft_wrap=True)
+                screen.print(line, style=VERDICTS[block.verdict][1], soft_wrap=True)
     for where, reason in found.failures.items():
         screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
     if not found.complete:
@@ -148,15 +134,15 @@ def _grid(table: Table) -> Grid:
     grid = Grid(box=None, pad_edge=False, title=table.title or None, title_justify="left")
     for column in table.columns:
         if column.brief:
-            left = column.kind in ("text", "model")
-            grid.add_column(column.head, justify="left" if left else "right", overflow="fold")
+            grid.add_column(
+                column.head,
+                justify="left" if column.kind in ("text", "model") else "right",
+                overflow="fold",
+            )
     for row in table.rows[: table.most]:
         grid.add_row(
             *(
-                Line(
-                    inert(words(cell, column, _typed)),
-                    COLOURS.get(cell.verdict, "") if isinstance(cell, Mark) else "",
-                )
+                Line(inert(words(cell, column, "{:.{}g}".format)), VERDICTS[_mark(cell).verdict][1])
                 for cell, column in zip(row, table.columns, strict=True)
                 if column.brief
             )
@@ -166,8 +152,10 @@ def _grid(table: Table) -> Grid:
 
 def csv(table: Table) -> str:
     """A table as CSV with all digits."""
-    heads = [column.name for column in table.columns]
-    return table_text(heads, ([plain(cell) for cell in row] for row in table.rows))
+    return table_text(
+        [column.name for column in table.columns],
+        ([plain(cell) for cell in row] for row in table.rows),
+    )
 
 
 def markdown(found: Finding) -> str:
@@ -185,8 +173,8 @@ def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
-        facts = "\n".join(f"- {name}: {value}" for name, value in block.facts)
-        parts = [block.text, facts, "\n".join(f"- {item}" for item in block.items)]
+        lists = ([f"{name}: {value}" for name, value in block.facts], block.items)
+        parts = [block.text, *("\n".join(f"- {item}" for item in items) for items in lists)]
         return title + "\n\n".join(filter(None, parts))
     if isinstance(block, Plot) or block.on == "file":
         return ""
@@ -195,8 +183,8 @@ def block_markdown(block: Table | Plot | Text) -> str:
         [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
         for row in block.rows
     )
-    table = markdown_table([column.head for column in block.columns], rows)
-    return title + table + (f"\n\n{block.note}" if block.note else "")
+    note = f"\n\n{block.note}" if block.note else ""
+    return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
 def _draw(plot: Plot, stem: Path, stamp: str) -> None:
@@ -230,26 +218,21 @@ def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
     No other file is taken for one: a table has the columns that its run.json says, and a figure's
     stamp is that of the data beside it.
     """
-    before: Any = None
-    with suppress(InputError):
-        before = read_json(within(folder, "run.json"))
-    tables = before.get("tables") if isinstance(before, dict) else None
-    for name, rows in tables.items() if isinstance(tables, dict) else ():
-        path, mine = folder / f"{name}.csv", name in {one.name for one in found.tables()}
-        if not mine and path.parent == folder and _holds(path, rows):
+    before: dict[str, list[dict[str, Any]]] = {}
+    with suppress(InputError, KeyError, TypeError, ValidationError):
+        before = TABLES.validate_python(read_json(within(folder, "run.json"))["tables"])
+    for name in before.keys() - {table.name for table in found.tables()}:
+        path = folder / f"{name}.csv"
+        heads = [table_text([*row], []) for row in before[name][:1] if path.parent == folder]
+        if heads and head_of(path, 10_000).startswith(heads[0]):
             yield path
     drawn = {plot.name for plot in found.plots()}
     for data in (folder / FIGURES).glob("*.json"):
         svg = data.with_suffix(".svg")
-        ours = stamp_in(svg).split()[:1] == stamp_of(head_of(data, MOST_BYTES)).split()[:1]
-        if data.stem not in drawn and ours:
+        if data.stem not in drawn and (
+            stamp_in(svg).split()[:1] == stamp_of(head_of(data, MOST_BYTES)).split()[:1]
+        ):
             yield from (data, svg)
-
-
-def _holds(path: Path, rows: Any) -> bool:
-    """Whether a CSV begins with the columns of these records."""
-    first = rows[0] if isinstance(rows, list) and rows else None
-    return isinstance(first, dict) and head_of(path, 10_000).startswith(table_text([*first], []))
 
 
 def publish(found: Finding, folder: Path) -> Path:
@@ -260,7 +243,7 @@ def publish(found: Finding, folder: Path) -> Path:
     `write_figure` draws.
     """
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
-    for old in (*_left_by_another(folder, found), *(folder / FAILING).glob("*.toml")):
+    for old in (*_left_by_another(folder, found), *folder.glob("failures/*.toml")):
         old.unlink()
     write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
@@ -277,82 +260,74 @@ def publish(found: Finding, folder: Path) -> Path:
         if stamp_in(stem.with_suffix(".svg")) != stamp:
             calls.append(Call(_draw, (drawn, stem, stamp)))
     list(side_by_side(calls))
-    above = (("Report", "../index.html"),) if (folder.parent / "index.html").exists() else ()
-    site = Site(folder, f"rockcheck: {found.title}", above)
-    site.assets()
+    write_assets(folder)
     if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
         write_whole(folder / "curves.js", script_text("window.rockcheckCurves", finite(live)))
-    return site.page(
+    return write_page(
+        folder,
         "index.html",
         "finding.html",
+        site={
+            "name": f"rockcheck: {found.title}",
+            "links": [("Report", "../index.html")]
+            if (folder.parent / "index.html").exists()
+            else [],
+        },
         found=found,
         live=bool(live),
-        scripts=scripts_of(plots, figures),
+        scripts=dict.fromkeys(
+            script
+            for plot in plots
+            if plot.live and plot.kind == "spectra"
+            for script in write_scripts(plot, figures)
+        ),
         looks=looks(LOOKS),
         row_cells=row_cells,
-        figures=FIGURES,
         formats=(),
     )
 
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
+#: The templates with what they call.
+TEMPLATES = Environment(
+    loader=FileSystemLoader(DATA / "templates"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    trim_blocks=True,
+    lstrip_blocks=True,
+    finalize=lambda value: inert(value) if type(value) is str else value,
+)
+TEMPLATES.filters |= {
+    one.__name__: one for one in (number, unit, duration, moment, window, dash_array, readable)
+}
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"
 
 
-@dataclass(frozen=True)
-class Site:
-    """A folder of pages with one look.
+def write_page(folder: Path, address: str, template: str, **context: Any) -> Path:
+    """Write the page `address` of a folder of pages, from a template of `data/templates/`.
 
-    `links` are its parts for the navigation: (title, address from the index).
+    The address is relative to the folder, with slashes. Of the context, `site` says the folder's
+    `name` and the `links` of its navigation: (title, address).
     """
+    *parts, name = address.split("/")
+    page = TEMPLATES.get_template(template)
+    return write_whole(
+        made(folder, *parts) / name,
+        page.render(root="../" * len(parts), address=address, **context),
+    )
 
-    folder: Path
-    name: str
-    links: tuple[tuple[str, str], ...] = ()
 
-    def page(self, address: str, template: str, **context: Any) -> Path:
-        """Write the page `address` from a template of `data/templates/`.
-
-        The address is relative to the folder, with slashes.
-        """
-        root = "../" * address.count("/")
-        text = (
-            _environment()
-            .get_template(template)
-            .render(site=self, root=root, address=address, **context)
-        )
-        return write_whole(made(self.folder, *address.split("/")[:-1]) / Path(address).name, text)
-
-    def assets(self) -> None:
-        """Write style sheets, scripts and the plotting library, once for all pages."""
-        target = made(self.folder, PAGES, "assets")
-        for source in sorted((DATA / "assets").iterdir()):
-            write_whole(target / source.name, source.read_bytes())
-        for source in sorted((DATA / "vendor").glob("*/*")):
-            name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
-            write_whole(target / name, source.read_bytes())
-        rows = (
+def write_assets(folder: Path) -> None:
+    """Write style sheets, scripts and the plotting library, once for all pages of a folder."""
+    target = made(folder, PAGES, "assets")
+    for source in (*(DATA / "assets").iterdir(), *(DATA / "vendor").glob("*/*")):
+        name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
+        write_whole(target / name, source.read_bytes())
+    write_whole(
+        target / "models.css",
+        "".join(
             f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"
             for look in BY_KEY.values()
-        )
-        write_whole(target / "models.css", "".join(rows))
-
-
-@cache
-def _environment() -> Environment:
-    """The templates with what they call.
-
-    Kept, since compiling a page's templates takes longer than drawing its figures.
-    """
-    environment = Environment(
-        loader=FileSystemLoader(DATA / "templates"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        finalize=lambda value: inert(value) if type(value) is str else value,
+        ),
     )
-    for filter in (number, unit, duration, moment, window, dash_array, readable):
-        environment.filters[filter.__name__] = filter
-    return environment

@@ -1,34 +1,20 @@
 """How the plots of a finding are drawn.
 
-Lines over axes, and by `DRAWERS` what needs a drawer of its own.
+Lines over axes, and what needs a drawer of its own.
 """
-
-from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
-from pathlib import Path
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal
 
-from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, figure_style, log_scales
+import numpy as np
+
+from rockcheck.reports.show.spectrum import figure as spectra
+from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, figure_style, power_of_ten
 from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Axis, Panel, Plot
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-#: Drawers of other kinds of plots: module and function, which takes the plot and returns a figure.
-DRAWERS = {
-    "spectra": "rockcheck.reports.show.spectrum:figure",
-    "stable-steps": f"{__name__}:stable_steps",
-    "strips": f"{__name__}:strips",
-}
-#: What writes the scripts of a live plot of such a kind: module and function, which takes the plot
-#: and the folder of figures and returns the scripts that the page reads, in order.
-SCRIPTS = {"spectra": "rockcheck.reports.show.spectrum:write_scripts"}
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
 COLOURS = (
     ("#0072b2", "#3d9fdc"),
@@ -55,29 +41,17 @@ STYLES: dict[str, dict[str, Any]] = {
 
 
 def figure_of(plot: Plot) -> Figure:
-    """The figure of a plot."""
-    drawn: Figure = resolve_name(DRAWERS.get(plot.kind, f"{__name__}:lines"))(plot)
-    return drawn
-
-
-def scripts_of(plots: Sequence[Plot], folder: Path) -> list[str]:
-    """Writes the scripts of live plots with a drawer of their own; returns those of the page."""
-    found = [
-        resolve_name(SCRIPTS[plot.kind])(plot, folder)
-        for plot in plots
-        if plot.live and plot.kind in SCRIPTS
-    ]
-    return list(dict.fromkeys(script for some in found for script in some))
+    """The figure of a plot; lines, unless its kind has a drawer of its own."""
+    of_kind = {"spectra": spectra, "stable-steps": stable_steps, "strips": strips}
+    return of_kind.get(plot.kind, lines)(plot)
 
 
 def lines(plot: Plot) -> Figure:
     """A panel beside the other, on common axes, with one legend below."""
-    from matplotlib.figure import Figure
-
     columns = min(COLUMNS, len(plot.panels))
     rows = math.ceil(len(plot.panels) / columns)
-    with figure_style():
-        figure = Figure(
+    with figure_style() as new_figure:
+        figure = new_figure(
             figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained"
         )
         grid = figure.subplots(rows, columns, sharex=True, sharey=plot.shared, squeeze=False)
@@ -85,17 +59,19 @@ def lines(plot: Plot) -> Figure:
         per = plot.data["per_unit"] if plot.data else 1.0
         for ax, panel in zip(grid.flat, plot.panels, strict=False):
             _draw(ax, panel, handles)
-            ax.set_title(panel.title)
-            _scale(ax, plot.x, plot.y)
+            place = ax.get_subplotspec()
+            ax.set(
+                title=panel.title,
+                xlabel=plot.x.label if place.is_last_row() else "",
+                ylabel=plot.y.label if place.is_first_col() else "",
+            )
+            _scale(ax, "x", plot.x)
+            _scale(ax, "y", plot.y)
             if plot.data:
-                above = ax.secondary_xaxis("top", functions=(lambda x: x * per, lambda x: x / per))
-                above.set_xlabel(plot.data["other_label"])
+                other = (lambda x: x * per, lambda x: x / per)
+                ax.secondary_xaxis("top", functions=other, xlabel=plot.data["other_label"])
         for ax in grid.flat[len(plot.panels) :]:
             ax.set_axis_off()
-        for ax in grid[:, 0]:
-            ax.set_ylabel(plot.y.label)
-        for ax in grid[-1, :]:
-            ax.set_xlabel(plot.x.label)
         if handles:
             figure.legend(handles.values(), handles, loc="outside lower center", ncols=4)
     return figure
@@ -106,12 +82,9 @@ def stable_steps(plot: Plot) -> Figure:
 
     Each cell shows the step by its colour and as a number.
     """
-    import numpy as np
-    from matplotlib.figure import Figure
-
     tried, models = plot.data["tried"], plot.data["models"]
-    with figure_style():
-        figure = Figure(figsize=(PAGE, 5.6), layout="constrained")
+    with figure_style() as new_figure:
+        figure = new_figure(figsize=(PAGE, 5.6), layout="constrained")
         for ax, (words, values, found) in zip(
             figure.subplots(2, 2).flat, plot.data["panels"], strict=True
         ):
@@ -134,29 +107,30 @@ def stable_steps(plot: Plot) -> Figure:
                     fontsize=6,
                     color="#1b1b1b" if step >= tried[2] or not step else "w",
                 )
-            ax.set_xticks(range(len(values)), [f"{value:g}" for value in values])
-            ax.set_yticks(range(len(models)), models)
+            ax.set(
+                xticks=range(len(values)),
+                xticklabels=[f"{value:g}" for value in values],
+                yticks=range(len(models)),
+                yticklabels=models,
+                xlabel=words,
+            )
             ax.grid(visible=False)
-            ax.set_xlabel(words)
     return figure
 
 
 def strips(plot: Plot) -> Figure:
     """A strip a figure: a point a run, a bar from the 16 to the 84 % quantile, and the median."""
-    import numpy as np
-    from matplotlib.figure import Figure
-
-    with figure_style():
+    with figure_style() as new_figure:
         # Margins in inches: a layout engine would need longer than the drawing.
-        height, row = 0.5 * len(plot.data) + 0.1, 0.5
-        figure = Figure(figsize=(PAGE, height))
+        height = 0.5 * len(plot.data) + 0.1
+        figure = new_figure(figsize=(PAGE, height))
         rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
         figure.subplots_adjust(
             1.25 / PAGE,
             0.24 / height,
             1.0 - 0.12 / PAGE,
             1.0 - 0.06 / height,
-            hspace=row / 0.26 - 1.0,
+            hspace=0.5 / 0.26 - 1.0,
         )
         for ax, one in zip(rows, plot.data, strict=True):
             values = np.sort(np.array(one["values"], dtype=float))
@@ -166,29 +140,32 @@ def strips(plot: Plot) -> Figure:
             ax.barh(0.0, high - low, left=low, height=0.9, color=COLOURS[0][0], alpha=0.15)
             ax.plot([median, median], [-0.5, 0.5], color=COLOURS[0][0], linewidth=1.6, zorder=3)
             ax.plot(values, beside, "o", markersize=3.0, color=COLOURS[1][0], alpha=0.8)
-            ax.set_xlim(0.0, max(float(values[-1]) * 1.06, 1e-3))
-            ax.set_ylim(-0.6, 0.6)
-            ax.set_yticks([])
+            ax.set(xlim=(0.0, max(float(values[-1]) * 1.06, 1e-3)), ylim=(-0.6, 0.6), yticks=[])
             ax.grid(axis="y", visible=False)
             ax.set_ylabel(one["label"], rotation=0, ha="right", va="center")
     return figure
 
 
-def _scale(ax: Axes, x: Axis, y: Axis) -> None:
-    for axis, scale, limit in ((x, ax.set_xscale, ax.set_xlim), (y, ax.set_yscale, ax.set_ylim)):
-        if axis.log:
-            scale("log")
-        if axis.limits is not None:
-            limit(*axis.limits)
-    log_scales(ax)
-    for ticks, put in ((x.ticks, ax.set_xticks), (y.ticks, ax.set_yticks)):
-        if ticks:
-            put(list(ticks), list(ticks.values()))
+def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
+    """One axis: limits, ticks, and where it is logarithmic at most seven powers of ten.
+
+    `figure_style` leaves the $ of matplotlib's own labels of powers as it is.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+    if axis.log:
+        ax.set(**{f"{of}scale": "log"})
+        drawn = getattr(ax, f"{of}axis")
+        drawn.set_major_locator(LogLocator(numticks=7))
+        drawn.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
+        drawn.set_minor_locator(NullLocator())
+    if axis.limits is not None:
+        ax.set(**{f"{of}lim": axis.limits})
+    if axis.ticks:
+        ax.set(**{f"{of}ticks": list(axis.ticks), f"{of}ticklabels": list(axis.ticks.values())})
 
 
-def _draw(ax: Axes, panel: Panel, handles: dict[str, Any]) -> None:
-    import numpy as np
-
+def _draw(ax: Any, panel: Panel, handles: dict[str, Any]) -> None:
     for series, colour in zip(panel.series, colours(panel), strict=True):
         low, y, high = (np.array(one, float) for one in (series.low, series.y, series.high))
         if series.style == "level":
@@ -228,28 +205,27 @@ def live_data(plot: Plot) -> dict[str, Any]:
     """What the page's script needs to draw a plot of one panel and to read it under the pointer."""
     (panel,) = plot.panels
     fits = {series.label: series for series in panel.series if series.style == "dots"}
-    curves = [
-        {
-            "label": series.label,
-            "values": _short(series.y),
-            "colour": colour,
-            "low": _short(series.low),
-            "high": _short(series.high),
-            "fit": _short(fits[series.label].y)
-            if series.label in fits and series.style != "thin"
-            else [],
-            "dash": {"dashed": [8, 4], "dotted": [2, 3]}.get(series.style, []),
-            "width": 0.7 if series.style == "thin" else 2.0,
-        }
-        for series, colour in zip(panel.series, colours(panel), strict=True)
-        if series.style != "dots"
-    ]
     return {
         "name": plot.name,
         "across": plot.x.label,
         "along": plot.y.label,
         "intensities": list(panel.series[0].x),
-        "curves": curves,
+        "curves": [
+            {
+                "label": series.label,
+                "values": _short(series.y),
+                "colour": colour,
+                "low": _short(series.low),
+                "high": _short(series.high),
+                "fit": _short(fits[series.label].y)
+                if series.label in fits and series.style != "thin"
+                else [],
+                "dash": {"dashed": [8, 4], "dotted": [2, 3]}.get(series.style, []),
+                "width": 0.7 if series.style == "thin" else 2.0,
+            }
+            for series, colour in zip(panel.series, colours(panel), strict=True)
+            if series.style != "dots"
+        ],
         "least": plot.y.limits[0] if plot.y.limits else 0.0,
         "most": plot.y.limits[1] if plot.y.limits else None,
         "single": any(series.style == "thin" for series in panel.series),

@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rockcheck.reports.show.words import number, scene_facts
-from rockcheck.reports.style import looks
 from rockcheck.reports.tables import checks_table, formula, runs_table, verdict_mark
-from rockcheck.reports.view import slugs_of
+from rockcheck.reports.view import View, slugs_of
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.statistics import CONFIDENCE, Sample, Samples
 from rockcheck.validation.finding import (
@@ -27,7 +26,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.suite.motions import Distribution, Ensemble
-from rockcheck.validation.suite.results import Cell, EnsembleRecord, Run
+from rockcheck.validation.suite.results import EnsembleRecord
 
 #: Ends of the axes of peaks, alpha, and where an overturned block is drawn beyond.
 LEAST, MOST, FALLEN = 1e-3, 1.0, 3.2
@@ -64,24 +63,12 @@ POINTS = (
 
 
 @dataclass(frozen=True)
-class EnsembleView:
+class EnsembleView(View):
     """One ensemble of a finished run, ready to be shown."""
 
-    run: Run
     record: EnsembleRecord
-    slug: str
     #: Its figures are for a paper, too.
     printed: ClassVar[bool] = True
-
-    @property
-    def name(self) -> str:
-        """Name of the ensemble."""
-        return self.record.name
-
-    @cached_property
-    def cells(self) -> tuple[Cell, ...]:
-        """The ensemble's cells, in the models' order."""
-        return self.run.of_scene(self.name)
 
     @cached_property
     def samples(self) -> dict[str, Sample]:
@@ -97,8 +84,13 @@ class EnsembleView:
     @cached_property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here; the run's own reference first."""
-        against = (figure.against for cell in self.cells for figure in cell.figures)
-        named = dict.fromkeys([self.run.reference, self.run.model_form, *against])
+        named = dict.fromkeys(
+            [
+                self.run.reference,
+                self.run.model_form,
+                *(figure.against for cell in self.cells for figure in cell.figures),
+            ]
+        )
         return tuple(model for model in named if model in self.samples)
 
     @cached_property
@@ -118,12 +110,18 @@ class EnsembleView:
 
     def page(self) -> Finding:
         """All that its page shows."""
-        states = [[c.model, verdict_mark(c), c.outcome or c.reason] for c in self.cells]
         heads = [Column("model", kind="model"), text("verdict"), text("outcome")]
         blocks: list[Block] = [
             Text(self.record.description, facts=self.facts()),
             Text(CHAOS),
-            Table("verdicts", heads, states),
+            Table(
+                "verdicts",
+                heads,
+                [
+                    [cell.model, verdict_mark(cell), cell.outcome or cell.reason]
+                    for cell in self.cells
+                ],
+            ),
             self.distributions(),
             *([self.by_scene()] if len(self.samples) > 1 else []),
             *(table for against in self.references if (table := self.agreement(against)).rows),
@@ -132,13 +130,17 @@ class EnsembleView:
             runs_table(self.run, self.cells),
             self.peaks(),
         ]
-        named = (
-            replace(one, name=f"data/{self.slug}-{one.name}".rstrip("-"))
-            if isinstance(one, Table)
-            else one
-            for one in blocks
+        return Finding(
+            "ensemble",
+            self.name,
+            "",
+            [
+                replace(one, name=f"data/{self.slug}-{one.name}".rstrip("-"))
+                if isinstance(one, Table)
+                else one
+                for one in blocks
+            ],
         )
-        return Finding("ensemble", self.name, "", list(named))
 
     def facts(self) -> list[tuple[str, str]]:
         """The ensemble in a few words: what is drawn, and the scene that it is drawn from."""
@@ -176,7 +178,7 @@ class EnsembleView:
             model: np.searchsorted(peaks, grid, side="right") / len(self.samples[model].peaks)
             for model, (peaks, _) in self.curves.items()
         }
-        known, reference = looks(self.run.models), self.references[0]
+        known, reference = self.looks, self.references[0]
         counts = [len(sample.peaks) for sample in self.samples.values()]
         same = float(kstwobign.ppf(CONFIDENCE)) * math.sqrt(2.0 / min(counts))
         ends = (0.0, float(grid[-1]))
@@ -195,18 +197,23 @@ class EnsembleView:
                 for m, share in values.items()
             ]
 
-        apart = {m: share - shares[reference] for m, share in shares.items() if m != reference}
+        others = {m: share - shares[reference] for m, share in shares.items() if m != reference}
         panels = [
             Panel("share of scenes below the peak", steps(shares)),
-            Panel(f"difference from {known[reference].label}", [*steps(apart), band]),
+            Panel(f"difference from {known[reference].label}", [*steps(others), band]),
         ]
-        x = Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5)))
-        title = f"Peak rotation in {max(counts)} scenes"
-        return Plot(self.slug, title, panels=panels, x=x, note=CURVES, shared=False)
+        return Plot(
+            self.slug,
+            f"Peak rotation in {max(counts)} scenes",
+            panels=panels,
+            x=Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5))),
+            note=CURVES,
+            shared=False,
+        )
 
     def by_scene(self) -> Plot:
         """Peak rotation of each scene by each model against the reference's."""
-        reference, known, panels = self.references[0], looks(self.run.models), []
+        reference, known, panels = self.references[0], self.looks, []
         for model in [one for one in self.samples if one != reference]:
             pair = Samples(self.samples[reference], self.samples[model])
             x, y = (
@@ -214,11 +221,13 @@ class EnsembleView:
                 for one in (pair.reference, pair.candidate)
             )
             odd = pair.reference.fallen != pair.candidate.fallen
-            diagonal = Series("", (LEAST, MOST), (LEAST, MOST), style="thin")
-            at, other = ((x[rows].tolist(), y[rows].tolist()) for rows in (~odd, odd))
-            same = Series("", *at, look=known[model].key, style="points")
-            apart = Series("one falls", *other, look=known[model].key, style="cross")
-            panels.append(Panel(known[model].label, [diagonal, same, apart]))
+            same, apart = ((x[rows].tolist(), y[rows].tolist()) for rows in (~odd, odd))
+            series = [
+                Series("", (LEAST, MOST), (LEAST, MOST), style="thin"),
+                Series("", *same, look=known[model].key, style="points"),
+                Series("one falls", *apart, look=known[model].key, style="cross"),
+            ]
+            panels.append(Panel(known[model].label, series))
         ticks = {LEAST: f"{LEAST:g}", 0.01: "0.01", 0.1: "0.1", MOST: "1", FALLEN: "fell"}
         x_axis, y_axis = (
             Axis(f"{PEAK} by {of}", log=True, limits=(LEAST * 0.8, FALLEN * 1.5), ticks=ticks)
@@ -233,38 +242,37 @@ class EnsembleView:
         rows = []
         for cell in self.cells:
             figures = {f.measure: f for f in cell.figures if f.against == against}
-            if not figures:
-                continue
-            theirs, own = self.samples[against].fallen, self.samples[cell.model].fallen
-            counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
-            shown = (
-                Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
-                for name in STATISTICS_SHOWN
-            )
-            rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
-        falls = ("both fall", "only the reference falls", "only the model falls", "both stay")
+            if figures:
+                theirs, own = self.samples[against].fallen, self.samples[cell.model].fallen
+                counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
+                shown = (
+                    Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
+                    for name in STATISTICS_SHOWN
+                )
+                rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
         columns = [
             Column("model", kind="model"),
-            *map(Column, falls),
+            Column("both fall"),
+            Column("only the reference falls"),
+            Column("only the model falls"),
+            Column("both stay"),
             *(Column(name, title, help=formula(name)) for name, title in STATISTICS_SHOWN.items()),
         ]
-        title = f"Agreement with {looks(self.run.models)[against].label}"
-        return Table(f"against-{slugs_of([against])[against]}", columns, rows, title)
+        name = f"against-{slugs_of([against])[against]}"
+        return Table(name, columns, rows, f"Agreement with {self.looks[against].label}")
 
     def peaks(self) -> Table:
         """Peak rotation (alpha) and outcome of every scene by every model."""
-        names = [
-            f"{what} {model}"
-            for model in self.samples
-            for what in ("peak_rotation_alpha", "outcome")
-        ]
-        values = [
-            column
-            for sample in self.samples.values()
-            for column in (sample.peaks.tolist(), sample.outcomes)
-        ]
-        rows = [[n, *row] for n, row in enumerate(zip(*values, strict=True), 1)]
-        return Table("", list(map(Column, ["scene", *names])), rows, on="file")
+        values = {
+            f"{what} {model}": column
+            for model, sample in self.samples.items()
+            for what, column in (
+                ("peak_rotation_alpha", sample.peaks.tolist()),
+                ("outcome", sample.outcomes),
+            )
+        }
+        rows = [[n, *row] for n, row in enumerate(zip(*values.values(), strict=True), 1)]
+        return Table("", list(map(Column, ["scene", *values])), rows, on="file")
 
 
 def _distribution(of: Distribution | None) -> str:

@@ -1,28 +1,28 @@
-"""Figures of one scene for a paper.
+"""What is drawn of one scene: its figures for a paper, and the data of its page.
 
-They show the quantities of its Figs. 4 and 5 for all models, and their differences below each.
+Figures show the quantities of the paper's Figs. 4 and 5 for all models, and their differences below
+each.
+
+A page's data (`payload`) are a script, since a page opened from the file system cannot fetch data.
+Their values are float32 (rounded to 6e-8 of their size), a line of `rows` values for the ground,
+each channel and each running figure. All lines of a page are packed together, and each place holds
+the number of its line.
 """
 
-from __future__ import annotations
-
+import base64
 import math
+import zlib
 from collections.abc import Iterable, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from rockcheck.reports.show.words import SUPERSCRIPTS, number
-from rockcheck.reports.style import PAGE, Look, figure_style, looks, save
-from rockcheck.reports.view import PAPER_CHANNELS, Band, Channel, SceneView
+from rockcheck.reports.show.words import number
+from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, figure_style
+from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import IMPACTS, WindowedHistory
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
@@ -41,9 +41,7 @@ LIMIT: dict[str, Any] = {
 }
 
 
-def histories_figure(
-    view: SceneView, against: str | None = None, channels: Sequence[Channel] = PAPER_CHANNELS
-) -> Figure:
+def histories_figure(view: SceneView, against: str | None = None) -> Figure:
     """Each channel of all models over time, below it the difference from `against`, then impacts.
 
     Tolerances are shaded.
@@ -51,24 +49,20 @@ def histories_figure(
     `against` None: the first reference of the scene; where there is none the differences are left
     out.
     """
-    from matplotlib.figure import Figure
-
-    if against is None:
-        against = next(iter(view.references), None)
-    known = looks(view.run.models)
-    with figure_style():
+    against = against or view.figure_references[0]
+    with figure_style() as new_figure:
         heights = (
             [0.55]
-            + [h for _ in channels for h in ([1.0, 0.62] if against else [1.0])]
+            + ([1.0, 0.62] if against else [1.0]) * len(PAPER_CHANNELS)
             + [0.16 * len(view.histories) + 0.15]
         )
         beyond = view.horizon is not None and view.horizon < view.t[-1]
-        shades = _shades(view, against, channels, beyond)
+        shades = _shades(view, against, beyond)
         legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
         # Margins in inches: a layout engine would need several times the drawing's own time.
         top, bottom, space = 0.25 + 0.16 * legend_rows, 0.42, 0.09
         height = top + bottom + 0.92 * sum(heights) + space * len(heights)
-        figure = Figure(figsize=(PAGE, height))
+        figure = new_figure(figsize=(PAGE, height))
         axes = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
         figure.subplots_adjust(
             0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7
@@ -76,7 +70,7 @@ def histories_figure(
         axes[0].plot(view.t, view.ground / GRAVITY_OF_RECORDS, color="#666666", linewidth=0.5)
         axes[0].set_ylabel("base\n(g)")
         panels = iter(axes[1:])
-        for channel in channels:
+        for channel in PAPER_CHANNELS:
             _values(next(panels), view, channel)
             if against:
                 _differences(next(panels), view, channel, against)
@@ -85,13 +79,17 @@ def histories_figure(
             if beyond:
                 ax.axvspan(view.horizon, view.t[-1], color="#000000", alpha=0.05, linewidth=0)
             ax.yaxis.set_label_coords(-0.6 / (PAGE - 1.03), 0.5)
-        axes[-1].set_xlabel("time (s)")
-        axes[-1].set_xlim(float(view.t[0]), float(view.t[-1]) or 1.0)
+        axes[-1].set(xlabel="time (s)", xlim=(float(view.t[0]), float(view.t[-1]) or 1.0))
         edge = 0.08 / PAGE
-        below = f"; below each the difference from {known[against].label}" if against else ""
-        title = f"{view.name}: all models{below}"
-        figure.text(edge, 1.0 - 0.06 / height, title, va="top", weight="bold", fontsize=8.5)
-        used, versions = ("rockcheck", *view.run.models), view.run.versions
+        below = f"; below each the difference from {view.looks[against].label}" if against else ""
+        figure.text(
+            edge,
+            1.0 - 0.06 / height,
+            f"{view.name}: all models{below}",
+            va="top",
+            weight="bold",
+            fontsize=8.5,
+        )
         handles, labels = axes[1].get_legend_handles_labels()
         figure.legend(
             handles + shades,
@@ -104,7 +102,11 @@ def histories_figure(
         figure.text(
             1.0 - edge,
             0.03 / height,
-            ", ".join(f"{name} {versions[name]}" for name in used if name in versions),
+            ", ".join(
+                f"{name} {view.run.versions[name]}"
+                for name in ("rockcheck", *view.run.models)
+                if name in view.run.versions
+            ),
             ha="right",
             va="bottom",
             fontsize=4.5,
@@ -115,35 +117,98 @@ def histories_figure(
 
 def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) -> Figure:
     """Some curves (x, y, and whose) over each other, small and without words."""
-    from matplotlib.figure import Figure
-
-    with figure_style():
-        figure = Figure(figsize=(3.4, 0.9))
+    with figure_style() as new_figure:
+        figure = new_figure(figsize=(3.4, 0.9))
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        style = "steps-post" if step else "default"
         for x, y, look in curves:
-            style = "steps-post" if step else "default"
             ax.plot(x, y, color=look.light, linewidth=0.7, drawstyle=style)
-        low, high = 0.0, 1.0
-        if not step:
+        if step:
+            ax.set_ylim(0.0, 1.0)
+        else:
             ax.axhline(0.0, color="#bbbbbb", linewidth=0.4, zorder=0)
             ax.margins(x=0.0, y=0.08)
-            low, high = min(ax.get_ylim()[0], -LEAST), max(ax.get_ylim()[1], LEAST)
-        ax.set_ylim(low, high)
+            ax.set_ylim(min(ax.get_ylim()[0], -LEAST), max(ax.get_ylim()[1], LEAST))
         ax.set_axis_off()
     return figure
 
 
-def write_figures(view: SceneView, folder: Path) -> None:
-    """Write the figures of a scene into `folder`.
+def packed_lines(lines: Sequence[ArrayLike]) -> str:
+    """Lines of values as base64 of a deflated stream.
 
-    A thumbnail of all rotations, and where the run asks for them those for a paper, one a
-    reference.
+    The stream holds of each little-endian float32 the first byte, then of each the second, and so
+    on.
+
+    A line shorter than others ends with NaN. Neighbours share their sign and exponent, so bytes of
+    one place compress well: a page takes half of what plain values take.
     """
-    known = looks(view.run.models)
-    curves = [(view.t, view.drawn[m]["theta"], known[m]) for m in known if m in view.values]
-    save(thumbnail(curves), folder / f"{view.slug}-small", ["svg"])
-    for against in view.figure_references if view.printed else ():
-        save(histories_figure(view, against), folder / figure_stem(view, against))
+    values = np.full((len(lines), max(map(np.size, lines))), np.nan, "<f4")
+    for place, line in zip(values, lines, strict=True):
+        place[: np.size(line)] = line
+    return base64.b64encode(zlib.compress(values.reshape(-1, 1).view(np.uint8).T.tobytes())).decode(
+        "ascii"
+    )
+
+
+def payload(view: SceneView) -> dict[str, Any]:
+    """All that is drawn and animated of a scene on its page; see the module."""
+    scene = view.scene
+    bands = view.bands()
+    lines: list[ArrayLike] = []
+
+    def line(values: ArrayLike) -> int:
+        lines.append(values)
+        return len(lines) - 1
+
+    return {
+        "scene": view.name,
+        "duration": float(view.t[-1]),
+        "step": scene.output_step * view.stride,
+        "rows": len(view.t),
+        "ground": line(view.ground / GRAVITY_OF_RECORDS),
+        "alpha": scene.block.alpha,
+        "frequencyParameter": scene.frequency_parameter,
+        "block": [scene.block.half_width, scene.block.half_height],
+        "walls": [{"side": wall.side, "gap": wall.gap} for wall in scene.walls],
+        "extent": [float(f"{edge:.4g}") for edge in view.extent],
+        "references": view.references,
+        "horizon": view.horizon,
+        "channels": [
+            {
+                "name": c.name,
+                "label": c.label,
+                "unit": "" if c.unit == "1" else c.unit,
+                "fine": fineness(view, c, bands),
+                "folded": c not in PAPER_CHANNELS,
+            }
+            for c in CHANNELS
+        ],
+        "window": view.active,
+        "bands": [
+            vars(band) | ({"running": line(view.running_rms(band))} if band.kind == "rms" else {})
+            for band in bands
+        ],
+        "models": [
+            {
+                "name": model,
+                "label": look.label,
+                "look": look.key,
+                "dash": look.dash,
+                "values": {name: line(values) for name, values in view.values[model].items()},
+                "events": [
+                    [float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")]
+                    for e in view.histories[model].event_list
+                ],
+                "modes": [[float(f"{t:.4f}"), mode] for t, _, mode in view.spells(model)],
+                "agreement": view.agreement.get(model),
+                "fell": view.falls.get(model),
+                "samples": view.measured.get(model),
+            }
+            for model, look in view.looks.items()
+            if model in view.histories
+        ],
+        "lines": packed_lines(lines),  # the last, when all are known
+    }
 
 
 def summary(view: SceneView) -> str:
@@ -155,15 +220,6 @@ def summary(view: SceneView) -> str:
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
-
-
-def figure_stem(view: SceneView, against: str | None) -> str:
-    """File name, without its suffix, of the figure whose differences are from `against`."""
-    if against is None or against == next(iter(view.references), None):
-        return view.slug
-    return (
-        f"{view.slug}-against-{''.join(c if c.isalnum() or c in '._-' else '-' for c in against)}"
-    )
 
 
 def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
@@ -185,15 +241,14 @@ def _largest(values: np.ndarray) -> float:
     return float(np.max(np.abs(known))) if len(known) else 0.0
 
 
-def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
+def _values(ax: Any, view: SceneView, channel: Channel) -> None:
     """One channel of all models, the first reference drawn wide below the others.
 
     Wall impacts are marked on each model's own curve.
     """
-    looked = looks(view.run.models)
-    first = next(iter(view.references), None)
-    for order, model in enumerate(model for model in looked if model in view.values):
-        look, values = looked[model], view.drawn[model][channel.name]
+    first = view.figure_references[0]
+    for order, model in enumerate(model for model in view.looks if model in view.values):
+        look, values = view.looks[model], view.drawn[model][channel.name]
         if model in view.measured:
             rows = view.measured[model]
             ax.plot(
@@ -221,7 +276,7 @@ def _values(ax: Axes, view: SceneView, channel: Channel) -> None:
     ax.set_ylabel(channel.symbol)
 
 
-def _marks(ax: Axes, view: SceneView, model: str, colour: str) -> None:
+def _marks(ax: Any, view: SceneView, model: str, colour: str) -> None:
     """A diamond at each wall impact, and a cross where the block falls: the curve ends there."""
     theta, until = view.drawn[model]["theta"], view.falls.get(model, math.inf)
     if model in view.falls:
@@ -235,8 +290,11 @@ def _marks(ax: Axes, view: SceneView, model: str, colour: str) -> None:
             color=colour,
             zorder=4.0,
         )
-    events = view.histories[model].event_list
-    if times := [event.t for event in events if event.kind == "wall impact" and event.t <= until]:
+    if times := [
+        event.t
+        for event in view.histories[model].event_list
+        if event.kind == "wall impact" and event.t <= until
+    ]:
         ax.plot(
             times,
             np.interp(times, view.t, np.nan_to_num(theta)),
@@ -248,9 +306,8 @@ def _marks(ax: Axes, view: SceneView, model: str, colour: str) -> None:
         )
 
 
-def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> None:
+def _differences(ax: Any, view: SceneView, channel: Channel, against: str) -> None:
     bands = [band for band in view.bands(against) if band.channel == channel.name]
-    known = looks(view.run.models)
     for limit, until in sorted(
         {(band.limit, band.until) for band in bands if band.kind == "peak"}, reverse=True
     ):
@@ -265,12 +322,16 @@ def _differences(ax: Axes, view: SceneView, channel: Channel, against: str) -> N
     }.values():
         running = view.running_rms(band)
         ax.plot(
-            view.t[: len(running)], running, color=known[band.model].light, linewidth=1.5, alpha=0.8
+            view.t[: len(running)],
+            running,
+            color=view.looks[band.model].light,
+            linewidth=1.5,
+            alpha=0.8,
         )
     fine = largest = fineness(view, channel, bands)
     for model, difference in view.differences(channel.name, against).items():
         largest = max(largest, _largest(difference))
-        ax.plot(view.t, difference, **known[model].line | {"linewidth": 0.6})
+        ax.plot(view.t, difference, **view.looks[model].line | {"linewidth": 0.6})
     ax.axhline(0.0, color="#888888", linewidth=0.4, zorder=1)
     ax.set_yscale("asinh", linear_width=fine)
     ticks = _decades(fine, largest)
@@ -295,10 +356,9 @@ def _decades(fine: float, largest: float) -> dict[float, str]:
     return ticks
 
 
-def _tracks(ax: Axes, view: SceneView) -> None:
+def _tracks(ax: Any, view: SceneView) -> None:
     """A row a model: its impacts, so that a missed or an extra one is seen at once."""
-    known = looks(view.run.models)
-    shown = [model for model in known if model in view.histories]
+    shown = [model for model in view.looks if model in view.histories]
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:
             times = [e.t for e in WindowedHistory(view.histories[model]).events(kind)]
@@ -308,10 +368,11 @@ def _tracks(ax: Axes, view: SceneView) -> None:
                 marker=marker,
                 markersize=size,
                 markeredgewidth=0.5,
-                color=known[model].light,
+                color=view.looks[model].light,
                 linestyle="",
             )
-    ax.set_yticks(range(len(shown)), [_short(known[model].label) for model in shown], fontsize=6)
+    labels = [_short(view.looks[model].label) for model in shown]
+    ax.set_yticks(range(len(shown)), labels, fontsize=6)
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.text(
@@ -330,20 +391,18 @@ def _short(label: str, most: int = 17) -> str:
     return label if len(label) <= most else label[: most - 1] + "…"
 
 
-def _shades(
-    view: SceneView, against: str | None, channels: Sequence[Channel], beyond: bool
-) -> list[Patch | Line2D]:
+def _shades(view: SceneView, against: str | None, beyond: bool) -> list[Any]:
     """Legend entries for what the figure has besides the models."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    names, bands = [channel.name for channel in channels], view.bands(against) if against else ()
-    kinds = {band.kind for band in bands if band.channel in names}
-    look: dict[str, Any] = {**LIMIT, "linestyle": "", "label": "its limit"}
-    entries: list[tuple[bool, Patch | Line2D]] = [
+    bands = view.bands(against) if against else ()
+    shown = {channel.name for channel in PAPER_CHANNELS}
+    kinds = {band.kind for band in bands if band.channel in shown}
+    entries: list[tuple[bool, Any]] = [
         ("peak" in kinds, Patch(color=TOLERANCE, alpha=0.25, label="tolerance")),
         ("rms" in kinds, Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far")),
-        ("rms" in kinds, Line2D([], [], **look)),
+        ("rms" in kinds, Line2D([], [], **LIMIT | {"linestyle": "", "label": "its limit"})),
         (beyond, Patch(color="#000000", alpha=0.08, label="beyond the horizon")),
     ]
     return [handle for shown, handle in entries if shown]

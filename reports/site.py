@@ -3,39 +3,34 @@
 They are one folder that opens from the file system and needs no other place.
 """
 
-from __future__ import annotations
-
-import json
 import re
-from collections.abc import Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from rockcheck.reports import tables
-from rockcheck.reports.document import FIGURES, PAGES, Site, csv, row_cells
+from rockcheck.reports.document import FIGURES, PAGES, csv, row_cells, write_assets, write_page
 from rockcheck.reports.drawers import figure_of, side_by_side
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
-    figure_stem,
     histories_figure,
+    payload,
     summary,
     thumbnail,
-    write_figures,
 )
-from rockcheck.reports.scene_data import payload, write_scene_file
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import drawn_by, kind_of, looks, save, save_as, stamp_in
-from rockcheck.reports.tables import PEAKS, accuracy, entry, glance, matrix, outcome_of
+from rockcheck.reports.style import looks, save, save_as, stamp_in, stamp_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
-from rockcheck.scenes import InputError, experience
+from rockcheck.scenes import InputError, Record, Scene, experience
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import MOST_BYTES, head_of
 from rockcheck.scenes.writing import made, script_text, write_whole
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call
-from rockcheck.validation.execute.provenance import digest
 from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite.results import SEVERITY, Run
 from rockcheck.validation.suite.tables import shown
@@ -61,18 +56,13 @@ STUDIES = (
 )
 
 
-View = SceneView | EnsembleView
-
-
 def write_figure(folder: Path, name: str, path: Path) -> Path:
     """Draw a finished run's scene or ensemble into the file `path`; returns it.
 
     The file name ends in one of `style.FORMATS`. A scene's figure shows differences from its first
     reference. Raises `InputError` for what the run does not have.
     """
-    kind_of(path)
-    pages = _Pages(folder, (name,))
-    view = pages.views[name]
+    view = _Pages(folder, (name,)).views[name]
     if isinstance(view, EnsembleView):
         return save_as(figure_of(view.distributions()), path)
     if not view.histories:
@@ -100,48 +90,29 @@ def write_site(
     not of the run.
     """
     pages = _Pages(folder, wanted)
-    pages.site.assets()
+    write_assets(folder)
     stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
     waiting = {
         name: stamp
         for name, stamp in stamps.items()
-        if afresh or stamp_in(folder / _address(pages.views[name])) != stamp
+        if afresh or stamp_in(folder / pages.links[name]) != stamp
     }
     for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
         on_progress(done, len(waiting) + 1)
-    _remove_pages(folder, {f"{view.slug}.html" for view in pages.views.values()})
+    remove_site(folder, {INDEX, *pages.links.values()})
     return folder / INDEX
 
 
-def remove_site(folder: Path) -> None:
-    """Remove the pages of an earlier run, with their figures and data; by their stamps."""
-    _remove_pages(folder)
-    if stamp_in(folder / INDEX):
-        for path in (folder / INDEX, folder / PAGES / FIGURES / f"{PEAKS}.svg"):
-            path.unlink(missing_ok=True)
+def remove_site(folder: Path, kept: Collection[str] = ()) -> None:
+    """Remove the pages of an earlier run, with their figures and data; by their stamps.
 
-
-def _remove_pages(folder: Path, current: Set[str] = frozenset()) -> None:
-    for page in (folder / PAGES).glob("*.html"):
-        if page.name not in current and stamp_in(page):
-            for name in (page.name, *_belongings(page)):
-                (folder / PAGES / name).unlink(missing_ok=True)
-
-
-def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp, and last the index.
-
-    They are made in processes of their own where that is quicker.
+    Pages whose addresses are `kept` stay.
     """
-    work = sum(PRINTED if pages.views[name].printed else 1 for name in stamps)
-    if work < FEW:
-        yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
-        return
-    calls = [
-        Call(_write_page, (pages.folder, pages.wanted, *one))
-        for one in (*stamps.items(), (INDEX, ""))
-    ]
-    yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
+    for page in (folder / INDEX, *(folder / PAGES).glob("*.html")):
+        if page.relative_to(folder).as_posix() not in kept and stamp_in(page):
+            for name in _belongings(page):
+                (folder / PAGES / name).unlink(missing_ok=True)
+            page.unlink()
 
 
 class _Pages:
@@ -157,18 +128,28 @@ class _Pages:
         slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
         if unknown := [name for name in wanted if name not in slugs]:
             raise unknown_name("scene of the run", unknown[0], slugs)
-        chosen = {*shown(self.run), *wanted}
-        self.scenes = scene_views(self.run, folder, chosen)
+        self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
-            EnsembleView(self.run, one, slugs[one.name]) for one in self.run.ensembles
+            EnsembleView(self.run, one.name, slugs[one.name], one) for one in self.run.ensembles
         ]
-        found: list[View] = [*self.scenes, *self.ensembles]
+        found: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
-        links = [
-            *((view.name, _address(view)) for view in found),
-            *((title, address) for title, address in STUDIES if (folder / address).exists()),
-        ]
-        self.site = Site(folder, f"rockcheck: {self.run.suite}", tuple(links))
+        self.links = {view.name: f"{PAGES}/{view.slug}.html" for view in found}
+        studies = [one for one in STUDIES if (folder / one[1]).exists()]
+        #: What every page shows, and calls.
+        self.common: dict[str, Any] = {
+            "site": {
+                "name": f"rockcheck: {self.run.suite}",
+                "links": [*self.links.items(), *studies],
+            },
+            "run": self.run,
+            "looks": looks(self.run.models),
+            "channels": CHANNELS,
+            "SEVERITY": SEVERITY,
+            "VERDICTS": tables.VERDICTS,
+            "tables": tables,
+            "row_cells": row_cells,
+        }
 
     def write(self, name: str, stamp: str) -> None:
         """Write figures and data, and last the page, with its `stamp`; or the index (`INDEX`)."""
@@ -176,32 +157,63 @@ class _Pages:
             self._write_index()
             return
         view = self.views[name]
-        page = self.folder / _address(view)
+        page = self.folder / self.links[name]
         before = _belongings(page)
         if isinstance(view, EnsembleView):
             template, shown = "finding.html", self._write_ensemble(view)
         else:
             template, shown = "scene.html", self._write_scene(view)
-        shown |= {"view": view, "stamp": stamp} | _common(self.run)
-        self.site.page(_address(view), template, **shown)
+        shown |= {"view": view, "stamp": stamp} | self.common
+        write_page(self.folder, self.links[name], template, **shown)
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
-        """Write a scene's figures and data; returns what its page shows beside the view."""
-        write_figures(view, made(self.folder, PAGES, FIGURES))
-        data = script_text("window.rockcheck", payload(view))
-        write_whole(made(self.folder, PAGES, "data") / f"{view.slug}.js", data)
+        """Write a scene's figures and data; returns what its page shows beside the view.
+
+        The figures are a thumbnail of all rotations, and where the run asks for them those for a
+        paper, one a reference.
+        """
+        figures = made(self.folder, PAGES, FIGURES)
+        curves = [
+            (view.t, view.drawn[model]["theta"], look)
+            for model, look in view.looks.items()
+            if model in view.values
+        ]
+        save(thumbnail(curves), figures / f"{view.slug}-small", ["svg"])
+        stems = {
+            against: f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", str(against))
+            if number
+            else view.slug
+            for number, against in enumerate(view.figure_references)
+        }
+        for against, stem in stems.items() if view.printed else ():
+            save(histories_figure(view, against), figures / stem)
+        write_whole(
+            made(self.folder, PAGES, "data") / f"{view.slug}.js",
+            script_text("window.rockcheck", payload(view)),
+        )
         files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
         beside = [None, *self.scenes, None]
         place = beside.index(view)
-        return {"files": files, "previous": beside[place - 1], "following": beside[place + 1]}
+        return {
+            "files": files,
+            "previous": beside[place - 1],
+            "following": beside[place + 1],
+            "facts": scene_facts(view.scene),
+            "beyond": experience.outside(view.scene),
+            "summary": summary(view),
+            "stems": stems,
+        }
 
     def _write_ensemble(self, view: EnsembleView) -> dict[str, Any]:
         """Write an ensemble's figures and tables; returns what its page shows beside the view."""
         page, figures = view.page(), made(self.folder, PAGES, FIGURES)
-        known = looks(self.run.models)
-        curves = [(*view.curves[model], known[model]) for model in known if model in view.curves]
+        curves = [
+            (*view.curves[model], look)
+            for model, look in view.looks.items()
+            if model in view.curves
+        ]
         save(thumbnail(curves, step=True), figures / f"{view.slug}-small", ["svg"])
         for plot in page.plots():
             save(figure_of(plot), figures / plot.name)
@@ -212,59 +224,57 @@ class _Pages:
 
     def _write_index(self) -> None:
         figures = made(self.folder, PAGES, FIGURES)
-        blocks = accuracy(self.run)
-        (figures / f"{PEAKS}.svg").unlink(missing_ok=True)
+        blocks = tables.accuracy(self.run)
+        (figures / f"{tables.PEAKS}.svg").unlink(missing_ok=True)
         for block in blocks:
             if isinstance(block, Plot):
-                save(figure_of(block), figures / PEAKS)
-        rows = matrix(self.run)
-        links = {name: _address(view) for name, view in self.views.items()}
-        self.site.page(
+                save(figure_of(block), figures / block.name)
+        matrix = tables.matrix(self.run)
+        write_page(
+            self.folder,
             INDEX,
             "index.html",
             scenes=self.scenes,
             ensembles=self.ensembles,
-            worst=tables.worst_table(self.run, links),
+            links=self.links,
+            worst=tables.worst_table(self.run, self.links),
             hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
             times=tables.times_table(self.run),
             summaries={m: FAMILIES[m].summary for m in self.run.models if m in FAMILIES},
-            matrix=[row for row in rows if row.scene in self.views],
+            matrix={scene: row for scene, row in matrix.items() if scene in self.views},
             accuracy=blocks,
-            glance=glance(self.run, rows),
-            **_common(self.run),
+            glance=tables.glance(self.run, matrix),
+            **self.common,
         )
 
-    def stamp(self, view: View) -> str:
-        """Hash of all that a page shows and of the code that draws it.
+    def stamp(self, view: SceneView | EnsembleView) -> str:
+        """The stamp of a page (`stamp_of`), for all that it shows.
 
         When the run was, and what was read back, does not count.
         """
-        run = self.run
-        shown = {
-            "what": view.record.model_dump(mode="json")
-            if isinstance(view, EnsembleView)
-            else [run.scenes[view.name], view.stride, view.printed],
-            "cells": [cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells],
-            "run": run.model_dump(
-                mode="json",
-                include={
-                    "suite",
-                    "reference",
-                    "model_form",
-                    "models",
-                    "measures",
-                    "versions",
-                    "hardware",
-                },
-            ),
-            "links": self.site.links,
-            "drawn by": drawn_by(),
-        }
-        return digest(json.dumps(shown, sort_keys=True))
-
-
-def _address(view: View) -> str:
-    return f"{PAGES}/{view.slug}.html"
+        return stamp_of(
+            {
+                "what": view.record.model_dump(mode="json")
+                if isinstance(view, EnsembleView)
+                else [self.run.scenes[view.name], view.stride, view.printed],
+                "cells": [
+                    cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells
+                ],
+                "run": self.run.model_dump(
+                    mode="json",
+                    include={
+                        "suite",
+                        "reference",
+                        "model_form",
+                        "models",
+                        "measures",
+                        "versions",
+                        "hardware",
+                    },
+                ),
+                "links": self.common["site"]["links"],
+            }
+        )
 
 
 #: A process of the pool reads the run once for all its pages.
@@ -275,34 +285,51 @@ def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> N
     _pages_of(folder, wanted).write(name, stamp)
 
 
+def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
+    """Write these pages, each with its stamp, and last the index.
+
+    They are made in processes of their own where that is quicker.
+    """
+    if sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW:
+        yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
+        return
+    calls = [
+        Call(_write_page, (pages.folder, pages.wanted, *one))
+        for one in (*stamps.items(), (INDEX, ""))
+    ]
+    yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
+
+
 def _belongings(page: Path) -> set[str]:
     """The files of a scene's page, relative to the folder of pages."""
-    found = re.findall(
-        r'(?:href|src)="((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"', head_of(page, MOST_BYTES)
-    )
-    return {*found, f"figures/{page.stem}-small.svg"}
+    address = r'(?:href|src)="(?:pages/)?((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"'
+    return {*re.findall(address, head_of(page, MOST_BYTES)), f"figures/{page.stem}-small.svg"}
 
 
-def _common(run: Run) -> dict[str, Any]:
-    """What every page of a run shows, and calls."""
-    functions = (
-        row_cells,
-        tables.checks_table,
-        tables.measures_table,
-        tables.runs_table,
-        tables.uncertainty_table,
-        tables.use,
-        experience.outside,
-        scene_facts,
-        summary,
-        figure_stem,
-        entry,
-        outcome_of,
+def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
+    """Write the scene as `<slug>.toml` with its records as CSV beside it.
+
+    What is at its default is left out. Returns file names and texts, the TOML first.
+
+    `load_scene` reads the file back to a scene that moves in the same way.
+    """
+    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    records = {}
+    for key in ("excitation", "vertical"):
+        excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
+        if isinstance(excitation, Record):
+            tables[key] = {"kind": "record", "file": name, "scale": excitation.scale}
+            head = [f"# {re.sub(r'[^ -~]', '?', excitation.source)}", "time_s,acceleration_m_s2"]
+            rows = (
+                f"{excitation.time_step * n:.12g},{value!r}"
+                for n, value in enumerate(excitation.unscaled)
+            )
+            write_whole(folder / name, "\n".join([*head, *rows, ""]))
+            records[name] = ""
+        elif key in tables:
+            tables[key] = {"kind": excitation.kind} | tables[key]
+    text = tomlkit.dumps(
+        dict(sorted(tables.items(), key=lambda one: isinstance(one[1], dict | list)))
     )
-    return {
-        "run": run,
-        "looks": looks(run.models),
-        "channels": CHANNELS,
-        "VERDICTS": tables.VERDICTS,
-        "SEVERITY": SEVERITY,
-    } | {function.__name__: function for function in functions}
+    write_whole(folder / f"{slug}.toml", text)
+    return {f"{slug}.toml": text, **records}

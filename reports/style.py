@@ -5,8 +5,6 @@ darkened where a line on white would fall below a contrast of 3:1. A dash patter
 more for print without colour.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -20,20 +18,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import head_of
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute.provenance import digest
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # it is imported only to draw: that takes a second
+    Figure = Any
 
 #: Widths of a text column and of a page of text in common journals, inches.
 COLUMN, PAGE = 3.5, 7.1
 FORMATS = ("svg", "png", "pdf")
 ENDINGS = ", ".join(f".{kind}" for kind in FORMATS)
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
@@ -111,14 +110,16 @@ def label_of(model: str) -> str:
 
 
 @contextmanager
-def figure_style() -> Iterator[None]:
+def figure_style() -> Iterator[type[Figure]]:
     """The common style of all figures, for a `with` block.
 
     Sizes for a journal's page, a light grid, reproducible SVG.
 
-    Figures made inside need no display: build them with `matplotlib.figure.Figure`.
+    Figures made inside need no display: build them with the class that the block is given,
+    `matplotlib.figure.Figure`.
     """
     import matplotlib as mpl
+    from matplotlib.figure import Figure as NewFigure
 
     settings: dict[Any, Any] = {
         "font.family": "sans-serif",
@@ -154,31 +155,13 @@ def figure_style() -> Iterator[None]:
         "figure.dpi": 100,
     }
     with mpl.rc_context(settings):
-        yield
-
-
-def log_scales(ax: Axes, *, decades: int = 7) -> None:
-    """Logarithmic axes in powers of ten, at most `decades` of them, written out.
-
-    `figure_style` leaves the $ of matplotlib's labels as it is.
-    """
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
-
-    for axis in (ax.xaxis, ax.yaxis):
-        if axis.get_scale() == "log":
-            axis.set_major_locator(LogLocator(numticks=decades))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-            axis.set_minor_locator(NullLocator())
+        yield NewFigure
 
 
 def power_of_ten(value: float) -> str:
     """10⁻³; plain from 0.1 to 1000."""
     exponent = round(math.log10(value))
-    return (
-        f"{value:g}"
-        if -1 <= exponent <= 3
-        else "10" + str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
-    )
+    return f"{value:g}" if -1 <= exponent <= 3 else f"10{str(exponent).translate(SUPERSCRIPTS)}"
 
 
 def kind_of(path: Path) -> str:
@@ -235,14 +218,17 @@ def stamp_of(shown: object) -> str:
 @cache
 def drawn_by() -> str:
     """Hash of all that draws figures and pages: code, templates, scripts, styles, matplotlib."""
-    places = sorted(Path(__file__).parent.rglob("*"))
-    files = (path for path in places if path.is_file() and path.suffix != ".pyc")
-    hashes = (hashlib.sha256(path.read_bytes()).hexdigest() for path in files)
+    hashes = (
+        hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(Path(__file__).parent.rglob("*"))
+        if path.is_file() and path.suffix != ".pyc"
+    )
     return digest("\n".join([version("matplotlib"), *hashes]))
 
 
 def stamp_in(path: Path) -> str:
     """The stamp that an SVG or a page names near its beginning, empty where there is none."""
-    mark = r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)'
-    found = re.search(mark, head_of(path, 4000))
+    found = re.search(
+        r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)', head_of(path, 4000)
+    )
     return found[1] if found else ""

@@ -5,8 +5,7 @@ scenes.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import geometric_mean
 from typing import Any
@@ -60,8 +59,8 @@ def checks_table(cells: Iterable[Cell], name: str = "") -> Table:
     """All checks of a place's cells; folded under its name where that is given."""
     rows = [_check_row(cell, check) for cell in cells for check in cell.checks]
     count = f"{name}: {len(rows)} check{'' if len(rows) == 1 else 's'}" if name else ""
-    columns = [CHECKS[0], *CHECKS[2:]]
-    return Table("checks", columns, [[row[0], *row[2:]] for row in rows], count, folded=bool(name))
+    without_scene = [[verdict, *more] for verdict, _, *more in (CHECKS, *rows)]
+    return Table("checks", without_scene[0], without_scene[1:], count, folded=bool(name))
 
 
 def verdict_mark(cell: Cell) -> Mark:
@@ -168,8 +167,11 @@ def times_table(run: Run) -> Table:
             for at in places
         )
         rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
-    columns = [Column("model", kind="model"), Column("ratio", "geometric mean, ×")]
-    columns += [Column(f"scene {place}", place) for place in places]
+    columns = [
+        Column("model", kind="model"),
+        Column("ratio", "geometric mean, ×"),
+        *(Column(f"scene {place}", place) for place in places),
+    ]
     return Table("times", columns, rows)
 
 
@@ -190,18 +192,20 @@ def measures_table(view: SceneView, against: str) -> Table:
     rows = [
         [
             Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
-            *(_measured(*found[key].get(m, (None, None))) for m in models),
+            *(_measured(*found[key][m]) if m in found[key] else None for m in models),
         ]
         for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
     ]
-    title = f"All measures against {label_of(against)}"
-    columns = [text("measure"), *map(Column, models)]
-    return Table("measures", columns, rows, title, folded=True)
+    return Table(
+        "measures",
+        [text("measure"), *map(Column, models)],
+        rows,
+        f"All measures against {label_of(against)}",
+        folded=True,
+    )
 
 
-def _measured(figure: Figure | None, check: Check | None) -> Any:
-    if figure is None:
-        return None
+def _measured(figure: Figure, check: Check | None) -> Mark:
     limit = f"limit {number(check.limit)}" if check else ""
     return Mark(
         f"{number(figure.value, 4)} {unit(figure.unit)}",
@@ -227,15 +231,18 @@ def uncertainty_table(view: SceneView) -> Table:
         for cell in view.cells
         for one in cell.explanations
     ]
-    columns = [
-        Column("model", kind="model"),
-        *map(text, ("quantity", "against")),
-        Column("difference"),
-        text("unit"),
-        *(Column(f"u_{name}") for name in ("num", "input", "D")),
-        text("says"),
-    ]
-    return Table("uncertainty", columns, rows)
+    return Table(
+        "uncertainty",
+        [
+            Column("model", kind="model"),
+            *map(text, ("quantity", "against")),
+            Column("difference"),
+            text("unit"),
+            *(Column(f"u_{name}") for name in ("num", "input", "D")),
+            text("says"),
+        ],
+        rows,
+    )
 
 
 def runs_table(
@@ -271,15 +278,19 @@ def runs_table(
         ]
         for cell in cells
     ]
-    names = ("run time", "against the reference", "set-up", "steps", "evaluations")
     columns = [
         Column("model", kind="model"),
         text("settings"),
-        *map(Column, names),
+        *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
         *map(text, ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]),
     ]
-    title = "Models, settings and run times"
-    return Table("models", columns, rows, title, folded=histories is not None)
+    return Table(
+        "models",
+        columns,
+        rows,
+        "Models, settings and run times",
+        folded=histories is not None,
+    )
 
 
 def _costs(cell: Cell, of: str, base: Cell | None) -> list[str]:
@@ -292,118 +303,47 @@ def _costs(cell: Cell, of: str, base: Cell | None) -> list[str]:
     ]
 
 
+#: One model in one scene, see `entry`.
+Entry = Mapping[str, Any]
 QUANTITY = "peak_rotation"
+#: What is drawn of an expected peak: the bias, and so many standard deviations below and above it.
+DEVIATIONS: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
 #: The figure of all peaks; no scene's file has such a name.
 PEAKS = "overview-peaks"
 
 
-@dataclass(frozen=True)
-class Entry:
-    """One model in one scene: RMS difference of rotation and ratio of peaks.
-
-    Both are against the run's reference.
-
-    `rms` is the judged figure of the shortest window, else the one of the whole time, which is
-    `whole`. `u_num` is the model's numerical uncertainty of `whole` (alpha), where it is known.
-    `apart`: of it and the reference one falls and the other does not, or to another side.
-    """
-
-    cell: Cell
-    rms: Figure | None
-    whole: Figure | None
-    ratio: float | None
-    u_num: float | None
-    outcome: str
-    apart: bool
-
-    @property
-    def used(self) -> float:
-        """The largest share of a limit that the cell uses; infinite where it has no history."""
-        return (
-            math.inf
-            if self.cell.status != "done"
-            else max(map(overrun, self.cell.checks), default=0.0)
-        )
-
-    @property
-    def why_apart(self) -> str:
-        """Why an outcome other than the reference's is within tolerance.
-
-        "" where it is not, or both are the same.
-        """
-        if not self.apart or not self.cell.checks or self.cell.verdict != "pass":
-            return ""
-        judged = any(check.figure.measure == "outcome_agrees" for check in self.cell.checks)
-        return f"not as the reference; {'accepted' if judged else 'not judged'}"
-
-    @property
-    def nearest(self) -> Check | None:
-        """The check that uses most of its limit."""
-        return max(self.cell.checks, key=overrun, default=None)
-
-
-@dataclass(frozen=True)
-class Row:
-    """A scene: its name, and an entry for each model (None where it does not play it)."""
-
-    scene: str
-    entries: tuple[Entry | None, ...]
-
-    @property
-    def worst(self) -> float:
-        """The largest share of a limit that any model uses, as a number that a page can sort by."""
-        return min(max((entry.used for entry in self.entries if entry), default=0.0), 1e9)
-
-
-@dataclass(frozen=True)
-class Glance:
-    """What most readers ask of a run.
-
-    The entry farthest from the reference, the scenes whose outcome depends on the model, and what
-    has changed since it was accepted (the farthest first; `judged` were looked at). A figure that
-    is out of a limit but as it was accepted has not changed.
-    """
-
-    farthest: Entry | None
-    apart: tuple[Row, ...]
-    changed: tuple[tuple[Cell, Check], ...]
-    judged: int
-
-
-def matrix(run: Run) -> list[Row]:
-    """A row a scene, an entry a model of the run."""
+def matrix(run: Run) -> dict[str, list[Entry | None]]:
+    """By scene: an entry for each model of the run, None where it does not play the scene."""
     cells = run.by_scene()
-    return [
-        Row(scene, tuple(entry(run, cells.get(scene, {}), model) for model in run.models))
+    return {
+        scene: [entry(run, cells.get(scene, {}), model) for model in run.models]
         for scene in run.scenes
-    ]
+    }
 
 
-def glance(run: Run, rows: Sequence[Row] | None = None) -> Glance:
-    """The answers that the index gives first.
+def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, Any]:
+    """The answers that the index gives first; `rows` are the run's `matrix`.
 
-    `rows` are those of the run's `matrix`, where they are known.
+    The entry `farthest` from the reference, the scenes whose outcome depends on the model (`apart`,
+    each with its row), and what has `changed` since it was accepted (the farthest first; `judged`
+    were looked at). A figure that is out of a limit but as it was accepted has not changed.
     """
-    rows = matrix(run) if rows is None else rows
-    entries = [
+    others = (
         one
-        for row in rows
-        for one in row.entries
-        if one and one.cell.model != run.reference and one.rms
-    ]
-    accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
-    return Glance(
-        farthest=max(
-            entries, key=lambda one: (one.rms.value if one.rms else None) or 0.0, default=None
-        ),
-        apart=tuple(row for row in rows if any(one and one.apart for one in row.entries)),
-        changed=tuple(
-            sorted(
-                (pair for pair in accepted if _moved(pair[1])), key=lambda pair: -overrun(pair[1])
-            )
-        ),
-        judged=len(accepted),
+        for row in rows.values()
+        for one in row
+        if one and one["cell"].model != run.reference and one["rms"]
     )
+    accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
+    changed = [pair for pair in accepted if _moved(pair[1])]
+    return {
+        "farthest": max(others, key=lambda one: one["rms"].value, default=None),
+        "apart": [
+            (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
+        ],
+        "changed": sorted(changed, key=lambda pair: -overrun(pair[1])),
+        "judged": len(accepted),
+    }
 
 
 def _moved(check: Check) -> bool:
@@ -421,7 +361,13 @@ def _moved(check: Check) -> bool:
 def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     """How far a model lies from the run's reference in a scene; None where it does not play it.
 
-    `cells` are those of the scene, by model.
+    `cells` are those of the scene, by model. Of its `cell`: `rms`, the RMS difference of rotation,
+    is the judged figure of the shortest window, else the one of the `whole` time; `ratio` is that
+    of the peaks. `u_num` is the model's numerical uncertainty of `whole` (alpha), where known.
+
+    `apart`: of it and the reference one falls and the other does not, or to another side, and
+    `why_apart`. `nearest` is the check that uses most of its limit, `used` that share; infinite
+    where there is no history.
     """
     cell, against = cells.get(model), run.reference
     if cell is None:
@@ -430,15 +376,29 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
-    return Entry(
-        cell=cell,
-        rms=min(found, key=lambda figure: figure.until or math.inf, default=None),
-        whole=whole,
-        ratio=value_of(figures, "peak_ratio", against),
-        u_num=cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
-        outcome=outcome_of(cell),
-        apart=len({_side(outcome_of(one)) for one in done}) > 1,
-    )
+    differs = len({_side(outcome_of(one)) for one in done}) > 1
+    nearest = max(cell.checks, key=overrun, default=None)
+    used = overrun(nearest) if nearest else 0.0
+    return {
+        "cell": cell,
+        "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
+        "whole": whole,
+        "ratio": value_of(figures, "peak_ratio", against),
+        "u_num": cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
+        "outcome": outcome_of(cell),
+        "apart": differs,
+        "why_apart": why_apart(cell) if differs else "",
+        "nearest": nearest,
+        "used": used if cell.status == "done" else math.inf,
+    }
+
+
+def why_apart(cell: Cell) -> str:
+    """Why an outcome other than the reference's is within tolerance; "" where it is not."""
+    if not cell.checks or cell.verdict != "pass":
+        return ""
+    judged = any(check.figure.measure == "outcome_agrees" for check in cell.checks)
+    return f"not as the reference; {'accepted' if judged else 'not judged'}"
 
 
 def outcome_of(cell: Cell) -> str:
@@ -482,7 +442,7 @@ def accuracy(run: Run) -> list[Block]:
         trust, (x, y) = in_all or here, zip(*pairs[model], strict=True)
         lines = [
             Series("", ends, ends, style="thin"),
-            *(_expected_lines(trust, ends, styles[model].key) if trust else ()),
+            *(_expected(trust, ends, styles[model].key) if trust else ()),
             Series("", x, y, look=styles[model].key, style="points"),
         ]
         panels.append(Panel(styles[model].label, lines))
@@ -506,19 +466,23 @@ def accuracy(run: Run) -> list[Block]:
         Axis(f"peak |θ|/α by {of}", log=True, limits=ends)
         for of in (styles[run.reference].label, "the model")
     )
-    note = (
-        "Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted: two"
-        " standard deviations."
-    )
     return [
-        Plot(PEAKS, "Predicted against reference", panels=panels, x=x_axis, y=y_axis, note=note),
+        Plot(
+            PEAKS,
+            "Predicted against reference",
+            panels=panels,
+            x=x_axis,
+            y=y_axis,
+            note="Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted:"
+            " two standard deviations.",
+        ),
         Table("accuracy", columns, rows),
     ]
 
 
-def _expected_lines(trust: Trust, ends: tuple[float, float], look: str) -> Iterator[Series]:
-    """The bias, and two standard deviations below and above it."""
-    styles: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
-    for sigma, style in styles.items():
-        factor = trust.bias * math.exp(sigma * trust.scatter)
-        yield Series("", ends, [factor * end for end in ends], look=look, style=style)
+def _expected(trust: Trust, ends: tuple[float, float], look: str) -> list[Series]:
+    return [
+        Series("", ends, [trust.bias * factor * end for end in ends], look=look, style=style)
+        for sigma, style in DEVIATIONS.items()
+        for factor in (math.exp(sigma * trust.scatter),)
+    ]

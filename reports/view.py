@@ -5,12 +5,14 @@ import re
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.reports.style import Look, looks
 from rockcheck.scenes import History, InputError, Scene, kinematics
 from rockcheck.scenes.history import COLUMNS, events_path
 from rockcheck.scenes.reading import within
@@ -43,11 +45,6 @@ class Channel:
     unit: str
     scale: float = 1.0
 
-    @property
-    def axis(self) -> str:
-        """Label of an axis, plain text."""
-        return f"{self.label} ({self.unit})" if self.unit != "1" else self.label
-
 
 #: The quantities of the paper's Figs. 4 and 5, then energy and hop.
 CHANNELS = (
@@ -77,16 +74,32 @@ class Band:
 
 
 @dataclass(frozen=True)
-class SceneView:
+class View:
+    """A scene or an ensemble of a finished run: what has a page of its own."""
+
+    run: Run
+    name: str
+    slug: str
+
+    @cached_property
+    def cells(self) -> tuple[Cell, ...]:
+        """Its cells, in the models' order."""
+        return self.run.of_scene(self.name)
+
+    @cached_property
+    def looks(self) -> dict[str, Look]:
+        """How each model of the run looks."""
+        return looks(self.run.models)
+
+
+@dataclass(frozen=True)
+class SceneView(View):
     """One scene of a finished run, ready to be drawn.
 
     `t` is every `stride`-th output time (s). Histories are read from the run's `folder` when they
     are asked for.
     """
 
-    run: Run
-    name: str
-    slug: str
     scene: Scene
     folder: Path
     stride: int
@@ -125,11 +138,6 @@ class SceneView:
         return {cell.model: _history_of(cell, self.folder) for cell in self.cells}
 
     @cached_property
-    def cells(self) -> tuple[Cell, ...]:
-        """The scene's cells, in the models' order."""
-        return self.run.of_scene(self.name)
-
-    @cached_property
     def t(self) -> Array:
         """The common time axis, s."""
         return self.scene.output_times[:: self.stride]
@@ -153,18 +161,18 @@ class SceneView:
             "hop": np.asarray(kinematics.pivot_height(block, found["y"], found["theta"])),
         }
         found["theta"] = found["theta"] / block.alpha
-        shown = {c.name: c.scale * found[c.name] for c in CHANNELS}
-        return shown | {name: found[name] for name in ("x", "y")}
+        return {c.name: c.scale * found[c.name] for c in CHANNELS} | {
+            name: found[name] for name in ("x", "y")
+        }
 
     def _on_axis(self, history: History, name: str) -> Array:
         """A column on `t`, linear between its rows.
 
         NaN outside them and where there is no such column.
         """
-        if name not in history.channels:
-            return np.full(len(self.t), math.nan)
         times = np.asarray(history.channels["t"], dtype=float)
-        values = np.asarray(history.channels[name], dtype=float)
+        unknown = np.full(len(times), math.nan)
+        values = np.asarray(history.channels.get(name, unknown), dtype=float)
         inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
         return np.where(inside, np.interp(self.t, times, values), math.nan)
 
@@ -180,16 +188,15 @@ class SceneView:
     @property
     def measured(self) -> dict[str, list[int]]:
         """By model that was measured: the rows of `t` that lie next to one of its samples."""
-        found = {}
-        for model, history in self.histories.items():
-            if set(history.settings) >= MEASURED:
-                near = np.searchsorted(
-                    self.t,
-                    np.asarray(history.channels["t"], dtype=float)
-                    - 0.5 * float(self.t[1] - self.t[0]),
-                )
-                found[model] = np.unique(near[near < len(self.t)]).tolist()
-        return found
+        near = {
+            model: np.searchsorted(
+                self.t,
+                np.asarray(history.channels["t"], dtype=float) - 0.5 * float(self.t[1] - self.t[0]),
+            )
+            for model, history in self.histories.items()
+            if set(history.settings) >= MEASURED
+        }
+        return {model: np.unique(rows[rows < len(self.t)]).tolist() for model, rows in near.items()}
 
     @cached_property
     def drawn(self) -> dict[str, dict[str, Array]]:
@@ -226,10 +233,15 @@ class SceneView:
         Its `height` (m), that `model`, and its `longest` flight (s); None where no model may hop,
         or none does.
         """
-        may = [cell for cell in self.cells if cell.model not in self.with_pivot("bilateral")]
-        may.sort(key=lambda cell: cell.settings.get("pivot") != "unilateral")
-        heights = {cell.model: value_of(cell.figures, "highest_hop") for cell in may}
-        model, height = next((one for one in heights.items() if one[1] is not None), ("", None))
+        trusted_first = sorted(
+            self.cells, key=lambda cell: cell.settings.get("pivot") != "unilateral"
+        )
+        heights = (
+            (cell.model, value_of(cell.figures, "highest_hop"))
+            for cell in trusted_first
+            if cell.settings.get("pivot") != "bilateral"
+        )
+        model, height = next((one for one in heights if one[1] is not None), ("", None))
         if not height:
             return None
         flights = (end - start for start, end, mode in self.spells(model) if mode == "flight")
@@ -248,12 +260,14 @@ class SceneView:
     @property
     def references(self) -> tuple[str, ...]:
         """Models with a history that others are held against here, the run's reference first."""
-        named = [
-            self.run.reference,
-            self.run.model_form,
-            *(f.against for cell in self.cells for f in cell.figures),
-        ]
-        return tuple(model for model in dict.fromkeys(named) if model in self.histories)
+        named = dict.fromkeys(
+            [
+                self.run.reference,
+                self.run.model_form,
+                *(figure.against for cell in self.cells for figure in cell.figures),
+            ]
+        )
+        return tuple(model for model in named if model in self.histories)
 
     @property
     def figure_references(self) -> tuple[str | None, ...]:
@@ -313,8 +327,15 @@ class SceneView:
     @property
     def horizon(self) -> float | None:
         """Horizon of predictability, s: the end of the window of that name, where there is one."""
-        figures = (f for cell in self.cells for f in all_figures(cell) if f.window == "horizon")
-        return min((f.until for f in figures if f.until is not None), default=None)
+        return min(
+            (
+                figure.until
+                for cell in self.cells
+                for figure in all_figures(cell)
+                if figure.window == "horizon" and figure.until is not None
+            ),
+            default=None,
+        )
 
     @property
     def agreement(self) -> dict[str, tuple[float, str, str]]:
@@ -348,10 +369,10 @@ class SceneView:
     def extent(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top of everything that the block and the walls reach, m."""
         block = self.scene.block
-        faces = [
+        faces = (
             (block.half_width + wall.gap) * (-1.0 if wall.side == "left" else 1.0)
             for wall in self.scene.walls
-        ]
+        )
         wide = [np.array([-block.half_width, block.half_width, *faces])]
         tall = [np.array([0.0, 2.0 * block.half_height])]
         for columns in self.values.values():
@@ -378,17 +399,15 @@ def scene_views(
     slugs = slugs_of(run.scenes)
     names = [name for name in run.scenes if chosen is None or name in chosen]
     share = max(most_values / max(1, len(names)), 20_000.0)
-
-    def stride(name: str, scene: Scene) -> int:
+    views = []
+    for name in names:
+        scene = run.load_scene(name)
         models = max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
         values = (scene.duration / scene.output_step + 1.0) * ((len(CHANNELS) + 2) * models)
-        return max(1, math.ceil(values / share))
-
-    scenes = {name: run.load_scene(name) for name in names}
-    return [
-        SceneView(run, name, slugs[name], scene, folder, stride(name, scene))
-        for name, scene in scenes.items()
-    ]
+        views.append(
+            SceneView(run, name, slugs[name], scene, folder, max(1, math.ceil(values / share)))
+        )
+    return views
 
 
 def slugs_of(names: Iterable[str]) -> dict[str, str]:
@@ -400,9 +419,8 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
     taken: set[str] = set()
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
-        slug, n = base, 2
-        while slug.lower() in taken:
-            slug, n = f"{base}-{n}", n + 1
+        numbered = chain([base], (f"{base}-{n}" for n in count(2)))
+        slug = next(one for one in numbered if one.lower() not in taken)
         taken.add(slug.lower())
         slugs[name] = slug
     return slugs

@@ -1,19 +1,15 @@
 """Notebook tables and figures of scenes, histories, spectra and comparisons."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rockcheck.ebm.spectrum import Spectrum
 from rockcheck.reports.show import words
+from rockcheck.reports.style import Figure
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.base import View
 from rockcheck.validation.discrepancy import Discrepancy
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def _later(name: str) -> Callable[[Any], Figure]:

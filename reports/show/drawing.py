@@ -35,14 +35,9 @@ class NotebookFigure(Figure):
         return png.getvalue()
 
 
-def new_figure(width: float = 7.0, height: float = 3.5) -> NotebookFigure:
-    """An empty figure of this width and height, in inches."""
-    return NotebookFigure(figsize=(width, height), layout="constrained")
-
-
 def scene_figure(scene: Scene) -> Figure:
     """Sketch of the block, its floor and walls, and the acceleration of the base over time."""
-    figure = new_figure(7.0, 3.0)
+    figure = NotebookFigure(figsize=(7.0, 3.0), layout="constrained")
     sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
     draw_block(sketch, scene)
     time = np.linspace(0.0, scene.duration, 2001)
@@ -86,7 +81,7 @@ def draw_block(axes: Any, scene: Scene) -> None:
 
 def history_figure(history: History) -> Figure:
     """Rotation, slip of the pivot (mm) and events over time (s)."""
-    figure = new_figure(7.0, 4.2)
+    figure = NotebookFigure(figsize=(7.0, 4.2), layout="constrained")
     rotation, slip, tracks = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
     time = history.channels["t"]
     rotation_lines(rotation, [history], [INK])
@@ -95,8 +90,13 @@ def history_figure(history: History) -> Figure:
         slip.plot(time, 1e3 * history.channels["slip"], color=INK, linewidth=0.9)
     slip.set_ylabel("slip of the\npivot, mm")
     slip.grid(color=SHADE, linewidth=0.5)
-    _tracks(tracks, history)
-    tracks.set_xlabel("t, s")
+    kinds = [kind for kind in TRACKS if any(event.kind == kind for event in history.event_list)]
+    for place, kind in enumerate(kinds):
+        times = [event.t for event in history.event_list if event.kind == kind]
+        tracks.plot(times, [place] * len(times), TRACKS[kind], color=INK, markersize=4)
+    tracks.set_yticks(range(len(kinds)), kinds, fontsize="small")
+    tracks.set(xlabel="t, s", ylim=(max(len(kinds), 1) - 0.5, -0.5))
+    tracks.grid(axis="x", color=SHADE, linewidth=0.5)
     return figure
 
 
@@ -121,16 +121,6 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
     axes.grid(color=SHADE, linewidth=0.5)
 
 
-def _tracks(axes: Any, history: History) -> None:
-    kinds = [kind for kind in TRACKS if any(event.kind == kind for event in history.event_list)]
-    for place, kind in enumerate(kinds):
-        times = [event.t for event in history.event_list if event.kind == kind]
-        axes.plot(times, [place] * len(times), TRACKS[kind], color=INK, markersize=4)
-    axes.set_yticks(range(len(kinds)), kinds, fontsize="small")
-    axes.set_ylim(max(len(kinds), 1) - 0.5, -0.5)
-    axes.grid(axis="x", color=SHADE, linewidth=0.5)
-
-
 def discrepancy_figure(found: Discrepancy) -> Figure:
     """Rotation of both histories, and candidate minus reference over the compared time.
 
@@ -142,13 +132,12 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
     style = looks([reference.model, candidate.model])
     mine, other = style[reference.model], style[candidate.model]
     other = SPARE[0] if mine is other else other
-    figure = new_figure(7.0, 4.0)
+    figure = NotebookFigure(figsize=(7.0, 4.0), layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     rotation_lines(above, [reference, candidate], [mine.light, other.light])
     above.legend(frameon=False, ncols=2)
     pair = Pair(reference, candidate, None, found.end)
-    theta = pair.theta
-    below.plot(pair.time, theta[1] - theta[0], color=other.light, linewidth=0.9)
+    below.plot(pair.time, np.diff(pair.theta, axis=0)[0], color=other.light, linewidth=0.9)
     below.set(xlabel="t, s", ylabel="difference, α" if pair.alpha else "difference, rad")
     below.grid(color=SHADE, linewidth=0.5)
     return figure
@@ -160,7 +149,8 @@ def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
     Acceleration is in g, velocity in m/s, both over time in s. Spectral acceleration, in g at
     5 % damping, is over the period in s.
     """
-    figure = new_figure(9.0, 1.9 * len(recordings) + 0.4)
+    size = 9.0, 1.9 * len(recordings) + 0.4
+    figure = NotebookFigure(figsize=size, layout="constrained")
     for (name, record), (acceleration, velocity, spectrum) in zip(
         recordings,
         figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)),

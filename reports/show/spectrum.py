@@ -1,22 +1,17 @@
 """Overturning spectra in the paper's colours, and the scripts of their interactive page."""
 
-from __future__ import annotations
-
-import itertools
 import json
+from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
-from rockcheck.reports.style import LOOKS, PAGE, figure_style
+from rockcheck.reports.style import LOOKS, PAGE, Figure, figure_style
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.scenes.writing import script_text, write_whole
 from rockcheck.validation.finding import Plot
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: The paper's colours.
 COLOURS = {
@@ -54,9 +49,9 @@ OWN_MARK: dict[str, Any] = {
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
     """One overturning spectrum as a figure."""
-    from rockcheck.reports.show.drawing import new_figure
+    from rockcheck.reports.show.drawing import NotebookFigure
 
-    figure = new_figure(4.5, 3.6)
+    figure = NotebookFigure(figsize=(4.5, 3.6), layout="constrained")
     draw(spectrum, figure.subplots())
     return figure
 
@@ -70,12 +65,11 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     """
     letters = np.array(["L", "S", "R"])[spectrum.outcomes - LEFT]
     letters[tuple(spectrum.undecided.T)] = "U"
-    law: Any = [] if spectrum.depends_on_law is None else spectrum.depends_on_law
-    axis = spectrum.frequency_ratios, spectrum.amplitude_ratios
-    _paint(axes, letters, *axis, free=not spectrum.scene.walls, law=law)
+    x, y = spectrum.frequency_ratios, spectrum.amplitude_ratios
+    law = () if spectrum.depends_on_law is None else spectrum.depends_on_law
+    _paint(axes, letters, x, y, free=not spectrum.scene.walls, law=law)
     horizontal, vertical = axis_labels(spectrum.scene.excitation.kind == "record")
-    axes.set_xlabel(horizontal)
-    axes.set_ylabel(vertical)
+    axes.set(xlabel=horizontal, ylabel=vertical)
 
 
 def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> None:
@@ -84,10 +78,16 @@ def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> 
     colours = {letter: COLOURS[name] for letter, name in LETTERS.items()} | MARKED
     if not free:
         colours["R"] = COLOURS["overturned"]
-    codes = np.searchsorted(sorted(colours), letters)
-    colour_map = ListedColormap([colours[letter] for letter in sorted(colours)])
-    look = {"cmap": colour_map, "vmin": 0, "vmax": len(colours) - 1}
-    axes.pcolormesh(x, y, codes, shading="nearest", rasterized=True, **look)
+    axes.pcolormesh(
+        x,
+        y,
+        np.searchsorted(sorted(colours), letters),
+        shading="nearest",
+        rasterized=True,
+        cmap=ListedColormap([colours[letter] for letter in sorted(colours)]),
+        vmin=0,
+        vmax=len(colours) - 1,
+    )
     if len(law):
         i, j = np.transpose(law)
         axes.plot(np.asarray(x)[j], np.asarray(y)[i], **LAW_MARK)
@@ -100,8 +100,9 @@ def axis_labels(record: bool) -> tuple[str, str]:
     Frequency and amplitude ratio of a pulse; for a record, the size of the block relative to its
     own and the scale of the record.
     """
-    of_record = "size of the block / its own", "scale of the record"
-    return of_record if record else ("\u03c9\u209a / p", "a\u209a / (g tan \u03b1)")
+    if record:
+        return "size of the block / its own", "scale of the record"
+    return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
 
 
 def figure(plot: Plot) -> Figure:
@@ -109,34 +110,44 @@ def figure(plot: Plot) -> Figure:
 
     Each panel's `place` is its first row, its number of rows and its column.
     """
-    from matplotlib.figure import Figure
-
     data = plot.data
     panels = data["panels"]
+    alone = len(panels) == 1
+    pulse, width = (data["pulse"], PAGE / 1.6) if alone else (None, PAGE)
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
-    with figure_style():
-        figure = Figure(figsize=(PAGE if len(panels) > 1 else PAGE / 1.6, data["height"]))
+    handles, columns = _legend(data)
+    places = _places(
+        panels,
+        (width, data["height"]),
+        rows,
+        title=0.27 if plot.title else 0.03,
+        units=0.4 if pulse else 0.0,
+        below=0.5 + 0.15 * -(-len(handles) // columns),
+    )
+    with figure_style() as new_figure:
+        figure = new_figure(figsize=(width, data["height"]))
         x, y = data["frequencies"], data["amplitudes"]
-        for panel, place in zip(panels, _places(data, rows, bool(plot.title)), strict=True):
+        for panel, place in zip(panels, places, strict=True):
             row, high, column = panel["place"]
             axes = figure.add_axes(place)
             letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-            below, beside = row + high == rows or column < high - 1, _beside(panel)
+            # Where panels are two grid rows high, column 0 holds the panel without a wall, midway
+            # between the rows of the others: it is labelled below, and column 1 beside, too.
+            below, beside = row + high == rows or column < high - 1, column < high
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=not data["record"])
             axes.spines[["top", "right"]].set_visible(True)
             of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)
             axes.set_ylabel(of if beside else "", fontsize=7.0)
-        if units := data["pulse"] if len(panels) == 1 else None:
-            if own := units.get("own"):
+        if pulse:
+            if own := pulse.get("own"):
                 axes.plot(*own, **OWN_MARK)
             _units(axes, data)
-        handles, columns = _legend(data)
         figure.legend(handles=handles, loc="lower center", ncols=columns, fontsize=7)
         figure.suptitle(
             plot.title, fontsize=9, x=0.01, y=1.0 - 0.06 / data["height"], ha="left", va="top"
@@ -144,34 +155,23 @@ def figure(plot: Plot) -> Figure:
     return figure
 
 
-def _beside(panel: Any) -> bool:
-    """Whether a panel's vertical axis is labelled.
-
-    Where panels are two grid rows high, column 0 holds the panel without a wall, midway between the
-    rows of the others: it is labelled below, and column 1 beside, too.
-    """
-    _, high, column = panel["place"]
-    return bool(column < high)
-
-
-def _places(data: Any, rows: int, title: bool) -> list[tuple[float, float, float, float]]:
+def _places(
+    panels: Any, size: tuple[float, float], rows: int, *, title: float, units: float, below: float
+) -> list[tuple[float, float, float, float]]:
     """Where each panel's axes are: left, bottom, width and height, in shares of the figure.
 
-    Margins in inches: a layout engine would need longer than the drawing.
+    Its `size`, and the room for its title, for a pulse's units (above and beside), and for what
+    stands below, are in inches: a layout engine would need longer than the drawing.
     """
-    panels, height = data["panels"], data["height"]
-    width = PAGE if len(panels) > 1 else PAGE / 1.6
-    units = 0.4 if len(panels) == 1 and data["pulse"] else 0.0
-    wide = {column: 0.1 for *_, column in (panel["place"] for panel in panels)}
-    for panel in filter(_beside, panels):
-        wide[panel["place"][2]] = 0.53 if "row" in panel else 0.45
+    width, height = size
+    wide: dict[int, float] = {}
+    for panel in panels:
+        _, high, column = panel["place"]
+        labelled = 0.53 if "row" in panel else 0.45
+        wide[column] = max(wide.get(column, 0.1), labelled if column < high else 0.1)
     across = (width - 0.1 - units - sum(wide.values())) / len(wide)
-    lines = max(panel["title"].count("\n") for panel in panels)
-    above = (0.27 if title else 0.03) + 0.22 + 0.13 * lines + units
-    handles, columns = _legend(data)
-    below = 0.5 + 0.15 * -(-len(handles) // columns)
-    lower = any(panel["title"] for panel in panels if panel["place"][0] > 0)
-    between = 0.3 if lower else 0.12
+    above = title + 0.22 + 0.13 * max(panel["title"].count("\n") for panel in panels) + units
+    between = 0.3 if any(panel["title"] for panel in panels if panel["place"][0] > 0) else 0.12
     row_height = (height - above - below + between) / rows
     return [
         (
@@ -188,10 +188,10 @@ def _units(axes: Any, data: Any) -> None:
     """Add axes with the frequency (Hz) and the peak acceleration (g) of the pulses."""
     hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
     g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
-    above = axes.secondary_xaxis("top", functions=(lambda x: x * hertz, lambda x: x / hertz))
-    above.set_xlabel("frequency of the pulse, Hz")
-    beside = axes.secondary_yaxis("right", functions=(lambda y: y * g, lambda y: y / g))
-    beside.set_ylabel("peak acceleration, g")
+    frequency = (lambda x: x * hertz, lambda x: x / hertz)
+    axes.secondary_xaxis("top", functions=frequency, xlabel="frequency of the pulse, Hz")
+    acceleration = (lambda y: y * g, lambda y: y / g)
+    axes.secondary_yaxis("right", functions=acceleration, ylabel="peak acceleration, g")
 
 
 def outcome_key(panels: Any) -> dict[str, str]:
@@ -230,20 +230,19 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
     `<name>.nodes.js` is small, and the page loads it at once. `<name>.histories.js` is loaded when
     a node is played, and is not among the scripts returned.
     """
-    panels = plot.data["panels"]
-    data = plot.data | {"stem": plot.name, "axes": axis_labels(plot.data["record"])}
-    data["key"] = outcome_key(panels)
-    data["panels"] = [
+    panels = [
         {name: panel[name] for name in ("title", "free", "nodes")}
-        | {"outcomes": _runs(panel["outcomes"])}
-        for panel in panels
+        # Run-length encoding of the letters: "SSL" is "2S1L".
+        | {"outcomes": "".join(f"{len([*same])}{one}" for one, same in groupby(panel["outcomes"]))}
+        for panel in plot.data["panels"]
     ]
+    data = plot.data | {
+        "stem": plot.name,
+        "axes": axis_labels(plot.data["record"]),
+        "key": outcome_key(panels),
+        "panels": panels,
+    }
     for what, content in (("Nodes", data), ("Histories", plot.played)):
         place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
         write_whole(folder / f"{plot.name}.{what.lower()}.js", script_text(place, content))
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]
-
-
-def _runs(letters: str) -> str:
-    """Run-length encoding of the letters: "SSL" gives "2S1L"."""
-    return "".join(f"{len(list(same))}{letter}" for letter, same in itertools.groupby(letters))

@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from html import escape
+from itertools import chain, repeat, takewhile
 
 import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
-from rockcheck.reports.style import Look
+from rockcheck.reports.style import SUPERSCRIPTS, Look
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
 from rockcheck.scenes.errors import inert
 from rockcheck.validation.discrepancy import Discrepancy
@@ -21,40 +22,32 @@ from rockcheck.validation.discrepancy.figures import (
     WindowedHistory,
 )
 
-SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number with `digits` significant digits and a true minus sign; "–" for None.
 
     Very large and very small numbers have a power of ten: 1.2·10⁻⁵.
     """
-    if value is None:
-        return "–"
-    text = f"{value:.{digits}g}"
-    if "e" in text:
-        mantissa, power = text.split("e")
-        return f"{mantissa}·10{str(int(power)).translate(SUPERSCRIPTS)}".replace("-", "−")
-    return text.replace("-", "−")
+    return "–" if value is None else readable(f"{value:.{digits}g}").replace("-", "−")
 
 
 def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[object] = ()) -> str:
     """A small HTML table; all text is escaped. Without `head` the first column names the rows."""
-
-    def line(row: Sequence[object], first: str, other: str) -> str:
-        tags = [first, *[other] * (len(row) - 1)]
-        texts = (
+    first = "td" if head else 'th scope="row"'
+    tagged = [
+        *((row, repeat('th scope="col"')) for row in [head] if row),
+        *((row, chain([first], repeat("td"))) for row in rows),
+    ]
+    lines = (
+        "".join(
             f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>'
-            for cell, tag in zip(row, tags, strict=True)
+            for cell, tag in zip(row, tags, strict=False)
         )
-        return f"<tr>{''.join(texts)}</tr>"
-
-    column, row_name = 'th scope="col"', 'th scope="row"'
-    lines = [line(head, column, column)] if head else []
-    lines += [line(row, "td" if head else row_name, "td") for row in rows]
+        for row, tags in tagged
+    )
     return (
         f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>'
-        f"{''.join(lines)}</table>"
+        f"{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
     )
 
 
@@ -81,10 +74,10 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         f"{wall.side}, gap {number(1e3 * wall.gap)} mm, restitution {number(wall.restitution)}"
         for wall in scene.walls
     )
-    starts = [f"θ = {number(tilt / block.alpha)} α"] if tilt else []
-    starts += [
+    starts = [
         f"{what} {number(value)} {of}"
         for what, value, of in (
+            ("θ =", tilt / block.alpha, "α"),
             ("velocity", scene.initial_velocity, "m/s"),
             ("angular velocity", scene.initial_angular_velocity, "rad/s"),
             ("height", scene.initial_height, "m"),
@@ -121,9 +114,9 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
         f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
         f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
     )
-    gyration = f"radius of gyration {number(math.sqrt(block.gyration_squared))} m"
+    gyration = number(math.sqrt(block.gyration_squared))
     return [
-        ("mass's centre", f"{place}; {gyration}"),
+        ("mass's centre", f"{place}; radius of gyration {gyration} m"),
         ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
     ]
 
@@ -141,17 +134,18 @@ def history_html(history: History) -> str:
     time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
     peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
     kinds = Counter(event.kind for event in WindowedHistory(history).events(*IMPACTS))
-    settings = ", ".join(f"{key} {value}" for key, value in history.settings.items())
     facts = {
         "outcome": history.fate,
         "peak rotation": peak if history.overturned_at is None else "",
         "impacts": f"{kinds['floor impact']} on the floor, {kinds['wall impact']} on walls",
         "time": f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows",
-        "settings": settings,
+        "settings": ", ".join(f"{key} {value}" for key, value in history.settings.items()),
         "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",
     }
-    rows = [(name, said) for name, said in facts.items() if said]
-    rows += [("note", note) for note in history.notes]
+    rows = [
+        *((name, said) for name, said in facts.items() if said),
+        *(("note", note) for note in history.notes),
+    ]
     return html_table(f"{history.name}, {history.model}", rows)
 
 
@@ -177,8 +171,9 @@ def spectrum_html(spectrum: Spectrum) -> str:
         ("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"),
         ("undecided", str(len(spectrum.undecided))),
     ]
-    about = scene_facts(spectrum.scene)[: 4 + len(mass_facts(spectrum.scene.block))]
-    return html_table(f"Overturning spectrum: {spectrum.scene.name}", [*facts, *about])
+    # What the scene's own base motion is, and what follows from it, does not count.
+    facts += takewhile(lambda fact: fact[0] != "base", scene_facts(spectrum.scene))
+    return html_table(f"Overturning spectrum: {spectrum.scene.name}", facts)
 
 
 _POWER = re.compile(r"(?<![\w.])([+-]?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]\w)")
@@ -187,10 +182,12 @@ _MINUS = re.compile(r"(?<![\w.)\]-])-(?=\.?\d)")
 
 def readable(text: str) -> str:
     """A sentence whose numbers do not break at a hyphen: −1.2·10⁻³ for -1.2e-3."""
-    shown = _POWER.sub(
-        lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text
+    return _MINUS.sub(
+        "−",
+        _POWER.sub(
+            lambda found: f"{found[1]}·10{str(int(found[2])).translate(SUPERSCRIPTS)}", text
+        ),
     )
-    return _MINUS.sub("−", shown)
 
 
 def unit(name: str) -> str:

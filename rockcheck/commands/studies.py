@@ -188,7 +188,7 @@ def _tune(
 
 
 def _export(folder: Path) -> None:
-    from rockcheck.reports.scene_data import write_scene_file
+    from rockcheck.reports.site import write_scene_file
     from rockcheck.validation.studies.conformance.phenomena import SCENES
     from rockcheck.validation.studies.conformance.study import export
 

@@ -4,7 +4,7 @@ cell, hostile names."""
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -17,6 +17,9 @@ from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.execute.store import HISTORIES
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
 MODELS: Mapping[str, dict[str, Any]] = {
@@ -333,3 +336,53 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_run(folder)
     write_site(folder)
     return folder
+
+
+@pytest.fixture
+def opened(visitor: Callable[..., "Page"]) -> Callable[..., "Page"]:
+    """`opened(path, home, **settings)` is a page of the folder `home` in the browser, its data
+    unpacked; in the end it must have complained of nothing and asked for nothing elsewhere."""
+
+    def page_at(path: Path, home: Path | None = None, **settings: Any) -> "Page":
+        desk = {"viewport": {"width": 1280, "height": 900}}
+        page = visitor(home or path.parent, **desk | settings)
+        page.goto(path.as_uri())
+        until(page, "!window.rockcheck || !!window.rockcheckPage")
+        return page
+
+    return page_at
+
+
+def until(page: "Page", expression: str, seconds: float = 10.0) -> None:
+    """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting
+    does."""
+    for _ in range(int(seconds / 0.05)):
+        if page.evaluate(expression):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"never came true: {expression}")
+
+
+@pytest.fixture
+def eventually() -> Callable[..., None]:
+    """`eventually(page, expression)` waits for it to hold."""
+    return until
+
+
+@pytest.fixture
+def barriers() -> Callable[["Page"], list[str]]:
+    """`barriers(page)`: what keeps people from reading a page, all its details open."""
+    from axe_playwright_python.sync_playwright import Axe
+
+    def found(page: "Page") -> list[str]:
+        page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+        # By default it would ask for style sheets, which a file may not.
+        violations = Axe().run(page, options={"preload": False}).response["violations"]
+        return [
+            f"{v['id']}: {n['html'][:120]}"
+            for v in violations
+            if v["impact"] in ("serious", "critical")
+            for n in v["nodes"][:3]
+        ]
+
+    return found

@@ -3,12 +3,10 @@
 import dataclasses
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
 
 from rockcheck.reports.site import write_site
@@ -21,74 +19,43 @@ PAGES = ("index.html", "pages/free.html", "pages/beside-a-wall.html", "pages/Fre
 WALL = "pages/beside-a-wall.html"
 
 
-@dataclass
-class Visit:
-    """An empty page of the browser, and the site that it is to open."""
-
-    page: playwright.Page
-    site: Path
-
-    def open(self, address: str) -> playwright.Page:
-        """Go to a page of the site; of a scene's page the data are unpacked."""
-        self.page.goto((self.site / address).as_uri())
-        until(self.page, "!window.rockcheck || !!window.rockcheckPage")
-        return self.page
-
-
-Visits = Callable[..., Visit]
+Opened = Callable[..., playwright.Page]
 
 
 @pytest.fixture
-def visits(visitor: Callable[..., playwright.Page], site: Path) -> Visits:
-    """`visits(**settings)` is a visit; in the end its page must have complained of nothing and
-    asked for nothing elsewhere."""
+def visit(opened: Opened, site: Path) -> Opened:
+    """`visit(address, **settings)` is a page of the site, see `opened`."""
     for name in ("checks.csv", "figures.csv"):  # validation writes them beside the pages
         (site / name).touch()
-    return lambda **settings: Visit(
-        visitor(site, **{"viewport": {"width": 1280, "height": 900}, **settings}), site
-    )
-
-
-@pytest.fixture
-def visit(visits: Visits) -> Visit:
-    return visits()
-
-
-def until(page: playwright.Page, expression: str, seconds: float = 10.0) -> None:
-    """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting
-    does."""
-    for _ in range(int(seconds / 0.05)):
-        if page.evaluate(expression):
-            return
-        page.wait_for_timeout(50)
-    raise AssertionError(f"never came true: {expression}")
+    return lambda address, **settings: opened(site / address, site, **settings)
 
 
 def window(page: playwright.Page) -> list[float]:
     return page.evaluate("rockcheckPage.store.window")
 
 
-def test_a_browser_that_cannot_unpack_the_data_is_told(visit: Visit) -> None:
-    visit.page.add_init_script("delete window.DecompressionStream")
-    visit.page.goto((visit.site / WALL).as_uri())
-    assert visit.page.locator("#too-old").is_visible()
-    assert not visit.page.locator("#live").is_visible()
+def test_a_browser_that_cannot_unpack_the_data_is_told(visitor: Opened, site: Path) -> None:
+    page = visitor(site)
+    page.add_init_script("delete window.DecompressionStream")
+    page.goto((site / WALL).as_uri())
+    assert page.locator("#too-old").is_visible()
+    assert not page.locator("#live").is_visible()
 
 
 @pytest.mark.parametrize("address", PAGES)
-def test_opens_and_draws(visit: Visit, address: str) -> None:
-    page = visit.open(address)
+def test_opens_and_draws(visit: Opened, eventually, address: str) -> None:
+    page = visit(address)
     assert page.locator("h1").count() == 1
     if address == "index.html":
         return
     assert page.locator("#plots canvas").count() == len(page.evaluate("rockcheckPage.drawn"))
     inked = """() => [...document.querySelectorAll('#live canvas')].map(c =>
         c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0))"""
-    until(page, f"({inked})().every(Boolean)")
+    eventually(page, f"({inked})().every(Boolean)")
 
 
-def test_links_lead_from_page_to_page(visit: Visit) -> None:
-    page = visit.open("index.html")
+def test_links_lead_from_page_to_page(visit: Opened) -> None:
+    page = visit("index.html")
     for name in ("free", "beside a wall", "Free"):
         page.get_by_role("navigation").get_by_role("link", name=name, exact=True).click()
         playwright.expect(page.locator("h1")).to_have_text(name)
@@ -97,8 +64,8 @@ def test_links_lead_from_page_to_page(visit: Visit) -> None:
     playwright.expect(page.locator("h1")).to_contain_text("A model failed")
 
 
-def test_the_index_is_filtered_and_sorted(visit: Visit) -> None:
-    page = visit.open("index.html")
+def test_the_index_is_filtered_and_sorted(visit: Opened) -> None:
+    page = visit("index.html")
     shown = (
         "[...document.querySelectorAll('#matrix tbody tr:not([hidden])')]"
         ".map(row => row.dataset.scene)"
@@ -117,8 +84,8 @@ def test_the_index_is_filtered_and_sorted(visit: Visit) -> None:
     playwright.expect(page.locator("#pick output")).to_have_text("1 of 3 scenes")
 
 
-def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_zoom_by_dragging_moves_all_plots(visit: Opened, eventually) -> None:
+    page = visit(WALL)
     box = page.locator("#plots .u-over").nth(3)
     box.scroll_into_view_if_needed()
     place = box.bounding_box()
@@ -128,7 +95,7 @@ def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
     page.mouse.move(place["x"] + 0.4 * place["width"], y, steps=4)
     page.mouse.move(place["x"] + 0.5 * place["width"], y, steps=4)
     page.mouse.up()
-    until(page, "rockcheckPage.store.window[0] > 2")
+    eventually(page, "rockcheckPage.store.window[0] > 2")
     assert window(page) == pytest.approx([3.0, 6.0], abs=0.1)
     spans = page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
     assert all(span == pytest.approx(window(page)) for span in spans)
@@ -143,8 +110,8 @@ def test_zoom_by_dragging_moves_all_plots(visit: Visit) -> None:
     assert window(page) == pytest.approx([0.0, 12.0])
 
 
-def test_buttons_and_keys_zoom_and_move(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_buttons_and_keys_zoom_and_move(visit: Opened) -> None:
+    page = visit(WALL)
     page.evaluate("rockcheckPage.store.change({time: 6})")
     page.get_by_role("button", name="Zoom in").click()
     assert window(page) == pytest.approx([3.0, 9.0])
@@ -160,8 +127,8 @@ def test_buttons_and_keys_zoom_and_move(visit: Visit) -> None:
     assert window(page) == pytest.approx([0.0, 12.0])
 
 
-def test_models_are_switched_everywhere(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_models_are_switched_everywhere(visit: Opened) -> None:
+    page = visit(WALL)
     shown = "rockcheckPage.drawn.slice(2).map(u => u.series[3].show)"
     assert all(page.evaluate(shown))
     page.get_by_role("checkbox", name="CM").uncheck()
@@ -172,8 +139,8 @@ def test_models_are_switched_everywhere(visit: Visit) -> None:
     assert all(page.evaluate(shown))
 
 
-def test_reference_of_the_differences_can_be_chosen(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_reference_of_the_differences_can_be_chosen(visit: Opened) -> None:
+    page = visit(WALL)
     largest = "Math.max(...rockcheckPage.drawn[3].data[{}].map(v => Math.abs(v ?? 0)))"
     assert page.evaluate(largest.format(1)) == 0.0  # the reference itself is left out
     assert page.evaluate(largest.format(2)) > 0.0
@@ -183,12 +150,12 @@ def test_reference_of_the_differences_can_be_chosen(visit: Visit) -> None:
     assert "difference from EBM;" in page.locator("#plots").inner_text()
 
 
-def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_animation_moves_the_block_with_the_cursor(visit: Opened, eventually) -> None:
+    page = visit(WALL)
     block = page.locator('#block [data-model="ebm-unilateral"]')
     start = block.get_attribute("transform")
     page.get_by_role("button", name="Play").click()
-    until(page, "rockcheckPage.store.time > 0.3")
+    eventually(page, "rockcheckPage.store.time > 0.3")
     page.get_by_role("button", name="Pause").click()
     time = page.evaluate("rockcheckPage.store.time")
     assert block.get_attribute("transform") != start
@@ -199,7 +166,7 @@ def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
     assert float(angle[1]) == pytest.approx(
         expected * page.evaluate("rockcheck.alpha") * 180.0 / 3.141592653589793
     )
-    until(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
+    eventually(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
     page.locator("#time").fill("2000")
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(10.0)
     line = page.locator("#plots .plot").nth(2).locator(".cursor-line")
@@ -208,49 +175,30 @@ def test_animation_moves_the_block_with_the_cursor(visit: Visit) -> None:
     )
 
 
-def test_slow_motion_is_slow(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_slow_motion_is_slow(visit: Opened, eventually) -> None:
+    page = visit(WALL)
     page.get_by_label("Speed").select_option("0.01")
     page.get_by_role("button", name="Play").click()
-    until(page, "rockcheckPage.store.time > 0")
+    eventually(page, "rockcheckPage.store.time > 0")
     page.wait_for_timeout(400)
     assert page.evaluate("rockcheckPage.store.time") < 0.1
-
-
-def test_a_falling_block_stays_where_it_fell(visit: Visit) -> None:
-    page = visit.open("pages/Free-2.html")
-    page.evaluate("rockcheckPage.store.change({time: 12})")
-    block = page.locator('#block [data-model="ebm"]')
-    assert "NaN" not in (block.get_attribute("transform") or "NaN")
-    assert block.evaluate("e => Number(e.style.opacity)") == 0.4
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("address", ["index.html", WALL])
-def test_accessible(visits: Visits, address: str, scheme: str) -> None:
-    page = visits(color_scheme=scheme, bypass_csp=True).open(address)
-    page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
-    found = (
-        Axe().run(page, options={"preload": False}).response["violations"]
-    )  # it would ask for style sheets, which a file may not
-    serious = [
-        f"{v['id']}: {n['html'][:120]}"
-        for v in found
-        if v["impact"] in ("serious", "critical")
-        for n in v["nodes"][:3]
-    ]
-    assert serious == []
+def test_accessible(visit: Opened, barriers, address: str, scheme: str) -> None:
+    assert barriers(visit(address, color_scheme=scheme, bypass_csp=True)) == []
 
 
-def test_a_phone_needs_no_sideways_scrolling(visits: Visits) -> None:
-    visit = visits(viewport={"width": 390, "height": 800})
+def test_a_phone_needs_no_sideways_scrolling(visit: Opened) -> None:
     for address in PAGES:
-        assert visit.open(address).evaluate("document.documentElement.scrollWidth") == 390, address
+        page = visit(address, viewport={"width": 390, "height": 800})
+        assert page.evaluate("document.documentElement.scrollWidth") == 390, address
 
 
-def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_print_shows_the_figures_and_no_controls(visit: Opened) -> None:
+    page = visit(WALL)
     page.emulate_media(media="print")
     assert not page.locator("#explore").is_visible()
     playwright.expect(page.locator("#paper")).to_have_attribute("open", "")
@@ -261,11 +209,11 @@ def test_print_shows_the_figures_and_no_controls(visit: Visit) -> None:
 
 @pytest.mark.parametrize(("kind", "begins"), [("svg", b"<svg"), ("png", b"\x89PNG")])
 def test_the_plots_can_be_taken_as_a_picture(
-    visit: Visit, tmp_path, kind: str, begins: bytes
+    visit: Opened, tmp_path, kind: str, begins: bytes
 ) -> None:
     """What is shown: the window of time, the models that are on; drawn by itself, with nothing of
     the page around it."""
-    page = visit.open(WALL)
+    page = visit(WALL)
     page.evaluate("rockcheckPage.store.change({ window: [1, 5] })")
     page.get_by_label("CM", exact=True).uncheck()
     with page.expect_download() as waiting:
@@ -287,15 +235,15 @@ def test_the_plots_can_be_taken_as_a_picture(
     assert "NaN" not in content.decode()
 
 
-def test_without_scripts_the_figures_remain(visits: Visits) -> None:
-    page = visits(java_script_enabled=False).open(WALL)
+def test_without_scripts_the_figures_remain(visit: Opened) -> None:
+    page = visit(WALL, java_script_enabled=False)
     assert "need JavaScript" in page.locator("noscript").inner_text()
     assert not page.locator("#live").is_visible()
     assert page.locator(".paper img").first.is_visible()
 
 
-def test_a_page_opens_on_the_time_in_which_something_happens(visit: Visit) -> None:
-    page = visit.open("pages/Free-2.html")
+def test_a_block_that_falls_is_shown_up_to_its_fall(visit: Opened) -> None:
+    page = visit("pages/Free-2.html")
     shown, drawn = (
         window(page),
         page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])"),
@@ -303,22 +251,22 @@ def test_a_page_opens_on_the_time_in_which_something_happens(visit: Visit) -> No
     assert page.evaluate("rockcheck.window") == pytest.approx(shown)
     assert shown[1] < 6.0 < 12.0  # the block lies then
     assert all(ends == pytest.approx(shown) for ends in drawn)
-    page.get_by_role("button", name="Whole").click()
-    assert window(page) == pytest.approx([0.0, 12.0])
-
-
-def test_a_fall_is_marked_and_ends_the_scale(visit: Visit) -> None:
-    page = visit.open("pages/Free-2.html")
     scale = page.evaluate(
         "[rockcheckPage.drawn[2].scales.y.min, rockcheckPage.drawn[2].scales.y.max]"
     )
     assert max(map(abs, scale)) < 1.8
     assert "✕ fell" in page.locator("#plots").inner_text()
     assert page.locator("#result").get_by_text("fell").count() == 2
+    page.get_by_role("button", name="Whole").click()
+    assert window(page) == pytest.approx([0.0, 12.0])
+    page.evaluate("rockcheckPage.store.change({time: 12})")
+    block = page.locator('#block [data-model="ebm"]')
+    assert "NaN" not in (block.get_attribute("transform") or "NaN")
+    assert block.evaluate("e => Number(e.style.opacity)") == 0.4
 
 
-def test_the_running_rms_is_drawn_below_its_limit(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_the_running_rms_is_drawn_below_its_limit(visit: Opened) -> None:
+    page = visit(WALL)
     assert "RMS so far" in page.locator("#plots").inner_text()
     running = page.evaluate(
         "rockcheckPage.drawn[3].data[9].filter(v => v !== null)"
@@ -331,8 +279,8 @@ def test_the_running_rms_is_drawn_below_its_limit(visit: Visit) -> None:
     assert page.evaluate("rockcheckPage.drawn[3].series[9].show") is False
 
 
-def test_the_explanation_and_the_figures_are_folded(visit: Visit) -> None:
-    page = visit.open(WALL)
+def test_the_explanation_and_the_figures_are_folded(visit: Opened) -> None:
+    page = visit(WALL)
     assert page.locator("#form").get_attribute("open") is None
     assert page.locator("#form summary").bounding_box()["height"] < 60.0  # two lines
     assert not page.locator(".paper img").first.is_visible()
@@ -341,9 +289,9 @@ def test_the_explanation_and_the_figures_are_folded(visit: Visit) -> None:
     assert page.locator("#result tbody tr").count() == 8
 
 
-def test_by_night_no_figure_is_white(visits: Visits) -> None:
+def test_by_night_no_figure_is_white(visit: Opened) -> None:
     for address in ("index.html", WALL):
-        page = visits(color_scheme="dark").open(address)
+        page = visit(address, color_scheme="dark")
         page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
         assert set(
             page.eval_on_selector_all(
@@ -352,9 +300,7 @@ def test_by_night_no_figure_is_white(visits: Visits) -> None:
         ) <= {"invert(0.91) hue-rotate(180deg)"}
 
 
-def test_a_measured_history_is_dots(
-    visitor: Callable[..., playwright.Page], tmp_path: Path, finished: Run
-) -> None:
+def test_a_measured_history_is_dots(opened: Opened, tmp_path: Path, finished: Run) -> None:
     history = History.load(tmp_path / (finished.cell("free", "cm").history or ""))
     every = slice(None, None, 10)
     table = dataclasses.replace(
@@ -374,10 +320,7 @@ def test_a_measured_history_is_dots(
         tmp_path
     )
     write_site(tmp_path)
-    page = visitor(
-        tmp_path, viewport={"width": 1280, "height": 900}
-    )  # in the end it must have complained of nothing
-    page.goto((tmp_path / "pages" / "free.html").as_uri())
+    page = opened(tmp_path / "pages" / "free.html", tmp_path)
     assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(
         table.channels["t"]
     )

@@ -10,8 +10,8 @@ import pytest
 from matplotlib.colors import to_rgba
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.drawers import figure_of, scripts_of
-from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
+from rockcheck.reports.drawers import figure_of
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw, write_scripts
 from rockcheck.scenes import Sine, load_scene
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import plain
@@ -113,7 +113,7 @@ def test_the_pulse_of_ones_own_scene_is_marked():
 
 def test_the_scripts_hold_every_node(tmp_path):
     plot = plot_of(8)
-    scripts = scripts_of([plot], tmp_path)
+    scripts = write_scripts(plot, tmp_path)
     assert "figures/figure-8.nodes.js" in scripts
     text = (tmp_path / "figure-8.nodes.js").read_text(encoding="utf-8")
     data = json.loads(text.partition(" = ")[2].rstrip(";\n"))

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
@@ -22,6 +21,7 @@ from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser
 SIZE = 20
+MADE = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
 FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
 
 
@@ -31,10 +31,7 @@ def written(study: Spectra, folder: Path, letters: str) -> Path:
         task: Played(letters) if task.what == "outcomes" else study.play(task)
         for task in study.tasks({})
     }
-    made = Made(
-        created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
-    )
-    return publish(replace(study.gather(done), made=made), folder)
+    return publish(replace(study.gather(done), made=MADE), folder)
 
 
 @pytest.fixture(scope="module")
@@ -47,10 +44,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def page(visitor: Callable[..., playwright.Page], folder: Path) -> playwright.Page:
-    page = visitor(folder, viewport={"width": 1280, "height": 900})
-    page.goto((folder / "index.html").as_uri())
-    return page
+def page(opened: Callable[..., playwright.Page], folder: Path) -> playwright.Page:
+    return opened(folder / "index.html")
 
 
 def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
@@ -104,11 +99,10 @@ def test_pointing_at_a_node_names_it_in_every_panel(page: playwright.Page) -> No
 
 
 def test_ones_own_block_is_told_in_hertz_and_g(
-    visitor: Callable[..., playwright.Page], tmp_path: Path
+    opened: Callable[..., playwright.Page], tmp_path: Path
 ) -> None:
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
-    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2).as_uri())
+    page = opened(written(Spectra((panel,), Request(SIZE)), tmp_path, "S" * SIZE**2))
     assert page.locator(".key.outcomes span").all_inner_texts() == [
         "safe",
         "overturned",
@@ -157,10 +151,7 @@ def test_keys_do_what_the_mouse_does(page: playwright.Page) -> None:
 
 
 def page_of(folder: Path, blocks: list[Block]) -> Path:
-    made = Made(
-        created="2026-11-24T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={}
-    )
-    return publish(Finding("made", "Made up", "20 records.", blocks, made=made), folder)
+    return publish(Finding("made", "Made up", "20 records.", blocks, made=MADE), folder)
 
 
 def fragility_page(folder: Path) -> Path:
@@ -186,10 +177,9 @@ def ida_page(folder: Path) -> Path:
 
 
 def test_fragility_is_read_under_the_pointer(
-    visitor: Callable[..., playwright.Page], tmp_path: Path
+    opened: Callable[..., playwright.Page], tmp_path: Path
 ) -> None:
-    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(fragility_page(tmp_path).as_uri())
+    page = opened(fragility_page(tmp_path))
     assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
     page.locator("[data-curves] .u-over").hover()
     said = page.locator("[data-curves] output").inner_text()
@@ -209,10 +199,9 @@ def test_fragility_is_read_under_the_pointer(
 
 
 def test_the_lines_of_an_ida_are_named_under_the_pointer(
-    visitor: Callable[..., playwright.Page], tmp_path: Path
+    opened: Callable[..., playwright.Page], tmp_path: Path
 ) -> None:
-    page = visitor(tmp_path, viewport={"width": 1280, "height": 900})
-    page.goto(ida_page(tmp_path).as_uri())
+    page = opened(ida_page(tmp_path))
     page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
     said = page.locator('[data-curves="lines"] output').inner_text()
     assert said.startswith("PGA, g ")
@@ -224,33 +213,23 @@ def test_the_lines_of_an_ida_are_named_under_the_pointer(
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("what", ["spectra", "ida"])
 def test_accessible(
-    visitor: Callable[..., playwright.Page], folder: Path, tmp_path: Path, what: str, scheme: str
+    opened: Callable[..., playwright.Page],
+    barriers,
+    folder: Path,
+    tmp_path: Path,
+    what: str,
+    scheme: str,
 ) -> None:
     address = folder / "index.html" if what == "spectra" else ida_page(tmp_path)
-    page = visitor(
-        address.parent,
-        color_scheme=scheme,
-        bypass_csp=True,
-        viewport={"width": 1280, "height": 900},
-    )
-    page.goto(address.as_uri())
+    page = opened(address, color_scheme=scheme, bypass_csp=True)
     if what == "spectra":
         page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
         playwright.expect(page.locator(".played")).to_be_visible()
-    page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
-    found = Axe().run(page, options={"preload": False}).response["violations"]
-    serious = [
-        f"{v['id']}: {n['html'][:120]}"
-        for v in found
-        if v["impact"] in ("serious", "critical")
-        for n in v["nodes"][:3]
-    ]
-    assert serious == []
+    assert barriers(page) == []
 
 
 def test_a_phone_needs_no_sideways_scrolling(
-    visitor: Callable[..., playwright.Page], folder: Path
+    opened: Callable[..., playwright.Page], folder: Path
 ) -> None:
-    page = visitor(folder, viewport={"width": 390, "height": 800})
-    page.goto((folder / "index.html").as_uri())
+    page = opened(folder / "index.html", viewport={"width": 390, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 390
