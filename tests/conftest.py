@@ -121,12 +121,19 @@ def but_progress() -> Callable[[str], list[str]]:
 
 @pytest.fixture
 def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
-    """What a command says on stdout and stderr, once its exit code is as expected."""
+    """What a command says on stdout and stderr, once its exit code is as expected, and it `holds`
+    the words that it should and `lacks` those that it should not."""
 
-    def say(*words: str, code: int = 0) -> tuple[str, str]:
+    def say(
+        *words: str, code: int = 0, holds: Sequence[str] = (), lacks: Sequence[str] = ()
+    ) -> tuple[str, str]:
         capsys.readouterr()
         assert main(list(words)) == code
-        return capsys.readouterr()
+        said = capsys.readouterr()
+        told = said.out + said.err
+        assert [part for part in holds if part not in told] == [], told
+        assert [part for part in lacks if part in told] == [], told
+        return said
 
     return say
 
@@ -235,8 +242,7 @@ def synthetic(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        half_width=HALF_WIDTH,
-        half_height=HALF_HEIGHT,
+        block=Block(half_width=HALF_WIDTH, half_height=HALF_HEIGHT),
     )
 
 
