@@ -60,10 +60,6 @@ ARGUMENTS = [
 ]
 
 
-def _may_be_skipped(reason: str) -> bool:
-    return any(reason.startswith(words) and allowed for words, allowed in MAY_BE_SKIPPED.items())
-
-
 def _judged(report: Any) -> None:
     """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
     if not os.environ.get("CI") or not report.skipped or hasattr(report, "wasxfail"):
@@ -71,7 +67,8 @@ def _judged(report: Any) -> None:
     reason = str(
         report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
     ).removeprefix("Skipped: ")
-    if not _may_be_skipped(reason):
+    allowed = tuple(words for words, listed in MAY_BE_SKIPPED.items() if listed)
+    if not reason.startswith(allowed):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
 
@@ -100,11 +97,8 @@ def pytest_runtest_makereport() -> Iterator[None]:
     return report
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_make_collect_report() -> Iterator[None]:
-    report = yield
-    _judged(report)
-    return report
+#: The same for a whole file.
+pytest_make_collect_report = pytest_runtest_makereport
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -246,7 +246,7 @@ def told(found: Finding, folder: Path | None = None) -> NoReturn:
     raise typer.Exit(found.exit_code)
 
 
-def one_of(kind: str, given: str, choices: Iterable[str]) -> Any:
+def one_of(kind: str, given: str, choices: Collection[str]) -> Any:
     """The choice that was `given`.
 
     Raises `InputError` that names the `kind` and suggests the nearest choice.
