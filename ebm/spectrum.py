@@ -14,7 +14,7 @@ from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import Block, InputError, Record, Scene
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import check_kind
-from rockcheck.scenes.progress import Count, OnProgress, unheard
+from rockcheck.scenes.progress import OnProgress, unheard
 
 if TYPE_CHECKING:
     from rockcheck.ebm.batch import Packed
@@ -116,12 +116,17 @@ def overturning_spectrum(
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
         model.check(scene)
-        count = Count(on_progress, len(frequencies) * len(amplitudes))
 
         def play(scene: Scene, amplitudes: Floats, frequencies: Floats) -> Nodes:
-            part = count.part()
             return play_nodes(
-                scene, amplitudes, frequencies, model=model, jobs=jobs, on_progress=part
+                scene,
+                amplitudes,
+                frequencies,
+                model=model,
+                jobs=jobs,
+                on_progress=lambda done, total, what="": on_progress(
+                    evaluations + done, outcomes.size
+                ),
             )
 
     outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)

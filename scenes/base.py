@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -78,14 +77,7 @@ class Shown:
         return _view_of(type(self)).html(self)
 
 
-@cache
-def _views() -> dict[type, View]:
-    views: dict[type, View] = {}
-    for entry in entry_points(group="rockcheck.views"):
-        views.update(entry.load())
-    return views
-
-
 def _view_of(kind: type) -> View:
-    views = _views()
+    entries = (entry.load() for entry in entry_points(group="rockcheck.views"))
+    views = {shown: view for entry in entries for shown, view in entry.items()}
     return next(views[base] for base in kind.__mro__ if base in views)

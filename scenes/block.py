@@ -206,6 +206,12 @@ class Block(Frozen):
         j = self.gyration_squared / max(self.pivot("left").radius, self.pivot("right").radius) ** 2
         return 2.0 * math.sqrt(j * (1.0 + j))
 
+    @property
+    def per_unit_mass(self) -> Block:
+        """The same block without its mass; the moment of inertia is per unit mass, m^2."""
+        inertia = self.moment_of_inertia and self.gyration_squared
+        return self.replace(mass=None, moment_of_inertia=inertia)
+
     def mirrored(self) -> Block:
         """The same block with left and right exchanged."""
         x, z = self.offset

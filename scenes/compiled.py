@@ -38,22 +38,14 @@ from rockcheck.scenes.progress import announce, announced
 from rockcheck.scenes.reading import MOST_BYTES, open_regular
 from rockcheck.scenes.writing import write_whole
 
-
-def _import_array_functions() -> None:
-    """Import numba's array functions without scipy.linalg (0.2 s).
-
-    numba imports scipy.linalg only to check that BLAS is there. It is, since rockcheck needs scipy;
-    code that calls BLAS checks again when it is compiled.
-    """
-    look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
-    try:
-        # Nothing here calls it: importing it tells numba how to compile arrays.
-        from numba.np import arraymath  # noqa: F401
-    finally:
-        linalg.ensure_blas = look
-
-
-_import_array_functions()
+# numba imports scipy.linalg (0.2 s) only to check that BLAS is there. It is, since rockcheck needs
+# scipy; code that calls BLAS checks again when it is compiled.
+_look, linalg.ensure_blas = linalg.ensure_blas, lambda: None
+try:
+    # Nothing here calls it: importing it tells numba how to compile arrays.
+    from numba.np import arraymath  # noqa: F401
+finally:
+    linalg.ensure_blas = _look
 config: Any = numba_config
 
 #: Age up to which code compiled from other sources is kept, s.
@@ -80,19 +72,16 @@ class _Compiling(Listener):
         self.depth = 0
         self.wanted = False
         self.told: set[str] = set()
-        self.timer: threading.Timer | None = None
 
     def on_start(self, event: Event) -> None:
         """Start of a compilation, perhaps inside another one; numba's lock admits one thread."""
         if self.depth == 0:
             self.wanted = gc.isenabled()
             gc.disable()
+            function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
+            self.timer = threading.Timer(_SILENT, self._tell, [getattr(function, "__module__", "")])
+            self.timer.daemon = True
             if announced():
-                function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-                self.timer = threading.Timer(
-                    _SILENT, self._tell, [getattr(function, "__module__", "")]
-                )
-                self.timer.daemon = True
                 self.timer.start()
         self.depth += 1
 
@@ -100,9 +89,7 @@ class _Compiling(Listener):
         """End of a compilation."""
         self.depth -= 1
         if self.depth == 0:
-            if self.timer is not None:
-                self.timer.cancel()
-                self.timer = None
+            self.timer.cancel()
             if self.wanted:
                 gc.enable()
 
@@ -110,10 +97,9 @@ class _Compiling(Listener):
         package = ".".join(module.split(".")[:2])
         if package not in self.told:
             self.told.add(package)
-            what = _PURPOSES.get(package, package)
             announce(
-                f"compiling {what} for this machine, once a version: about a minute (`rockcheck"
-                " warm` does it ahead)"
+                f"compiling {_PURPOSES.get(package, package)} for this machine, once a version:"
+                " about a minute (`rockcheck warm` does it ahead)"
             )
 
 
@@ -122,8 +108,7 @@ register("numba:compile", _Compiling())
 
 def _package(function: Callable[..., Any]) -> Path:
     """Folder of the function's package: of rockcheck.ebm for rockcheck.ebm.core.march."""
-    below = max(len(function.__module__.split(".")) - 3, 0)
-    return Path(function.__code__.co_filename).parents[below]
+    return Path(function.__code__.co_filename).parents[max(function.__module__.count(".") - 2, 0)]
 
 
 @cache
@@ -206,8 +191,7 @@ class _Compiler(Compiler):
     """
 
     def _compile_core(self) -> Any:
-        already = "get_call_type" in vars(types.Function)
-        if already:
+        if "get_call_type" in vars(types.Function):  # within another compilation
             return super()._compile_core()
         types.Function.get_call_type = _call_type
         try:
@@ -225,13 +209,10 @@ class _Linked(JITCodeLibrary):
     """
 
     def _optimize_final_module(self) -> None:
-        made = self._codegen._module_pass_manager(
+        passes, builder = self._codegen._module_pass_manager(
             opt=0, loop_vectorize=False, slp_vectorize=False, cost="cheap"
         )
-        passes, *builder = (
-            made if isinstance(made, tuple) else (made,)
-        )  # numba before 0.62 needs no builder
-        passes.run(self._final_module, *builder)
+        passes.run(self._final_module, builder)
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -303,8 +284,6 @@ class _Cache(FunctionCache):
     def load(self, key: object) -> Any:
         """The data that `save` wrote; None if there are none, or if they are damaged."""
         path = self._path(key)
-        if not os.path.lexists(path):
-            return None
         with contextlib.suppress(OSError, InputError), open_regular(path, MOST_BYTES) as stream:
             content = stream.read()
             if hashlib.sha256(content[32:]).digest() == content[:32]:
@@ -389,22 +368,7 @@ def _as_number(kind: Any) -> Any:
     return kind.dtype if isinstance(kind, types.IntEnumMember) else kind
 
 
-def _inner(function: Callable[..., Any], **options: bool) -> Any:
-    """Make an inner kernel, compiled with these options of numba.
-
-    All options are named: numba would take the first caller's for the others.
-    """
-    if config.DISABLE_JIT:
-        return function
-    named = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": True} | options
-    return _Inner(
-        function,
-        targetoptions=named | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
-        pipeline_class=_InnerCompiler,
-    )
-
-
-def inner_kernel(function: Callable[..., Any]) -> Any:
+def inner_kernel(function: Callable[..., Any], *, forceinline: bool = True) -> Any:
     """A part of kernels, inlined into its callers, that neither makes nor returns an array.
 
     It works on arrays that it is given. Most take many arguments, and a call would take longer than
@@ -412,7 +376,15 @@ def inner_kernel(function: Callable[..., Any]) -> Any:
     and no entry point for Python, which calls the plain function instead. numba refuses to compile
     one that makes an array; one that returns an array would free it too early.
     """
-    return _inner(function)
+    if config.DISABLE_JIT:
+        return function
+    # All options are named: numba would take the first caller's for the others.
+    options = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": forceinline}
+    return _Inner(
+        function,
+        targetoptions=options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+        pipeline_class=_InnerCompiler,
+    )
 
 
 def called_kernel(function: Callable[..., Any]) -> Any:
@@ -420,4 +392,4 @@ def called_kernel(function: Callable[..., Any]) -> Any:
 
     Inlined, it would be compiled again at each of them.
     """
-    return _inner(function, forceinline=False)
+    return inner_kernel(function, forceinline=False)

@@ -7,7 +7,7 @@ m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,35 +23,27 @@ MOST_PGA = 1000.0
 
 
 class Motion(Frozen):
-    """Base of all excitations: a scaled or stretched motion is of the same kind.
-
-    `_size` names the field proportional to the acceleration, `_length` the field proportional to
-    time; "" where there is none.
-    """
-
-    _size: ClassVar[str] = "amplitude"
-    _length: ClassVar[str] = "period"
+    """Base of all excitations: a scaled or stretched motion is of the same kind."""
 
     def scaled(self, factor: float) -> Self:
         """The same motion with `factor` times the acceleration.
 
         A negative factor also exchanges left and right.
         """
-        return self._times(self._size, factor)
+        return self._times(("amplitude", "scale"), factor)
 
     def stretched(self, factor: float) -> Self:
         """The same motion with all times multiplied by `factor` (> 0)."""
-        return self._times(self._length, factor)
+        return self._times(("period", "time_step"), factor)
 
-    def _times(self, name: str, factor: float) -> Self:
-        return self.model_copy(update={name: factor * getattr(self, name)}) if name else self
+    def _times(self, names: tuple[str, ...], factor: float) -> Self:
+        own = [name for name in names if name in type(self).model_fields]
+        return self.model_copy(update={name: factor * getattr(self, name) for name in own})
 
 
 class Rest(Motion):
     """A base that does not move."""
 
-    _size: ClassVar[str] = ""
-    _length: ClassVar[str] = ""
     kind: Literal["rest"] = "rest"
 
     def acceleration(self, t: ArrayLike) -> FloatArray:
@@ -147,8 +139,6 @@ class Record(Motion):
     what the file's reader changed or assumed, such as a first time other than 0.
     """
 
-    _size: ClassVar[str] = "scale"
-    _length: ClassVar[str] = "time_step"
     kind: Literal["record"] = "record"
     unscaled: tuple[Finite, ...] = Field(min_length=1, repr=False)
     time_step: Positive
@@ -166,23 +156,18 @@ class Record(Motion):
                 raise InputError("cannot be given together with scale", "pga")
             if extra := {"unscaled", "source", "notes"} & data.keys():
                 raise InputError("cannot be given together with file", min(extra))
-            data = dict(data)
-            path = data.pop("file")
+            path = data["file"]
             if not isinstance(path, str | Path):
                 raise InputError(f"{path!r} is not allowed: give the path of a record file", "file")
-            reading = Reading(
-                **{name: data.pop(name) for name in Reading.model_fields if name in data}
-            )
-            found = read_record(Path(path), reading)
-            data |= {
+            options = data.keys() & Reading.model_fields
+            found = read_record(Path(path), Reading(**{name: data[name] for name in options}))
+            data = {key: data[key] for key in data if key not in (*options, "file")} | {
                 "unscaled": tuple(found.samples.tolist()),
                 "time_step": found.time_step,
                 "source": Path(path).name,
                 "notes": found.notes,
             }
-        if isinstance(data, dict) and "pga" in data:
-            data = _at_peak(data)
-        return data
+        return _at_peak(data) if isinstance(data, dict) and "pga" in data else data
 
     @classmethod
     def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
@@ -228,14 +213,14 @@ class Record(Motion):
 
 def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
     """A record's fields with the `scale` that gives it a peak acceleration of `pga` (g)."""
-    data = dict(data)
-    pga, largest = data.pop("pga"), max(map(abs, data.get("unscaled", ())), default=0.0)
+    pga, largest = data["pga"], max(map(abs, data.get("unscaled", ())), default=0.0)
     number = isinstance(pga, int | float) and not isinstance(pga, bool)
     if not number or not 0.0 < pga <= MOST_PGA:
         raise InputError(f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}", "pga")
     if not largest > 0.0:
         raise InputError("the record does not move: no scale gives it a peak", "pga")
-    return {**data, "scale": pga * GRAVITY_OF_RECORDS / largest}
+    fields = {name: value for name, value in data.items() if name != "pga"}
+    return fields | {"scale": pga * GRAVITY_OF_RECORDS / largest}
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

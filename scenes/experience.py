@@ -81,17 +81,14 @@ def trust_of(model: str, settings: Mapping[str, Any]) -> Mapping[str, Trust]:
 
 def _within(own: object, value: object) -> bool:
     """Whether a setting is this value, or a number below it."""
-    if isinstance(own, float) and isinstance(value, float):
-        return own <= value * (1.0 + 1e-9)
-    return own == value
+    numbers = isinstance(own, float) and isinstance(value, float)
+    return own <= value * (1.0 + 1e-9) if numbers else own == value  # type: ignore[operator]
 
 
 def expected(trust: Trust, value: float) -> Expected:
     """A model's figure M corrected by its bias delta: M/delta, and 1.96 sigma to either side."""
-    best = value / trust.bias
-    return Expected(
-        best, best * (1.0 - WIDTH * trust.scatter), best * (1.0 + WIDTH * trust.scatter)
-    )
+    best, width = value / trust.bias, WIDTH * trust.scatter
+    return Expected(best, best * (1.0 - width), best * (1.0 + width))
 
 
 def axes_of(scene: Scene) -> dict[str, list[float]]:
@@ -101,9 +98,13 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
     over g tan alpha. An axis without a value is left out.
     """
     block = scene.block
-    found = {"alpha": [block.alpha], "R": [block.radius], "friction": [scene.floor.friction]}
-    found["wall restitution"] = [wall.restitution for wall in scene.walls]
-    found["gap / R"] = [wall.gap / block.radius for wall in scene.walls]
+    found = {
+        "alpha": [block.alpha],
+        "R": [block.radius],
+        "friction": [scene.floor.friction],
+        "wall restitution": [wall.restitution for wall in scene.walls],
+        "gap / R": [wall.gap / block.radius for wall in scene.walls],
+    }
     if scene.excitation.kind != "rest":
         peak = float(np.max(np.abs(scene.excitation.acceleration(scene.output_times))))
         found["peak acceleration / (g tan alpha)"] = [

@@ -23,7 +23,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 from pydantic import model_validator
@@ -33,7 +33,7 @@ from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_n
 from rockcheck.scenes.excitations import FloatArray
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.scenes.scene import Scene
+from rockcheck.scenes.scene import Scene, Wall
 
 Place = tuple[str | int, ...]
 Part = TypeVar("Part", bound=Frozen)
@@ -78,10 +78,11 @@ def uncertain_scene_from(
     data: Mapping[str, Any], *, folder: Path, default_name: str
 ) -> UncertainScene:
     """A scene with its uncertain numbers, from the tables of a scene file."""
-    plain, spreads, correlations = split(data)
-    return uncertain_scene(
-        scene_from(plain, folder=folder, default_name=default_name), spreads, correlations
-    )
+    spreads: dict[str, Spread] = {}
+    tables = {key: value for key, value in data.items() if key != CORRELATION}
+    plain = _plain(tables, (), spreads)
+    scene = scene_from(plain, folder=folder, default_name=default_name)
+    return uncertain_scene(scene, spreads, data.get(CORRELATION, {}))
 
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
@@ -158,22 +159,20 @@ class Spread(Frozen):
     @property
     def nominal(self) -> float:
         """The value used in the scene: `value`, else the middle between `low` and `high`."""
-        if self.value is not None:
-            return self.value
-        assert self.low is not None
-        assert self.high is not None
-        return 0.5 * (self.low + self.high)
+        return 0.5 * sum(self._ends) if self.value is None else self.value
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return cast(tuple[float, float], (self.low, self.high))
 
     @property
     def law(self) -> Any:
         """The frozen distribution of scipy.stats."""
         from scipy import stats
 
+        mean, (low, high) = self.nominal, self._ends
         if self.sd is None:
-            assert self.low is not None
-            assert self.high is not None
-            return stats.uniform(self.low, self.high - self.low)
-        mean = self.nominal
+            return stats.uniform(low, high - low)
         if self.distribution == "uniform":
             half = math.sqrt(3.0) * self.sd
             return stats.uniform(mean - half, 2.0 * half)
@@ -238,17 +237,6 @@ class UncertainScene:
             ) from None
 
 
-def split(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Spread], Mapping[str, Any]]:
-    """Split the tables of a scene file into plain numbers, spreads and correlations.
-
-    The tables get the nominal value of each uncertain number. Spreads are keyed by the number's
-    place.
-    """
-    spreads: dict[str, Spread] = {}
-    tables = {key: value for key, value in data.items() if key != CORRELATION}
-    return _plain(tables, (), spreads), spreads, data.get(CORRELATION, {})
-
-
 def uncertain_scene(
     scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
 ) -> UncertainScene:
@@ -289,18 +277,17 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
     Raises `InputError`.
     """
     change: dict[str, Any] = {}
-    walls = list(scene.walls)
+    walls: dict[str, Wall] = {wall.side: wall for wall in scene.walls}
     for place, value in numbers.items():
         table, _, name = place.partition(".")
         if not name:
             change[table] = value
         elif table == "walls":
             side, _, name = name.partition(".")
-            k = next(k for k, wall in enumerate(walls) if wall.side == side)
-            walls[k] = _changed(walls[k], name, value, f"walls.{side}")
+            walls[side] = _changed(walls[side], name, value, f"walls.{side}")
         else:
             change[table] = _changed(change.get(table, getattr(scene, table)), name, value, table)
-    return scene.replace(**change, walls=tuple(walls))
+    return scene.replace(**change, walls=tuple(walls.values()))
 
 
 def _changed(part: Part, name: str, value: float, place: str) -> Part:
@@ -312,7 +299,11 @@ def _changed(part: Part, name: str, value: float, place: str) -> Part:
 
 def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
     if isinstance(value, list):
-        return [_plain(item, (*place, _label(item, k)), spreads) for k, item in enumerate(value)]
+        return [
+            # a wall goes by its side, any other table by its number
+            _plain(item, (*place, item.get("side", k) if isinstance(item, Mapping) else k), spreads)
+            for k, item in enumerate(value)
+        ]
     if not isinstance(value, Mapping):
         return value
     if not value.keys() & _KEYS:
@@ -323,8 +314,3 @@ def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:
     except InputError as error:
         raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
     return spreads[name].nominal
-
-
-def _label(item: Any, k: int) -> str | int:
-    """Label of the k-th table of a list: the side of a wall, else its number."""
-    return str(item["side"]) if isinstance(item, Mapping) and "side" in item else k

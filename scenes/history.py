@@ -99,13 +99,8 @@ class History(Shown):
     settings: Mapping[str, Any] = field(default_factory=dict)
     #: Notes for the reader, one line each (for example that the record is shorter than the scene).
     notes: tuple[str, ...] = ()
-    #: Of the block, m; None for a history read from a file that does not say.
-    half_width: float | None = None
-    half_height: float | None = None
-    #: Of a block that is not homogeneous (see `Block`): centre of mass (m), moment of inertia per
-    #: unit mass (m^2).
-    centre_of_mass: tuple[float, float] | None = None
-    moment_of_inertia: float | None = None
+    #: The block, without its mass; None for a history read from a file that does not say.
+    block: Block | None = None
     #: Half width of the 95 % interval by measure (SI), of figures with an uncertain source, such as
     #: a mean of tests.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
@@ -130,18 +125,6 @@ class History(Shown):
     def alpha(self) -> float | None:
         """The block's slenderness angle in rad, where the block is known."""
         return None if self.block is None else self.block.alpha
-
-    @cached_property
-    def block(self) -> Block | None:
-        """The block, without its mass, where it is known."""
-        if self.half_width is None or self.half_height is None:
-            return None
-        return Block(
-            half_width=self.half_width,
-            half_height=self.half_height,
-            centre_of_mass=self.centre_of_mass,
-            moment_of_inertia=self.moment_of_inertia,
-        )
 
     @property
     def peak_rotation(self) -> float:
@@ -200,13 +183,17 @@ class History(Shown):
         path = Path(path)
         check_format(path)
         kind, contents = path.suffix.lower(), dict[Path, str | bytes]()
-        if kind in (".json", ".mat"):
-            form = _json if kind == ".json" else _mat
-            contents[path] = form(self._about(), self.channels, self._event_columns())
+        if kind == ".json":
+            columns = {name: column.tolist() for name, column in self.channels.items()}
+            more = {"channels": columns, "events": self._event_columns()}
+            contents[path] = json_text(self._about() | more) + "\n"
+        elif kind == ".mat":
+            contents[path] = _mat(self._about(), self.channels, self._event_columns())
         elif kind == ".parquet":
-            attrs = {ABOUT: json.loads(json.dumps(self._about(), default=str))}
-            contents[events_path(path)] = _parquet(self.events, {})
-            contents[path] = _parquet(self.frame, attrs)
+            frame = self.frame.copy()
+            frame.attrs[ABOUT] = json.loads(json.dumps(self._about(), default=str))
+            contents[events_path(path)] = self.events.to_parquet(engine="pyarrow", index=False)
+            contents[path] = frame.to_parquet(engine="pyarrow", index=False)
         else:
             table, beside = self.packed().values() if kind == ".gz" else self._tables()
             if path.is_file() or not path.exists():  # nothing is written beside /dev/stdout
@@ -228,9 +215,10 @@ class History(Shown):
             "name": self.name,
             "model": self.model,
             "outcome": self.outcome,
-            "half_width": self.half_width,
-            "half_height": self.half_height,
-            **{name: getattr(self, name) for name in _MASS if getattr(self, name) is not None},
+            **{name: getattr(self.block, name, None) for name in _SIZES},
+            **{
+                name: getattr(self.block, name) for name in _MASS if getattr(self.block, name, None)
+            },
             "settings": dict(self.settings),
             "notes": list(self.notes),
             "uncertainty": dict(self.uncertainty),
@@ -301,7 +289,7 @@ class History(Shown):
             settings=about.settings,
             notes=tuple(printable(note, 1000) for note in about.notes),
             uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
-            **block,
+            block=block,
         )
 
 
@@ -320,28 +308,14 @@ def check_format(path: Path, more: str = "") -> None:
     """
     kind = path.suffix.lower()
     if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
-        allowed = ".csv, .csv.gz, .json, .mat or .parquet"
         raise InputError(
-            f"{printable(path)}: a history is written as {allowed}, not as"
-            f" {printable(path.suffix)}{more}"
+            f"{printable(path)}: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
+            f" not as {printable(path.suffix)}{more}"
         )
     if kind == ".parquet" and not find_spec("pyarrow"):
         raise InputError(
             f"{printable(path)}: Parquet needs the package pyarrow: pip install pyarrow"
         )
-
-
-def _parquet(table: pd.DataFrame, about: Mapping[str, Any]) -> bytes:
-    table = table.copy()
-    table.attrs = dict(about)
-    return bytes(table.to_parquet(engine="pyarrow", index=False))
-
-
-def _json(
-    about: Mapping[str, Any], channels: Mapping[str, NDArray[Any]], events: Mapping[str, list[Any]]
-) -> str:
-    columns = {name: column.tolist() for name, column in channels.items()}
-    return json_text({**about, "channels": columns, "events": events}) + "\n"
 
 
 def _mat(
@@ -433,28 +407,19 @@ class _About(Frozen):
     cost: Mapping[str, Any] = {}
 
 
-def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, dict[str, Any]]:
-    """The metadata of a table, and the block's fields: masses are checked against the sizes."""
+def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:
+    """The metadata of a table, and its block where both of its sizes are known."""
     text = frame[ABOUT].iloc[0] if ABOUT in frame.columns and len(frame) else "{}"
     try:
         about = _About(**json.loads(text))
         given = {name: getattr(about, name) for name in (*_SIZES, *_MASS)}
+        unknown = None in (about.half_width, about.half_height)
         massless = all(given[name] is None for name in _MASS)
-        return about, given if massless else block_fields(Block(**given))
+        return about, None if unknown and massless else Block(**given)
     except InputError as error:
         raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
     except (TypeError, ValueError, RecursionError):
         raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
-
-
-def block_fields(block: Block) -> dict[str, Any]:
-    """A block's fields as keywords of `History`."""
-    return {
-        "half_width": block.half_width,
-        "half_height": block.half_height,
-        "centre_of_mass": block.centre_of_mass,
-        "moment_of_inertia": block.moment_of_inertia and block.gyration_squared,
-    }
 
 
 def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:

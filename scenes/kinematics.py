@@ -67,25 +67,22 @@ def top_corners(block: Block, x: Any, theta: Any) -> Any:
     return np.stack([x + d * np.cos(theta) - h * np.sin(theta) for d in (-b, b)])
 
 
-def of_mass(block: Block, states: Any) -> Any:
-    """States of the centre of mass, from the box's centre; (..., 6: x, y, theta and rates)."""
-    return states if block.centre_of_mass is None else _moved(block, states, 1.0)
+def of_mass(block: Block, states: Any, sense: float = 1.0) -> Any:
+    """States of the centre of mass, from the box's centre; (..., 6: x, y, theta and rates).
 
-
-def of_box(block: Block, states: Any) -> Any:
-    """States of the box's centre, from the centre of mass; (..., 6: x, y, theta and rates)."""
-    return states if block.centre_of_mass is None else _moved(block, states, -1.0)
-
-
-def _moved(block: Block, states: Any, sense: float) -> Any:
-    """States of a point fixed to the block, at an offset from the given one.
-
-    The offset is `sense` times that from the box's centre to the centre of mass.
+    With `sense` -1 the other way round.
     """
+    if block.centre_of_mass is None:
+        return states
     x, y, theta, x_dot, y_dot, w = np.moveaxis(np.asarray(states, dtype=float), -1, 0)
     (dx, dz), s, c = block.offset, np.sin(theta), np.cos(theta)
     right, up = sense * (dx * c - dz * s), sense * (dx * s + dz * c)
     return np.stack([x + right, y + up, theta, x_dot - w * up, y_dot + w * right, w], axis=-1)
+
+
+def of_box(block: Block, states: Any) -> Any:
+    """States of the box's centre, from the centre of mass; (..., 6: x, y, theta and rates)."""
+    return of_mass(block, states, -1.0)
 
 
 def mass_motion(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import kinematics
-from rockcheck.scenes.history import Cost, Event, History, block_fields, outcome_of
+from rockcheck.scenes.history import Cost, Event, History, outcome_of
 from rockcheck.scenes.scene import Scene
 
 #: Size from which a note warns of lengths in mm, m.
@@ -67,7 +67,7 @@ def observe(
         cost=about.get("cost", Cost()),
         settings=dict(about.get("settings", {})),
         notes=(*scene_notes(scene), *about.get("notes", ())),
-        **block_fields(scene.block),
+        block=scene.block.per_unit_mass,
     )
 
 
@@ -78,9 +78,10 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
     if size > LARGE:
         said.append(f"the block is {size:g} m large: lengths are in m, not mm")
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
-        notes = excitation.notes if excitation.kind == "record" else ()
-        said += [f"the {which} record: {note}" for note in notes]
-        if excitation.kind == "record" and excitation.quiet_after < scene.duration:
+        if excitation.kind != "record":
+            continue
+        said += [f"the {which} record: {note}" for note in excitation.notes]
+        if excitation.quiet_after < scene.duration:
             end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"
             said.append(f"the {which} record ends at {end}; the base is at rest after it")
     return tuple(said)

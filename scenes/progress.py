@@ -14,9 +14,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
 from queue import SimpleQueue
-from threading import Lock
 from typing import Any, Protocol, TypeVar
 
 Result = TypeVar("Result")
@@ -88,33 +86,6 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
         yield
     finally:
         announce_by(before)
-
-
-@dataclass
-class Count:
-    """Adds up the parts that several threads finish, and reports the sum to `on_progress`."""
-
-    on_progress: OnProgress = unheard
-    total: float = 0.0
-    done: float = 0.0
-    _lock: Lock = field(default_factory=Lock, init=False, repr=False)
-
-    def add(self, parts: float) -> None:
-        """Add finished parts, and report the sum."""
-        with self._lock:
-            self.done += parts
-            self.on_progress(self.done, self.total)
-
-    def part(self) -> OnProgress:
-        """An `OnProgress` for one part of the whole work."""
-        before = 0.0
-
-        def told(done: float, total: float, what: str = "") -> None:
-            nonlocal before
-            self.add(done - before)
-            before = done
-
-        return told
 
 
 class _Runner:

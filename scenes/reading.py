@@ -10,8 +10,6 @@ import re
 import stat
 import zipfile
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
@@ -160,22 +158,6 @@ _NOT_UTF8 = re.compile(rb"\xff\xfe|\xfe\xff")
 _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
-@contextmanager
-def open_table(path: Path) -> Iterator[IO[bytes]]:
-    """A table's content, open for reading; gzip is decompressed as it is read.
-
-    Raises `InputError`.
-    """
-    with open_regular(path, MOST_TABLE_BYTES) as stream:
-        packed = stream.read(len(_GZIP)) == _GZIP
-        stream.seek(0)
-        if not packed:
-            yield stream
-            return
-        with gzip.GzipFile(fileobj=stream) as unpacked:
-            yield cast(IO[bytes], unpacked)
-
-
 def read_table(path: Path, **options: Any) -> pd.DataFrame:
     """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas.
 
@@ -190,7 +172,10 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
     if pd.__version__ < "3":  # its reader loses the last bit of a number by default
         options = {"float_precision": "round_trip", **options}
     try:
-        with open_table(path) as stream:
+        with open_regular(path, MOST_TABLE_BYTES) as raw:
+            packed = raw.read(len(_GZIP)) == _GZIP
+            raw.seek(0)
+            stream = cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
             _check_lines(stream, shown)
             stream.seek(0)
             return pd.read_csv(stream, comment="#", **options)

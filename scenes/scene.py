@@ -121,25 +121,18 @@ class Scene(Shown, Frozen):
                 f" {self.duration:g} s",
                 "output_step",
             )
+        x, half_width = self.initial_state[0], self.block.half_width
+        radius, tilt = self.block.half_diagonal, abs(self.initial_rotation)
         for wall in self.walls:
-            reach = self._reach(wall.side)
-            if reach > self.block.half_width + wall.gap + 1e-12 * self.block.half_diagonal:
+            to_the_left = x if wall.side == "left" else -x
+            reach = radius * math.sin(self.block.box_angle + tilt) - to_the_left
+            if reach > half_width + wall.gap + 1e-12 * radius:
                 raise InputError(
                     f"{self.initial_rotation:g} is not allowed: the block would start"
-                    f" {reach - self.block.half_width - wall.gap:.3g} m"
-                    f" inside the {wall.side} wall",
+                    f" {reach - half_width - wall.gap:.3g} m inside the {wall.side} wall",
                     "initial_rotation",
                 )
         return self
-
-    def _reach(self, side: str) -> float:
-        """Reach of the initial block to one side, m from the place of its upright centre."""
-        tilt, radius, alpha = self.initial_rotation, self.block.half_diagonal, self.block.box_angle
-        outward = 1.0 if side == "left" else -1.0
-        centroid = math.copysign(1.0, tilt) * (
-            radius * math.sin(alpha - abs(tilt)) - self.block.half_width
-        )
-        return radius * math.sin(alpha + abs(tilt)) - outward * centroid
 
     def wall(self, side: Literal["left", "right"]) -> Wall | None:
         """The wall on that side, or None."""

@@ -60,10 +60,6 @@ ARGUMENTS = [
 ]
 
 
-def _may_be_skipped(reason: str) -> bool:
-    return any(reason.startswith(words) and allowed for words, allowed in MAY_BE_SKIPPED.items())
-
-
 def _judged(report: Any) -> None:
     """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
     if not os.environ.get("CI") or not report.skipped or hasattr(report, "wasxfail"):
@@ -71,7 +67,8 @@ def _judged(report: Any) -> None:
     reason = str(
         report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
     ).removeprefix("Skipped: ")
-    if not _may_be_skipped(reason):
+    allowed = tuple(words for words, listed in MAY_BE_SKIPPED.items() if listed)
+    if not reason.startswith(allowed):
         report.outcome = "failed"
         report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
 
@@ -100,11 +97,8 @@ def pytest_runtest_makereport() -> Iterator[None]:
     return report
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_make_collect_report() -> Iterator[None]:
-    report = yield
-    _judged(report)
-    return report
+#: The same for a whole file.
+pytest_make_collect_report = pytest_runtest_makereport
 
 
 @pytest.fixture(scope="session")
@@ -121,12 +115,19 @@ def but_progress() -> Callable[[str], list[str]]:
 
 @pytest.fixture
 def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
-    """What a command says on stdout and stderr, once its exit code is as expected."""
+    """What a command says on stdout and stderr, once its exit code is as expected, and it `holds`
+    the words that it should and `lacks` those that it should not."""
 
-    def say(*words: str, code: int = 0) -> tuple[str, str]:
+    def say(
+        *words: str, code: int = 0, holds: Sequence[str] = (), lacks: Sequence[str] = ()
+    ) -> tuple[str, str]:
         capsys.readouterr()
         assert main(list(words)) == code
-        return capsys.readouterr()
+        said = capsys.readouterr()
+        told = said.out + said.err
+        assert [part for part in holds if part not in told] == [], told
+        assert [part for part in lacks if part in told] == [], told
+        return said
 
     return say
 
@@ -235,8 +236,7 @@ def synthetic(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        half_width=HALF_WIDTH,
-        half_height=HALF_HEIGHT,
+        block=Block(half_width=HALF_WIDTH, half_height=HALF_HEIGHT),
     )
 
 

@@ -13,6 +13,7 @@ import tempfile
 import tomllib
 from collections import defaultdict
 from fnmatch import fnmatch
+from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -64,13 +65,10 @@ def share(summary: dict[str, int]) -> float:
 
 def ranges(lines: list[int]) -> str:
     """Line numbers, neighbours put together."""
-    spans: list[list[int]] = []
-    for line in lines:
-        if spans and line == spans[-1][1] + 1:
-            spans[-1][1] = line
-        else:
-            spans.append([line, line])
-    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in spans)
+    # Of neighbours the number less the place in the list is the same.
+    grouped = groupby(enumerate(lines), key=lambda pair: pair[1] - pair[0])
+    spans = [[line for _, line in span] for _, span in grouped]
+    return ", ".join(str(s[0]) if len(s) == 1 else f"{s[0]}-{s[-1]}" for s in spans)
 
 
 if __name__ == "__main__":

@@ -10,12 +10,12 @@ import sys
 import tempfile
 import threading
 import tomllib
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.console import Console
@@ -30,8 +30,8 @@ from rich.progress import (
 )
 
 from rockcheck.reports.style import ENDINGS, kind_of, save_as
-from rockcheck.scenes import InputError, named_scenes
-from rockcheck.scenes.errors import inert, printable, unknown_name
+from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
+from rockcheck.scenes.files import named_scenes
 from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.recordings.sets import Odd
 from rockcheck.scenes.writing import json_text, made
@@ -44,8 +44,6 @@ if TYPE_CHECKING:
     from rockcheck.validation.study import Study
 
 OUT = Path("rockcheck-report")
-Choice = TypeVar("Choice", bound=str)
-
 
 OutOption = Annotated[
     Path,
@@ -248,16 +246,14 @@ def told(found: Finding, folder: Path | None = None) -> NoReturn:
     raise typer.Exit(found.exit_code)
 
 
-def one_of(kind: str, given: str, choices: Iterable[Choice]) -> Choice:
+def one_of(kind: str, given: str, choices: Collection[str]) -> Any:
     """The choice that was `given`.
 
     Raises `InputError` that names the `kind` and suggests the nearest choice.
     """
-    known = tuple(choices)
-    for choice in known:
-        if choice == given:
-            return choice
-    raise unknown_name(kind, given, known)
+    if given not in choices:
+        raise unknown_name(kind, given, choices)
+    return given
 
 
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
@@ -346,14 +342,14 @@ def usable_folder(folder: Path, *parts: str) -> Path:
 
 def scene_names(incomplete: str) -> list[str]:
     """For the shell's completion: scenes that come with the package, and scene files here."""
-    return [name for name in (*named_scenes(), *_files(".toml")) if name.startswith(incomplete)]
+    return _completed(incomplete, named_scenes())
 
 
 def suite_names(incomplete: str) -> list[str]:
     """For the shell's completion: suites that come with the package, and suite files here."""
     from rockcheck.validation.suite.suites import named_suites
 
-    return [name for name in (*named_suites(), *_files(".toml")) if name.startswith(incomplete)]
+    return _completed(incomplete, named_suites())
 
 
 def model_names(incomplete: str) -> list[str]:
@@ -361,5 +357,6 @@ def model_names(incomplete: str) -> list[str]:
     return [name for name in FAMILIES if name.startswith(incomplete)]
 
 
-def _files(suffix: str) -> list[str]:
-    return sorted(path.name for path in Path().glob(f"*{suffix}"))
+def _completed(incomplete: str, names: Iterable[str]) -> list[str]:
+    here = sorted(path.name for path in Path().glob("*.toml"))
+    return [name for name in (*names, *here) if name.startswith(incomplete)]

@@ -125,8 +125,6 @@ def run(
         given = UncertainScene(changed, given.spreads, given.correlation)
     sets = record_sets(records or (), read or ())
     cases, left_out = under_records({given.scene.name: given}, sets, Path())
-    if not records:
-        check_moves(given.scene)
     check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
@@ -141,9 +139,7 @@ def run(
         recorded=bool(records),
         levels=None
         if tried.levels is None
-        else population_of(tried.levels, given.scene, named, tried.capacity)
-        if records
-        else pulses_of(tried.levels, given.scene),
+        else population_of(tried, given.scene, named if records else {}),
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
@@ -153,7 +149,15 @@ def run(
 def check_tried(
     tried: Tried, drawn: UncertainScene, given: UncertainScene, *, recorded: bool
 ) -> None:
-    """Raises `InputError` for an option without an effect; `drawn` is the scene to be drawn."""
+    """Raises `InputError` for a scene in which nothing happens, or an option without an effect.
+
+    `drawn` is the scene to be drawn.
+    """
+    scene = given.scene
+    begins = (scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity)
+    rests = scene.excitation.kind == scene.vertical.kind == "rest"
+    if rests and not (recorded or any(begins) or scene.initial_height):
+        raise InputError("are needed: the base of the scene is at rest", "records")
     if tried.samples is not None and not drawn.spreads:
         besides = " besides the excitation that the records replace" if given.spreads else ""
         raise InputError(
@@ -165,42 +169,29 @@ def check_tried(
         raise InputError("needs records and --levels", "--capacity")
 
 
-def check_moves(scene: Scene) -> None:
-    """Raises `InputError` for a scene in which nothing happens."""
-    begins = any((scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity))
-    still = scene.excitation.kind == scene.vertical.kind == "rest"
-    if still and not begins and not scene.initial_height:
-        raise InputError("are needed: the base of the scene is at rest", "records")
+def population_of(tried: Tried, scene: Scene, cases: dict[str, UncertainScene]) -> Population:
+    """What --levels asks for. Raises `InputError`.
 
-
-def population_of(
-    text: str, scene: Scene, cases: dict[str, UncertainScene], capacity: list[float] | None
-) -> Population:
-    """The incremental dynamic analysis that --levels asks for. Raises `InputError`."""
-    measure, values = levels_of(text)
-    motions = [
-        (name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()
-    ]
+    An incremental dynamic analysis of the `cases` under records; without any, the fragility under
+    pulses of the scene's kind.
+    """
+    measure, values = levels_of(tried.levels or "")
+    if not cases:
+        if measure not in ("", "pga-ratio"):
+            raise InputError(f"{measure} needs records; of pulses it is pga-ratio", "--levels")
+        return fragility(scene, [], values, FREQUENCIES, model=REFERENCE)
     return ida(
         scene,
-        motions,
+        [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],
         values,
         measure=measure or "pga",
-        capacities=capacity or CAPACITIES,
+        capacities=tried.capacity or CAPACITIES,
         upward={
             name: one.scene.vertical
             for name, one in cases.items()
             if one.scene.vertical != scene.vertical
         },
     )
-
-
-def pulses_of(text: str, scene: Scene) -> Population:
-    """The fragility under pulses of the scene's kind. Raises `InputError`."""
-    measure, values = levels_of(text)
-    if measure not in ("", "pga-ratio"):
-        raise InputError(f"{measure} needs records; of pulses it is pga-ratio", "--levels")
-    return fragility(scene, [], values, FREQUENCIES, model=REFERENCE)
 
 
 def levels_of(text: str) -> tuple[str, Floats]:

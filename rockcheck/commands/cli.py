@@ -23,8 +23,7 @@ import typer
 import typer.core
 
 from rockcheck.commands import console, report_file, speaking
-from rockcheck.scenes import InputError, ModelFailure
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, ModelFailure, printable
 from rockcheck.scenes.progress import INTERRUPTED
 from rockcheck.validation.suite.results import FAULT
 
@@ -42,7 +41,7 @@ COMMANDS = {
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("validate.accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
     "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
-    "spectrum": ("spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
+    "spectrum": ("studies.spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("studies.benchmark", "rockcheck benchmark --quick"),
     "conformance": (
         "studies.conformance",
@@ -89,12 +88,11 @@ EXIT_CODES = {
 }
 
 _NAMED = inspect.Parameter.KEYWORD_ONLY
-QuietOption = Annotated[
-    bool, typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer.")
-]
-JsonOption = Annotated[
-    bool, typer.Option("--json", help="The result as JSON on stdout, instead of tables.")
-]
+#: The options that all commands have, by their parameters.
+COMMON = {
+    "quiet": typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer."),
+    "as_json": typer.Option("--json", help="The result as JSON on stdout, instead of tables."),
+}
 
 
 def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
@@ -110,7 +108,8 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
     def command(context: typer.Context, *, quiet: bool, as_json: bool, **given: Any) -> None:
         code = 0
-        given |= {name: _filled(group, given) for name, group in groups.items()}
+        for name, group in groups.items():
+            given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         with speaking("json" if as_json else "quiet" if quiet else "tables"):
             try:
                 does(**given)
@@ -123,17 +122,15 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     every = [
         *(option for one in own for option in _options(one)),
         inspect.Parameter("context", _NAMED, annotation=typer.Context),
-        inspect.Parameter("quiet", _NAMED, default=False, annotation=QuietOption),
-        inspect.Parameter("as_json", _NAMED, default=False, annotation=JsonOption),
+        *(
+            inspect.Parameter(name, _NAMED, default=False, annotation=Annotated[bool, option])
+            for name, option in COMMON.items()
+        ),
     ]
     command.__doc__ = does.__doc__
     command.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in every}
     return command
-
-
-def _filled(group: Any, given: dict[str, Any]) -> Any:
-    return group(**{one.name: given.pop(one.name) for one in fields(group)})
 
 
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
@@ -259,7 +256,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         except ModelFailure as error:
             return _told(str(error), 3)
         except (KeyboardInterrupt, typer.Abort):
-            return _told("interrupted; what was finished is kept", INTERRUPTED)
+            code = INTERRUPTED
         except (
             OSError
         ) as error:  # a disk that is full, a folder that has gone: what was written before is whole
@@ -271,16 +268,11 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         except MemoryError:
             return _told("out of memory; what was finished is kept", 3)
         except Exception as error:
-            trace = "".join(
-                [
-                    f"rockcheck {version('rockcheck')}, Python {sys.version}\n",
-                    *traceback.format_exception(error),
-                ]
-            )
-            where = report_file(trace) or f"this: {error}"
+            program = f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
+            where = report_file("".join([program, *traceback.format_exception(error)]))
             return _told(
                 f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
-                f" {where}",
+                f" {where or f'this: {error}'}",
                 FAULT,
             )
         if code == INTERRUPTED:  # a study has gathered what there is, or Typer has caught it
@@ -330,7 +322,3 @@ def _readers_may_go() -> Iterator[None]:
 def _told(message: str, code: int) -> int:
     print(f"rockcheck: {printable(message, 1400)}", file=sys.stderr)
     return code
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -150,10 +150,9 @@ def headline(found: Discrepancy) -> str:
     """
     assert found.histories is not None
     reference, candidate = (history.fate for history in found.histories)
-    same = found["outcome_agrees"] == 1.0
     fate = (
         f"same outcome, {candidate}"
-        if same
+        if found["outcome_agrees"] == 1.0
         else f"outcomes differ, {candidate} against {reference}"
     )
     rms = found.figure("theta_rms")

@@ -16,8 +16,7 @@ from rockcheck.commands import (
     setting_of,
     tell_left_out,
 )
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
 from rockcheck.scenes.recordings.sets import Odd, files_of, record_path
 from rockcheck.validation.finding import Finding, Table, Text, text
@@ -144,12 +143,7 @@ def _picture(record: Recording) -> str:
             for part in np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
         ]
     )
-    largest = float(np.max(peaks))
-    levels = (
-        np.ceil(peaks / largest * (len(_MARKS) - 1)).astype(int)
-        if largest > 0.0
-        else np.zeros(len(peaks), dtype=int)
-    )
+    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
     return "".join(_MARKS[level] for level in levels)
 
 

@@ -16,8 +16,7 @@ import typer
 from filelock import FileLock, Timeout
 
 from rockcheck.commands import answer, check_file, console, progress
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.writing import no_link, write_whole

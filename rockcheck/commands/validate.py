@@ -28,8 +28,7 @@ from rockcheck.commands import (
 )
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.commands.report import keep, publish, withdraw
-from rockcheck.scenes import InputError
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of

@@ -34,6 +34,7 @@ from rockcheck.scenes.recordings.recording import (
     Recording,
     fault,
     option,
+    place_of,
 )
 from rockcheck.scenes.recordings.tables import read_table
 
@@ -41,9 +42,16 @@ __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_componen
 
 #: Lines of a file that are searched for its format.
 _LOOKED_AT = 100
-Reader = Callable[[Path, list[str], Reading], Recording | list[Recording]]
+Reader = Callable[[Path, list[str], Reading], list[Recording]]
 #: Formats by the ending of the file's name.
 _BY_NAME: dict[str, Reader] = {".at2": read_at2, ".csv": read_table}
+#: Formats with a header, in the words of a message.
+_WITH_HEADER: dict[Reader, str] = {
+    read_at2: "a PEER file",
+    read_esm: "an ESM file",
+    read_knet: "a K-NET file",
+    read_volume: "a V2 file",
+}
 
 
 def read_components(path: Path, reading: Reading | None = None) -> list[Recording]:
@@ -56,9 +64,19 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     """
     asked = reading or Reading()
     lines = read_text(path, latin=True).split("\n")
-    read = _reader_of(path, lines)(path, lines, asked)
-    found = read if isinstance(read, list) else [read]
-    return found if asked.component is None else [_chosen(path, found, asked.component)]
+    read = _reader_of(path, lines)
+    for name in ("column", "header_lines", "decimal") if read in _WITH_HEADER else ():
+        if getattr(asked, name) is not None:
+            raise fault(
+                path,
+                f"is {_WITH_HEADER[read]}, which says by itself where its numbers stand; leave the"
+                f" option {name} out",
+            )
+    found = read(path, lines, asked)
+    if asked.component is None:
+        return found
+    names = [one.component for one in found]
+    return [found[place_of(path, "component", asked.component, names, _listed(found))]]
 
 
 def read_record(path: Path, reading: Reading | None = None) -> Recording:
@@ -84,17 +102,6 @@ def _reader_of(path: Path, lines: list[str]) -> Reader:
     }
     fits = next((reader for reader, fit in found.items() if fit), read_table)
     return _BY_NAME.get(path.suffix.lower(), fits)
-
-
-def _chosen(path: Path, found: list[Recording], component: int | str) -> Recording:
-    if isinstance(component, int) and component <= len(found):
-        return found[component - 1]
-    named = [one for one in found if one.component == component]
-    if len(named) == 1:
-        return named[0]
-    raise fault(
-        path, f"no single component {printable(repr(component))}; there are {_listed(found)}"
-    )
 
 
 def _listed(found: list[Recording]) -> str:

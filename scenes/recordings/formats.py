@@ -28,7 +28,6 @@ from rockcheck.scenes.recordings.recording import (
     known_unit,
     number,
     numbers,
-    only_for_tables,
     option,
     settled_step,
     settled_unit,
@@ -67,9 +66,8 @@ _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
 _UP = {400: "up", 401: "down"}
 
 
-def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
+def read_at2(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
-    only_for_tables(path, reading, "a PEER file")
     found = (AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in lines[:20])
     header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
     if match is None:
@@ -77,13 +75,8 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     for n, line in enumerate(lines[:header], 1):
         if other := _OTHER_KIND.search(line[:_WIDE]):
             raise fault(path, f"{printable(other[0], 30)!r}; only accelerations can be read", n)
-    stated = next(
-        filter(
-            None,
-            (known_unit(word) for line in lines[:header] for word in _UNITS.findall(line)),
-        ),
-        "",
-    )
+    words = (word for line in lines[:header] for word in _UNITS.findall(line))
+    stated = next(filter(None, map(known_unit, words)), "")
     if not stated and reading.unit is None:
         raise fault(
             path,
@@ -96,13 +89,15 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> Recording:
     values = numbers(path, enumerate(lines[header:], header + 1), count)
     if len(values) != count:
         raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header)
-    return Recording(
-        samples=np.array(values) * UNITS[unit],
-        time_step=step,
-        unit=unit,
-        form="PEER AT2",
-        component=_at2_component(lines),
-    )
+    return [
+        Recording(
+            samples=np.array(values) * UNITS[unit],
+            time_step=step,
+            unit=unit,
+            form="PEER AT2",
+            component=_at2_component(lines),
+        )
+    ]
 
 
 def _at2_component(lines: list[str]) -> str:
@@ -110,14 +105,13 @@ def _at2_component(lines: list[str]) -> str:
 
     The line holds event, date, station and component.
     """
-    fields = lines[1].split(",") if len(lines) > 1 else []
-    name = fields[-1].strip()[:10] if len(fields) > 2 else ""
-    return printable(name) if re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
+    fields = lines[1].split(",")
+    name = fields[-1].strip()[:10]
+    return name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
 
 
-def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
+def read_esm(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     """ESM (DYNA 1.2): lines of KEY: value, then one acceleration a line."""
-    only_for_tables(path, reading, "an ESM file")
     said = [match for match in takewhile(bool, map(_ESM_LINE.match, lines)) if match]
     header = {match[1]: (n, match[2].strip()) for n, match in enumerate(said, 1)}
     first = min(len(said) + 1, len(lines))
@@ -142,22 +136,23 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> Recording:
     values = numbers(path, enumerate(lines[first - 1 :], first))
     if len(values) != count:
         raise fault(path, f"NDATA says {count}, the file has {len(values)} samples", place)
-    return Recording(
-        samples=np.array(values) * UNITS[unit],
-        time_step=step,
-        unit=unit,
-        form="ESM ASCII",
-        component=printable(header.get("STREAM", (0, ""))[1], 30),
-    )
+    return [
+        Recording(
+            samples=np.array(values) * UNITS[unit],
+            time_step=step,
+            unit=unit,
+            form="ESM ASCII",
+            component=printable(header.get("STREAM", (0, ""))[1], 30),
+        )
+    ]
 
 
-def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
+def read_knet(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     """K-NET and KiK-net: 17 header lines, then counts of the digitiser.
 
     Names of the header stand in the first 18 columns. The counts have an offset: their mean is
     taken out, as it is for the Max. Acc. that the file states.
     """
-    only_for_tables(path, reading, "a K-NET file")
     header: dict[str, tuple[int, str]] = {}
     for n, line in enumerate(lines[:40], 1):
         header[line[:18].strip()] = n, line[18:].strip()
@@ -178,32 +173,27 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> Recording:
         raise fault(path, f"Scale Factor {printable(scale[0], 40)} is not usable", place)
     hertz = checked_step(path, header["Sampling Freq(Hz)"][0], "Sampling Freq(Hz)", rate[1])
     values = np.array(numbers(path, enumerate(lines[n:], n + 1)))
-    _check_duration(path, header.get("Duration Time(s)"), hertz, len(values))
+    if not len(values):
+        raise fault(path, "no samples after the line Memo.")
+    if stated := header.get("Duration Time(s)"):
+        expected = number(path, *stated) * hertz
+        if abs(expected - len(values)) > 0.5:
+            found = f"{expected:.10g} samples, the file has {len(values)}"
+            raise fault(path, f"Duration Time(s) {stated[1]} is {found}", stated[0])
     unit = settled_unit(path, "gal", reading)
     samples = values * (factor / counts * UNITS[unit])
     mean = float(np.mean(samples))
     said = f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
-    return Recording(
-        samples=samples - mean,
-        time_step=settled_step(path, 1.0 / hertz, reading),
-        unit=unit,
-        form="K-NET ASCII",
-        component=printable(header.get("Dir.", (0, ""))[1], 30),
-        notes=(said,),
-    )
-
-
-def _check_duration(path: Path, stated: tuple[int, str] | None, hertz: float, found: int) -> None:
-    if not found:
-        raise fault(path, "no samples after the line Memo.")
-    if stated:
-        expected = number(path, stated[0], stated[1]) * hertz
-        if abs(expected - found) > 0.5:
-            raise fault(
-                path,
-                f"Duration Time(s) {stated[1]} is {expected:.10g} samples, the file has {found}",
-                stated[0],
-            )
+    return [
+        Recording(
+            samples=samples - mean,
+            time_step=settled_step(path, 1.0 / hertz, reading),
+            unit=unit,
+            form="K-NET ASCII",
+            component=printable(header.get("Dir.", (0, ""))[1], 30),
+            notes=(said,),
+        )
+    ]
 
 
 @dataclass
@@ -240,7 +230,6 @@ def is_volume(line: str) -> bool:
 
 def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     """Every block of acceleration, in the file's order."""
-    only_for_tables(path, reading, "a V2 file")
     found: list[Recording] = []
     block, index = _Block(), 0
     while index < len(lines):

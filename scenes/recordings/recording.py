@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -92,8 +92,8 @@ def fault(path: Path, said: str, line: int | None = None) -> InputError:
 
 def option(name: str, value: str | float) -> str:
     """Text that shows how to give an option, on the command line and in a scene file."""
-    in_file = value if not isinstance(value, str) else f'"{value}"'
-    return f"--read {name}={value} (in a scene file: {name} = {in_file})"
+    quote = '"' if isinstance(value, str) else ""
+    return f"--read {name}={value} (in a scene file: {name} = {quote}{value}{quote})"
 
 
 def number(path: Path, line: int, word: str) -> float:
@@ -101,13 +101,28 @@ def number(path: Path, line: int, word: str) -> float:
 
     Raises `InputError` if it is none, or larger than `MOST`.
     """
-    if _NUMBER.fullmatch(word):
-        value = float(word.translate(_EXPONENT))
-        if abs(value) <= MOST:
-            return value
-        if math.isfinite(value):
-            raise fault(path, f"{printable(word, 30)} is larger than {MOST:g}", line)
-    raise fault(path, f"{printable(word, 30)!r} is not a finite number", line)
+    value = float(word.translate(_EXPONENT)) if is_number(word) else math.nan
+    if abs(value) <= MOST:
+        return value
+    shown = printable(word, 30)
+    said = (
+        f"{shown} is larger than {MOST:g}"
+        if math.isfinite(value)
+        else f"{shown!r} is not a finite number"
+    )
+    raise fault(path, said, line)
+
+
+def place_of(path: Path, kind: str, asked: int | str, names: Sequence[str], listed: str) -> int:
+    """Place from 0 of the column or component that is `asked` for, by its number or its name.
+
+    `kind` and `listed` are words for the message of the `InputError` where there is no such one.
+    """
+    if isinstance(asked, int) and asked <= len(names):
+        return asked - 1
+    if names.count(asked) == 1:
+        return names.index(asked)
+    raise fault(path, f"no single {kind} {printable(repr(asked))}; there are {listed}")
 
 
 def is_number(word: str) -> bool:
@@ -180,20 +195,6 @@ def settled_step(path: Path, stated: float, reading: Reading) -> float:
             " option time_step out",
         )
     return stated
-
-
-def only_for_tables(path: Path, reading: Reading, form: str) -> None:
-    """Raise `InputError` if an option of tables is given for a format with a header.
-
-    `form` names the format in the message.
-    """
-    for name in ("column", "header_lines", "decimal"):
-        if getattr(reading, name) is not None:
-            raise fault(
-                path,
-                f"is {form}, which says by itself where its numbers stand; leave the option {name}"
-                " out",
-            )
 
 
 def checked_count(path: Path, line: int, name: str, count: str) -> int:

@@ -23,6 +23,7 @@ from rockcheck.scenes.recordings.recording import (
     known_unit,
     number,
     option,
+    place_of,
     settled_unit,
 )
 
@@ -49,28 +50,22 @@ class _Layout:
 
     def words(self, path: Path, n: int, line: str) -> list[str]:
         """The fields of a line; decimal commas become points."""
-        if self.separator is None:
-            words = line.split()
-        elif '"' not in line:
-            words = [word.strip() for word in line.split(self.separator)]
+        if self.separator is None or '"' not in line:
+            words = line.split(self.separator)
         else:
             try:
-                words = [
-                    word.strip() for word in next(csv.reader([line], delimiter=self.separator))
-                ]
+                words = next(csv.reader([line], delimiter=self.separator))
             except csv.Error as error:
                 raise fault(path, f"not a line of a CSV table: {printable(error)}", n) from None
-        return (
-            [
-                word.replace(",", ".", 1) if _DECIMAL_COMMA.fullmatch(word) else word
-                for word in words
-            ]
-            if self.decimal_comma
-            else words
-        )
+        words = [word.strip() for word in words]
+        if not self.decimal_comma:
+            return words
+        return [
+            word.replace(",", ".", 1) if _DECIMAL_COMMA.fullmatch(word) else word for word in words
+        ]
 
 
-def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
+def read_table(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     """Read a column of times and one of accelerations, or accelerations alone.
 
     Lines that start with # or % are remarks.
@@ -82,19 +77,22 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> Recording:
     unit = settled_unit(path, stated, reading)
     samples, times, words = cells.read(place, time)
     step, notes = float(reading.time_step or 0.0), list[str]()
-    name = f"column {place + 1}" if cells.width > 1 else ""
     if time is not None:
         step, notes = _step_of(path, times, words, [n for n, _ in cells.rows], reading)
         if not cells.names or cells.names[time].lower() in ("t", "time"):
             notes.append(f"column {time + 1} is taken as the time in s")
-    return Recording(
-        samples=samples * UNITS[unit],
-        time_step=step,
-        unit=unit,
-        form="table" if cells.layout.separator is None else "CSV",
-        component=printable(cells.names[place], 30) if cells.names else name,
-        notes=tuple(notes),
-    )
+    return [
+        Recording(
+            samples=samples * UNITS[unit],
+            time_step=step,
+            unit=unit,
+            form="table" if cells.layout.separator is None else "CSV",
+            component=printable(cells.names[place], 30)
+            if cells.names
+            else f"column {place + 1}" * (cells.width > 1),
+            notes=tuple(notes),
+        )
+    ]
 
 
 @dataclass(frozen=True)
@@ -150,11 +148,8 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
     with_digits = next(
         (line for line in head if re.match(r"[\s\"]*+[-+.]?[-+.\d]", line)), head[0]
     )[:10_000]
-    if ";" in with_digits:
-        separator: str | None = ";"
-    elif "\t" in with_digits:
-        separator = "\t"
-    elif "," in with_digits and reading.decimal != ",":
+    separator = next((sign for sign in ";\t" if sign in with_digits), None)
+    if separator is None and "," in with_digits and reading.decimal != ",":
         words = with_digits.split()
         # Where each word between blanks has one comma, the commas cannot separate fields.
         if len(words) > 1 and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
@@ -173,8 +168,6 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
                 rows[-1][0],
             )
         return _Layout(",", False)
-    else:
-        separator = None
     comma = reading.decimal == "," or (
         reading.decimal is None and "." not in with_digits and "," in with_digits
     )
@@ -233,29 +226,25 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, int, str]:
 
 
 def _unclear(cells: _Cells) -> InputError:
+    said = (
+        f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
+        f" {', '.join(NAMED)}, or give the column"
+        if cells.names
+        else f"{cells.width} columns; give that of the accelerations"
+    )
     line = cells.rows[0][0] - bool(cells.names) if cells.rows else 1
-    said = f"{cells.width} columns; give that of the accelerations"
-    if cells.names:
-        said = f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
-        said += f" {', '.join(NAMED)}, or give the column"
     return fault(cells.path, f"{said}: {option('column', 2)}", line)
 
 
 def _chosen(cells: _Cells, column: int | str) -> int:
-    if isinstance(column, int) and column <= cells.width:
-        return column - 1
-    if isinstance(column, str) and cells.names.count(column) == 1:
-        return cells.names.index(column)
     shown = printable(", ".join(cells.names)) if cells.names else f"1 to {cells.width}"
-    raise fault(cells.path, f"no single column {printable(repr(column))}; there are {shown}")
+    return place_of(cells.path, "column", column, cells.names or [""] * cells.width, shown)
 
 
 def _unit_of(name: str) -> str:
     """The unit that a column's name states; "" where it states none."""
-    if name in NAMED:
-        return NAMED[name]
     match = _BRACKETS.search(name)
-    return known_unit(match[1]) if match else ""
+    return NAMED.get(name) or (known_unit(match[1]) if match else "")
 
 
 def _decimals(word: str) -> int:

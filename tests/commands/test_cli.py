@@ -1,6 +1,6 @@
 """The command line: exit codes, and errors of the user as one line without a traceback."""
 
-import math
+import re
 from pathlib import Path
 
 import pytest
@@ -71,26 +71,13 @@ def test_bad_input_is_one_line_and_exit_2(words, said, refused):
     assert said in refused(*words)
 
 
-def test_compare_two_histories(typed):
-    write("scene.toml", SCENE)
-    for offset in ("0.0", "0.001"):
-        own = "--set", f"offset={offset}", "-o", f"{offset}.csv"
-        main(["simulate", "scene.toml", "--model", *STILL, *own])
-    out = typed("compare", "0.0.csv", "0.001.csv")[0]
-    assert "RMS difference of rotation" in out
-    assert f"{0.001 / math.atan2(0.4, 1.5):.6g}" in out
-    assert max(map(len, out.splitlines())) <= 80
-
-
 def test_histories_of_two_blocks_are_not_compared_unless_a_scene_says_how(refused):
     for name, width in (("one", "0.4"), ("same", "0.4000000001"), ("other", "0.5")):
         write(f"{name}.toml", SCENE.replace("0.4", width))
         assert main(["simulate", f"{name}.toml", "--model", *STILL, "-o", f"{name}.csv", "-q"]) == 0
     assert main(["compare", "one.csv", "same.csv", "-q"]) == 0
     said = refused("compare", "one.csv", "other.csv")
-    assert said.startswith("rockcheck: scene: ")
-    assert "half_width = 0.4," in said
-    assert "half_width = 0.5," in said
+    assert re.match("rockcheck: scene: .*half_width = 0.4,.*half_width = 0.5,", said)
     assert main(["compare", "one.csv", "other.csv", "--scene", "one.toml", "-q"]) == 0
     write(
         "plain.csv", "t,theta\n" + "".join(f"{0.005 * k},0\n" for k in range(41))

@@ -31,8 +31,7 @@ def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, typed):
     )
     told = Path(line.rpartition(" ")[2])
     assert told.parent == tmp_path
-    assert "in broken" in told.read_text()
-    assert "a fault\nof two lines" in told.read_text()
+    assert re.search(r"in broken\n(?s:.*)a fault\nof two lines", told.read_text())
     if os.name == "posix":
         assert told.stat().st_mode & 0o777 == 0o600
 
@@ -64,10 +63,14 @@ def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
 def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monkeypatch, typed):
     """What is missing is played by the next call."""
     monkeypatch.setattr("rockcheck.commands.studies.MINUTES", 1e-9)
-    out, err = typed("benchmark", "skipping", "--quick", "--jobs", "1", "--out", str(tmp_path))
-    assert "benchmark: its 1e-09 minutes are over" in err
-    assert "not complete: the same command goes on where it ended" in out
-    assert "interrupted" not in out + err
+    typed(
+        *("benchmark", "skipping", "--quick", "--jobs", "1", "--out", str(tmp_path)),
+        holds=[
+            "benchmark: its 1e-09 minutes are over",
+            "not complete: the same command goes on where it ended",
+        ],
+        lacks=["interrupted"],
+    )
 
 
 @pytest.mark.needs("POSIX")
@@ -95,8 +98,7 @@ def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, read
         check=False,
     )
     assert done.stdout.splitlines()[-1] == str(expected)
-    assert "Broken" not in done.stderr
-    assert "Traceback" not in done.stderr
+    assert not re.search("Broken|Traceback", done.stderr)
     assert len(done.stderr.splitlines()) == (expected != 0)
 
 

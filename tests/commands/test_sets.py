@@ -3,6 +3,7 @@ is judged."""
 
 import csv
 import importlib.util
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -67,12 +68,12 @@ def test_files_folders_and_patterns_each_shake_the_scene(told, words):
     found = told(
         "validate", "rack.toml", *(part for word in words for part in ("--records", word)), *STILL
     )
-    assert [cell["scene"] for cell in found["cells"]] == ["rack, RSN1_H1", "rack, RSN1_H2"]
-    assert [cell["outcome"] for cell in found["cells"]] == ["at rest"] * 2
-    assert not found["judged"]
-    assert found["left_out"] == (
-        ["RSN1_V.AT2"] if words[-1].startswith("records/RSN1_*") or words[-1] == "records" else []
-    )
+    assert [(cell["scene"], cell["outcome"]) for cell in found["cells"]] == [
+        ("rack, RSN1_H1", "at rest"),
+        ("rack, RSN1_H2", "at rest"),
+    ]
+    whole = words[-1] in ("records", "records/RSN1_*.AT2")
+    assert (found["judged"], found["left_out"]) == (False, ["RSN1_V.AT2"] * whole)
 
 
 def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
@@ -87,19 +88,10 @@ def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
 def test_a_chosen_component_is_played_though_it_is_vertical(told):
     rows = "".join(f"{0.02 * n:.2f},{a:.6f}\n" for n, a in enumerate(motion(0.3)))
     Path("up.csv").write_text("time_s,acceleration_g\n" + rows, encoding="utf-8")
-    assert main(["validate", "rack.toml", "--records", "up.csv", *STILL]) == 2
-    assert [
-        c["scene"]
-        for c in told(
-            "validate",
-            "rack.toml",
-            "--records",
-            "up.csv",
-            "--read",
-            "column=acceleration_g",
-            *STILL,
-        )["cells"]
-    ] == ["rack, up"]
+    words = "validate", "rack.toml", "--records", "up.csv", *STILL
+    assert main([*words]) == 2
+    (cell,) = told(*words, "--read", "column=acceleration_g")["cells"]
+    assert cell["scene"] == "rack, up"
 
 
 def test_the_vertical_component_of_a_file_goes_with_its_others(told):
@@ -119,8 +111,8 @@ def test_the_vertical_component_of_a_file_goes_with_its_others(told):
     assert told(*words)["left_out"] == ["two.v2 Up"]
     assert told(*words, "--read", "vertical=true")["left_out"] == []
     scene = Run.load("rockcheck-report").load_scene("rack, two 90 Deg")
-    assert scene.excitation.peak == pytest.approx(2 * 0.1 * 981 / 980.665, rel=1e-3)
-    assert scene.vertical.peak == pytest.approx(2 * 0.05 * 981 / 980.665, rel=1e-3)
+    peaks = scene.excitation.peak, scene.vertical.peak
+    assert peaks == pytest.approx(2 * 981 / 980.665 * np.array([0.1, 0.05]), rel=1e-3)
 
 
 def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
@@ -153,15 +145,8 @@ def test_a_scene_that_there_is_not_is_the_only_line(refused, monkeypatch):
 
 
 def test_all_models_are_those_that_are_installed(told):
-    found = told(
-        "validate",
-        "rack.toml",
-        "--models",
-        "all",
-        "--set",
-        "mujoco.time_step=1e-3",
-        "--no-report",
-    )
+    """They play where none is named, too."""
+    found = told("validate", "rack.toml", "--set", "mujoco.time_step=1e-3", "--no-report")
     models = [cell["model"] for cell in found["cells"]]
     assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
     assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)
@@ -184,29 +169,15 @@ def test_what_falls_is_told_with_its_time_and_without_a_peak(typed):
         "1",
     )[0]
     (line,) = (line for line in out.splitlines() if "Falls" in line)
-    assert line.split() == [
-        "faulty:Falls",
-        "overturned",
-        "left",
-        "at",
-        "1.57",
-        "s",
-        "ref.",
-        "0.0",
-        "s",
-    ]
+    assert re.fullmatch("faulty:Falls +overturned left at 1.57 s +ref. +0.0 s *", line)
     assert max(map(len, out.splitlines())) <= 130
-    page = Path("rockcheck-report/index.html").read_text(encoding="utf-8")
-    assert "Nothing is judged." in page
-    (scene,) = Path("rockcheck-report/pages").glob("*.html")
-    for text in (page, scene.read_text(encoding="utf-8")):
-        assert "ithin tolerance" not in text.replace(
-            '<option value="pass">within tolerance</option>', ""
-        )
+    folder, option = Path("rockcheck-report"), '<option value="pass">within tolerance</option>'
+    (scene,) = (folder / "pages").glob("*.html")
+    for path in (folder / "index.html", scene, folder / "summary.md"):
+        text = path.read_text(encoding="utf-8").replace(option, "")
         assert "overturned left at 1.57 s" in text
-    assert "overturned left at 1.57 s" in Path("rockcheck-report/summary.md").read_text(
-        encoding="utf-8"
-    )
+        assert "ithin tolerance" not in text or path.suffix == ".md"
+        assert "Nothing is judged." in text or path.stem != "index"
 
 
 def test_a_model_that_fails_is_exit_3(told):
@@ -220,13 +191,6 @@ def test_a_model_that_fails_is_exit_3(told):
         code=3,
     )
     assert [cell["status"] for cell in found["cells"]] == ["failed", "done"]
-
-
-def test_validate_plays_a_scene_and_says_so(monkeypatch):
-    for name in FAMILIES.keys() - {"ebm", "ebm-unilateral", "measured"}:
-        monkeypatch.delitem(FAMILIES, name)
-    assert main(["validate", "rack.toml", "--no-report"]) == 0
-    assert [cell.model for cell in Run.load("rockcheck-report").cells] == ["ebm", "ebm-unilateral"]
 
 
 SUITE = """

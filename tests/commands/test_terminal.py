@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import tomllib
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -68,14 +69,9 @@ def on_a_terminal(*words, columns=80):
     ) as process:
         os.close(inside)
         said = b""
-        while True:
-            try:
-                part = os.read(terminal, 65536)
-            except OSError:  # how Linux says that nobody holds the other end any more
-                break
-            if not part:
-                break
-            said += part
+        with suppress(OSError):  # how Linux says that nobody holds the other end any more
+            while part := os.read(terminal, 65536):
+                said += part
     os.close(terminal)
     assert process.returncode == 0, said
     return said.decode()
@@ -136,8 +132,7 @@ def test_new_overwrites_nothing(refused):
     Path("mine.toml").write_text("precious")
     assert "is there already" in refused("new", "mine.toml")
     assert Path("mine.toml").read_text() == "precious"
-    assert main(["new", "mine.txt"]) == 2
-    assert main(["new", "no/such/mine.toml"]) == 2
+    assert [main(["new", name]) for name in ("mine.txt", "no/such/mine.toml")] == [2, 2]
 
 
 def test_quiet_says_nothing_but_errors(typed):
@@ -159,8 +154,7 @@ def test_json_is_all_that_is_on_stdout(told):
     history = told(
         "simulate", "mine.toml", "--model", *STILL, "--set", "offset=0.001", "-o", "a.csv"
     )
-    assert history["history"] == "a.csv"
-    assert history["scene"] == "mine"
+    assert (history["history"], history["scene"]) == ("a.csv", "mine")
     main(["simulate", "mine.toml", "--model", *STILL, "-o", "b.csv", "-q"])
     found = told("compare", "b.csv", "a.csv")
     rms = next(figure for figure in found["figures"] if figure["measure"] == "theta_rms")
@@ -170,18 +164,9 @@ def test_json_is_all_that_is_on_stdout(told):
         == "rockcheck-report/spectrum/index.html"
     )
     Path("suite.toml").write_text(SUITE)
-    run = told(
-        "validate",
-        "suite.toml",
-        "--allow-code",
-        "faulty:Still",
-        "--no-report",
-        "--jobs",
-        "1",
-        code=1,
-    )
-    assert run["verdict"] == "fail"
-    assert len(run["reasons"]) == 1
+    own = "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1"
+    run = told("validate", *own, "--no-report", code=1)
+    assert (run["verdict"], len(run["reasons"])) == ("fail", 1)
     nothing = {
         "overturned_at_s": None,
         "checks": 0,
@@ -191,21 +176,16 @@ def test_json_is_all_that_is_on_stdout(told):
         "explanations": [],
     }
     assert run["cells"] == [{"scene": "short", "model": "still", "outcome": "at rest", **nothing}]
-    assert (
-        told("accept", "suite.toml", "--allow-code", "faulty:Still", "--jobs", "1")["refused"] == []
-    )
+    assert told("accept", *own)["refused"] == []
 
 
 def test_without_a_terminal_no_colour_and_no_progress(but_progress):
     done = rockcheck("scenes")
-    assert done.returncode == 0
-    assert done.stderr == ""
-    assert "\x1b" not in done.stdout
+    assert (done.returncode, done.stderr, "\x1b" in done.stdout) == (0, "", False)
     assert max(map(len, done.stdout.splitlines())) <= 80
     rockcheck("new", "mine.toml")
     done = rockcheck("simulate", "mine.toml", "--model", *STILL)
-    assert (done.returncode, but_progress(done.stderr)) == (0, [])
-    assert "\x1b" not in done.stdout
+    assert (done.returncode, but_progress(done.stderr), "\x1b" in done.stdout) == (0, [], False)
 
 
 @pytest.mark.parametrize("voice", ["tables", "json", "quiet"])
@@ -257,9 +237,7 @@ def test_on_a_terminal_colour_progress_and_its_width():
     said = on_a_terminal(
         "simulate", "mine.toml", "--model", "mujoco", "--set", "time_step=1e-3", "-o", "a.csv"
     )
-    assert "left" in said
-    assert "mine, mujoco" in said
-    assert "\x1b[" in said
+    assert [part for part in ("left", "mine, mujoco", "\x1b[") if part not in said] == []
     assert not list(Path().glob("*--*")), "only what was asked for"
     for columns in (60, 80):
         plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", on_a_terminal("scenes", columns=columns))
@@ -282,8 +260,7 @@ def test_models_tell_how_far_they_are():
         with listening(lambda done, total, what="": heard.append(done / total)):
             MuJoCo(time_step=step).simulate(scene)
         assert heard == sorted(heard)
-        assert all(0.0 <= share < 1.0 for share in heard)
-        assert len(heard) >= 1
+        assert 0.0 <= heard[0] <= heard[-1] < 1.0
     tell(1, 2)  # nobody listens
 
 

@@ -162,39 +162,33 @@ def test_the_key_is_of_all_that_lies_below_the_package(tmp_path, monkeypatch):
     assert len(keys) == 2
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        "cut short",
-        "a flipped bit",
-        "empty",
-        "a folder",
-        "a pipe",
-        "another's pickle",
-        "a link to nowhere",
-    ],
-)
+def flipped(content: bytes) -> bytes:
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+#: What may lie where a compiled function did, by the place and its content.
+DAMAGES = {
+    "cut short": lambda path, content: path.write_bytes(content[: len(content) // 2]),
+    "a flipped bit": lambda path, content: path.write_bytes(flipped(content)),
+    "empty": lambda path, content: path.write_bytes(b""),
+    "a folder": lambda path, content: (path / "inside").mkdir(parents=True),
+    "a pipe": lambda path, content: os.mkfifo(path),
+    "another's pickle": lambda path, content: path.write_bytes(
+        pickle.dumps(_Planted(str(path.parents[2] / "ran")))
+    ),
+    "a link to nowhere": lambda path, content: path.symlink_to(path.with_name("nowhere")),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_file_is_compiled_again(tmp_path, replay, damage):
     """And what the planted pickle would do is not done."""
     replay("0 read, 2 compiled")
     for path in files(tmp_path):
-        content = bytearray(path.read_bytes())
+        content = path.read_bytes()
         path.unlink()
-        if damage == "cut short":
-            path.write_bytes(content[: len(content) // 2])
-        elif damage == "a flipped bit":
-            content[len(content) // 2] ^= 1
-            path.write_bytes(content)
-        elif damage == "empty":
-            path.write_bytes(b"")
-        elif damage == "a folder":
-            (path / "inside").mkdir(parents=True)
-        elif damage == "a pipe":
-            os.mkfifo(path)
-        elif damage == "another's pickle":
-            path.write_bytes(pickle.dumps(_Planted(str(tmp_path / "ran"))))
-        else:
-            path.symlink_to(tmp_path / "nowhere")
+        DAMAGES[damage](path, content)
     assert replay("0 read, 2 compiled") == ""
     assert replay("2 read, 0 compiled") == ""
     assert not (tmp_path / "ran").exists()
@@ -210,30 +204,24 @@ class _Planted:
         return os.mkdir, (self.path,)
 
 
-@pytest.mark.needs("POSIX")
-def test_the_folder_is_closed_to_others(tmp_path, replay):
-    replay("0 read, 2 compiled")
-    (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
-    assert folder.stat().st_mode & 0o777 == 0o700
+def exchanged(folder: Path) -> None:
+    """In its place a link to it stands."""
+    folder.symlink_to(folder.rename(folder.parent.parent / "elsewhere"))
 
 
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize(
-    "fault", ["open to others", "a link", "below a folder that all may change"]
+    "spoil",
+    [lambda folder: folder.chmod(0o777), exchanged, lambda folder: folder.parent.chmod(0o777)],
+    ids=["open to others", "a link", "below a folder that all may change"],
 )
-def test_a_folder_that_others_may_change_is_not_used(tmp_path, replay, fault):
-    """The next place is taken, or none: then one line says so."""
+def test_a_folder_that_others_may_change_is_not_used(tmp_path, replay, spoil):
+    """It is closed to them; else the next place is taken, or none: then one line says so."""
     replay("0 read, 2 compiled")
     (folder,) = (tmp_path / "cache").glob("tiny-kernels-*")
-    if fault == "open to others":
-        folder.chmod(0o777)
-    elif fault == "a link":
-        folder.rename(tmp_path / "elsewhere")
-        folder.symlink_to(tmp_path / "elsewhere")
-    else:
-        folder.parent.chmod(0o777)
-    said = replay("0 read, 2 compiled")
-    assert said == (
+    assert folder.stat().st_mode & 0o777 == 0o700
+    spoil(folder)
+    assert replay("0 read, 2 compiled") == (
         "rockcheck: no private folder for compiled code, each run compiles anew:"
         " set NUMBA_CACHE_DIR to one of your own\n"
     )

@@ -1,9 +1,15 @@
-"""Excitations: the paper's pulse, sines and records, and how they begin and end."""
+"""Excitations: the paper's pulse, sines and records, how they begin and end, and how strong a
+recorded motion is."""
+
+import math
 
 import numpy as np
 import pytest
 
 from rockcheck.scenes import Record, Rest, Ricker, Sine
+from rockcheck.scenes.recordings import intensity
+from rockcheck.scenes.recordings.oscillator import largest_response
+from rockcheck.scenes.recordings.recording import Recording
 
 
 def test_ricker_is_the_papers():
@@ -59,3 +65,77 @@ def test_record_is_linear_between_samples():
         record.acceleration([0.05, 0.1, 0.15, 0.2]), [-1.0, -2.0, 1.0, 4.0], atol=1e-14
     )
     assert record.peak == pytest.approx(4.0 / 9.80665)
+
+
+# --- how strong a recorded motion is, against closed forms
+
+G = 9.80665
+
+
+def test_intensities_of_a_sine_are_its_closed_forms():
+    """a = A sin(w t) over ten cycles: PGV 2 A/w from rest, Arias pi/(2 g) A^2 T/2; resonance builds
+    up as 1 - exp(-z w t)."""
+    amplitude, rate, step = 2.0, 2 * math.pi, 1e-3
+    samples = amplitude * np.sin(rate * step * np.arange(10_001))
+    record = Recording(samples=samples, time_step=step, unit="m/s2", form="CSV")
+    assert intensity.peak_acceleration(record) == pytest.approx(amplitude / G, rel=1e-9)
+    assert intensity.peak_velocity(record) == pytest.approx(2 * amplitude / rate, rel=1e-5)
+    assert intensity.arias(record) == pytest.approx(
+        math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5
+    )
+    built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
+    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
+    assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
+
+
+def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
+    """Samples four periods apart, or all motion in the last one: as of the same lines with samples
+    4000 times as dense."""
+    samples = np.array([0.0, 1.0, -0.5, 0.0])
+    dense = Recording(
+        samples=np.interp(np.arange(12_001) / 4000, np.arange(4), samples),
+        time_step=1e-3,
+        unit="m/s2",
+        form="CSV",
+    )
+    for period in (1.0, 2.5):
+        coarse = Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV")
+        expected = intensity.spectral_acceleration(dense, period)
+        assert intensity.spectral_acceleration(coarse, period) == pytest.approx(expected, rel=2e-3)
+    # A hat of a step's length is, to an oscillator of a far longer period, an impulse; the peak
+    # comes a quarter of a period later.
+    last = Recording(samples=np.array([0.0, 0.0, 1.0]), time_step=1e-2, unit="m/s2", form="CSV")
+    rate, damping = 2 * math.pi / 1.0, 0.05
+    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
+    assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.05, 0.5])
+def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping):
+    """A step of acceleration: the peak is 1 + exp(-pi D/sqrt(1 - D^2)), half a period later."""
+    step = Recording(samples=np.ones(2000), time_step=1e-3, unit="m/s2", form="CSV")
+    peak = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
+    found = intensity.spectral_acceleration(step, 0.5, damping)
+    assert found == pytest.approx(peak / G, rel=1e-4)
+
+
+@pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
+def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
+    from scipy.signal import cont2discrete, lfilter
+
+    samples, parts = np.random.default_rng(3).normal(size=40), 2
+    step, rate, damping, tail = 0.01, math.tau / period, 0.1, 30
+    above, below, _ = cont2discrete(
+        ([rate**2], [1.0, 2.0 * damping * rate, rate**2]), step, method="foh"
+    )
+    ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
+    response = lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)])
+    found = largest_response(samples, parts, tail, step, rate, damping)
+    assert found == pytest.approx(np.max(np.abs(response)), rel=1e-9)
+
+
+def test_periods_of_a_spectrum_leave_no_wide_gap():
+    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert intensity.PERIODS[0] <= 0.1
+    assert intensity.PERIODS[-1] >= 4.0

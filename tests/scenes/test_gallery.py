@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import History, Scene, load_scene, named_scenes
+from rockcheck.scenes import Block, History, Scene, load_scene, named_scenes
 from rockcheck.scenes.excitations import Ricker
 
 CASES = ("rack", "loaded", "bookcase", "statue", "vial", "boulder")
@@ -50,10 +50,7 @@ def test_the_loaded_rack_falls_to_its_heavy_side_only():
     turned = scene.replace(excitation=scene.excitation.scaled(-1.0))
     assert [played(one).outcome for one in (scene, turned)] == ["overturned right", "at rest"]
     plain = load_scene("rack").block
-    assert (plain.half_width, plain.half_height) == (
-        scene.block.half_width,
-        scene.block.half_height,
-    )
+    assert plain == Block(half_width=scene.block.half_width, half_height=scene.block.half_height)
     assert not any(
         played(one.replace(block=plain)).outcome.startswith("overturned") for one in (scene, turned)
     )

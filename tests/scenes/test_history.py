@@ -52,16 +52,10 @@ def test_save_and_load_round_trip(history, tmp_path):
     path = tmp_path / "run.csv"
     history.save(path)
     again = History.load(path)
-    assert (again.name, again.model, again.outcome, again.notes) == (
-        "observed",
-        "model",
-        "moving",
-        ("a note, with a comma",),
-    )
-    assert (again.half_width, again.half_height, again.alpha) == (0.4, 1.6, SCENE.block.alpha)
-    assert again.cost == history.cost
-    assert again.settings == history.settings
-    assert list(again.event_list) == list(history.event_list)
+    assert (again.name, again.model, again.outcome) == ("observed", "model", "moving")
+    assert (again.notes, again.block) == (("a note, with a comma",), SCENE.block)
+    for field in ("cost", "settings", "event_list"):
+        assert getattr(again, field) == getattr(history, field), field
     assert list(again.channels) == list(history.channels)
     for name, values in history.channels.items():
         np.testing.assert_array_equal(again.channels[name], values)
@@ -107,8 +101,7 @@ def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path)
     }
     assert gzip.decompress(written) == (tmp_path / "run.csv").read_bytes()
     again = History.load(path)
-    assert list(again.event_list) == list(history.event_list)
-    assert again.settings == history.settings
+    assert (again.event_list, again.settings) == (history.event_list, history.settings)
     np.testing.assert_array_equal(again.channels["theta"], history.channels["theta"])
     np.testing.assert_allclose(pd.read_csv(path)["theta"], history.channels["theta"], rtol=1e-14)
     again.save(path)
@@ -119,12 +112,10 @@ def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path)
 def test_a_damaged_compressed_history(history, tmp_path, damage):
     path = tmp_path / "run.csv.gz"
     history.save(path)
-    content = bytearray(path.read_bytes())
-    if damage == "flipped":
-        content[len(content) // 2] ^= 0xFF
-    path.write_bytes(
-        content[:5] if damage == "cut" else content[:-8] if damage == "no end" else content
-    )
+    content = path.read_bytes()
+    middle = len(content) // 2
+    flipped = content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
+    path.write_bytes({"cut": content[:5], "flipped": flipped, "no end": content[:-8]}[damage])
     with pytest.raises(
         InputError,
         match=r"^[^\n]*run\.csv\.gz: (a compressed file that is damaged|not a CSV table)",
@@ -153,19 +144,8 @@ def test_another_compressed_file_is_refused(history, tmp_path):
 
 
 def test_tables(history):
-    assert list(history.frame.columns) == [
-        "t",
-        "x",
-        "y",
-        "theta",
-        "x_dot",
-        "y_dot",
-        "theta_dot",
-        "slip",
-        "slip_rate",
-        "mode",
-    ]
-    assert len(history.frame) == 11
+    words = "t x y theta x_dot y_dot theta_dot slip slip_rate mode"
+    assert (list(history.frame.columns), len(history.frame)) == (words.split(), 11)
     assert list(history.events["kind"]) == ["uplift", "floor impact"]
     assert history.peak_rotation == 0.1
     np.testing.assert_allclose(history.channels["slip"], 0.0, atol=1e-15)
@@ -176,13 +156,8 @@ def test_a_plain_table_is_a_measured_history(tmp_path):
     path = tmp_path / "table.csv"
     path.write_text("time,theta,t\n9,0.0,0\n9,0.1,0.5\n9,0.00001,1\n")
     history = History.load(path)
-    assert (history.name, history.model, history.outcome, history.alpha) == (
-        "table",
-        "measured",
-        "at rest",
-        None,
-    )
-    assert set(history.channels) == {"t", "theta"}
+    assert (history.name, history.model, history.alpha) == ("table", "measured", None)
+    assert (history.outcome, set(history.channels)) == ("at rest", {"t", "theta"})
     assert list(history.event_list) == []
     path.write_text("t,theta\n0,0\n1,-1.57\n")
     assert History.load(path).outcome == "overturned right"
@@ -264,14 +239,13 @@ def test_hostile_events(tmp_path):
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    with pytest.raises(InputError, match="cannot be read: No such file"):
-        History.load(tmp_path / "none.csv")
-    binary = tmp_path / "binary.csv"
-    binary.write_bytes(bytes(range(256)))
-    with pytest.raises(InputError, match="not a CSV table"):
-        History.load(binary)
-    with pytest.raises(InputError, match="cannot be read"):
-        History.load(tmp_path)
+    (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
+    for name, said in (
+        ("none.csv", "cannot be read: No such file"),
+        ("binary.csv", "not a CSV table"),
+    ):
+        with pytest.raises(InputError, match=said):
+            History.load(tmp_path / name)
 
 
 def test_unknown_outcome_in_a_header_is_not_believed(tmp_path):

@@ -28,7 +28,7 @@ def fault_of(path: Path) -> str:
     with pytest.raises(InputError) as fault:
         Record.from_file(path)
     said = str(fault.value)
-    assert "\n" not in said
+    assert said.isprintable()
     assert path.name in said
     return said
 
@@ -41,23 +41,13 @@ def fault_of(path: Path) -> str:
 @pytest.mark.parametrize("dt", ["0.01", ".01", "1.0E-2", "0.0100"])
 def test_at2(header, dt, end, tmp_path):
     body = "  .1000000E-01  -.2000000E-01   0.3\n  4.0D-2 -5e-02\n"
-    record = Record.from_file(
-        written(tmp_path, (header.format(npts=5, dt=dt) + body).replace("\n", end))
-    )
+    path = written(tmp_path, (header.format(npts=5, dt=dt) + body).replace("\n", end))
+    record = Record.from_file(path, scale=2.0)
     np.testing.assert_allclose(
-        record.samples, np.array([0.01, -0.02, 0.3, 0.04, -0.05]) * G, rtol=1e-15
+        record.samples, np.array([0.02, -0.04, 0.6, 0.08, -0.1]) * G, rtol=1e-15
     )
-    assert record.time_step == 0.01
-    assert record.source == "motion.AT2"
-
-
-def test_at2_scaled(tmp_path):
-    record = Record.from_file(
-        written(tmp_path, NAMED.format(npts=2, dt=0.02) + "0.1 -0.2"), scale=1.6
-    )
-    np.testing.assert_allclose(record.samples, [0.16 * G, -0.32 * G], rtol=1e-14)
-    assert record.peak == pytest.approx(0.32)
-    assert record.quiet_after == pytest.approx(0.02)
+    assert (record.time_step, record.source) == (0.01, "motion.AT2")
+    assert (record.peak, record.quiet_after) == pytest.approx((0.6, 0.04))
 
 
 @pytest.mark.parametrize(
@@ -76,6 +66,7 @@ def test_at2_scaled(tmp_path):
         (NAMED.format(npts=2, dt=0.0) + "0.1 0.2", "line 4: DT 0.0 is not positive"),
         (NAMED.format(npts=2, dt=-0.01) + "0.1 0.2", "line 4: DT -0.01 is not positive"),
         (PLAIN.format(npts=2, dt=-0.01) + "0.1 0.2", "line 4: DT -0.01 is not positive"),
+        (NAMED.format(npts=1, dt=0.1) + "\x1b[31mred", "line 5: '?[31mred' is not a finite number"),
         (NAMED.format(npts=0, dt=0.01), "line 4: NPTS 0 is not in 1..10000000"),
         (NAMED.format(npts="9" * 40, dt=0.01) + "0.1", "line 4: NPTS 9"),
         (
@@ -111,16 +102,13 @@ def peer_record(component: str) -> Path:
 
 @pytest.mark.parametrize(
     ("component", "count", "peak"),
-    [("180-hor1", 5372, 0.2808), ("-UP", None, None), ("270-hor2", None, None)],
+    [("180-hor1", 5372, 0.2808), ("-UP", 5378, 0.1781), ("270-hor2", 5346, 0.2107)],
 )
 def test_genuine_peer_files(component, count, peak):
     record = Record.from_file(peer_record(component))
-    assert record.time_step == 0.01
+    assert (record.time_step, len(record.samples)) == (0.01, count)
     assert np.isfinite(record.samples).all()
-    if count is not None:
-        assert len(record.samples) == count
-        assert record.peak == pytest.approx(peak, abs=5e-5)
-    assert 0.05 < record.peak < 0.5
+    assert record.peak == pytest.approx(peak, abs=5e-5)
 
 
 # --- CSV
@@ -136,14 +124,6 @@ def test_csv(column, factor, end, tmp_path):
     record = Record.from_file(written(tmp_path, text.replace("\n", end), "motion.csv"))
     np.testing.assert_allclose(record.samples, np.array([0.0, 0.1, -0.2]) * factor, rtol=1e-15)
     assert record.time_step == 0.02
-
-
-def test_csv_times_may_be_rounded(tmp_path):
-    times = np.round(np.arange(9) / 128.0, 4)
-    rows = "".join(f"{t},0.1\n" for t in times)
-    assert Record.from_file(
-        written(tmp_path, "time_s,acceleration_g\n" + rows, "a.csv")
-    ).time_step == pytest.approx(1 / 128, rel=1e-2)
 
 
 HEAD = "time_s,acceleration_g\n"
@@ -179,25 +159,10 @@ def test_csv_faults(text, said, tmp_path):
     assert said in fault_of(written(tmp_path, text, "motion.csv"))
 
 
-# --- files that are not what they say
-
-
 def test_files_that_cannot_be_read(tmp_path):
     assert "cannot be read: No such file" in fault_of(tmp_path / "nowhere.AT2")
-    assert "3 columns; give that of the accelerations: --read column=2" in fault_of(
-        written(tmp_path, "1 2 3", "motion.txt")
-    )
-    binary = tmp_path / "motion.csv"
-    binary.write_bytes(bytes(range(256)))
-    assert "not a text file" in fault_of(binary)
-    folder = tmp_path / "folder.csv"
-    folder.mkdir()
-    assert "cannot be read" in fault_of(folder)
-
-
-def test_control_characters_do_not_reach_the_terminal(tmp_path):
-    said = fault_of(written(tmp_path, NAMED.format(npts=1, dt=0.1) + "\x1b[31mred"))
-    assert said.isprintable()
+    (tmp_path / "motion.csv").write_bytes(bytes(range(256)))
+    assert "not a text file" in fault_of(tmp_path / "motion.csv")
 
 
 def run_together(

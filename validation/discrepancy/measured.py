@@ -16,7 +16,7 @@ import numpy as np
 from rockcheck.scenes import History, InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen
 from rockcheck.scenes.errors import printable
-from rockcheck.scenes.history import block_fields, check_readable, outcome_of
+from rockcheck.scenes.history import check_readable, outcome_of
 from rockcheck.scenes.reading import read_table
 
 CONFIDENCE = 0.95
@@ -81,7 +81,7 @@ class Measured(Frozen):
             channels=channels,
             outcome=history.outcome if inside[-1] else outcome_of(channels),
             event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
-            **block_fields(scene.block),
+            block=scene.block.per_unit_mass,
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
 

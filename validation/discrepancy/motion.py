@@ -79,7 +79,7 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
 def largest_slip(history: History) -> float:
     """Largest |slip|, m, also of a block that falls; 0 if it is rounding of the pivot's place."""
     largest = float(np.max(np.abs(history.channels["slip"])))
-    return largest if largest > ROUNDING * (history.half_height or 0.0) else 0.0
+    return largest if largest > ROUNDING * getattr(history.block, "half_height", 0.0) else 0.0
 
 
 def wall_speeds(history: History, scene: Scene) -> list[float]:

@@ -245,7 +245,7 @@ def test_figures_of_one_history(made):
 
 def test_a_measured_history_may_lack_columns(made):
     bare = dataclasses.replace(
-        made(WAVE, T), channels={"t": T, "theta": made(WAVE, T).channels["theta"]}, half_width=None
+        made(WAVE, T), channels={"t": T, "theta": made(WAVE, T).channels["theta"]}, block=None
     )
     found = compare(made(WAVE, T), bare)
     assert found["theta_rms"] == 0.0
