@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
@@ -60,7 +61,7 @@ class ContinuousModel(Frozen):
     damping_rule
         "calibrated": a contact that closes is given the damping with which a clamped contact of its
         effective mass has the scene's restitution (`contact.damping_ratio`,
-        `contact.effective_mass`). "paper": (33) with the whole mass, constant.
+        `kernels.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
     the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
@@ -135,23 +136,13 @@ class ContinuousModel(Frozen):
         surfaces = np.flatnonzero(np.isfinite(parameters.distance))
         contacts = kernels.Contacts(memory, np.zeros(4), parameters, surfaces)
 
-        def advance(row: int, rows: int) -> tuple[int, int, int, int, int, float]:
-            return kernels.advance(
-                contacts,
-                row,
-                scene.output_step,
-                base,
-                state,
-                output[row : row + rows],
-                events,
-            )
-
-        advance(1, 0)  # compiles, or reads the compiled loop from its cache
+        advance = partial(kernels.advance, contacts, base, scene.output_step, state, events)
+        advance(1, output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
         strikes: list[NDArray[np.float64]] = []
         row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
         while row < len(times) and ending == kernels.DONE:
-            slab = partial(advance, row, min(rows_a_slab, len(times) - row))
+            slab = partial(advance, row, output[row : row + rows_a_slab])
             ending, rows, found, more_steps, more_sweeps, reached = interruptible(slab)
             row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
             strikes.append(events[:found].copy())
@@ -289,10 +280,10 @@ def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
     The scene is played twice, the second time up to that impact with 20 output times in every
     1/sqrt(k/m). Raises `InputError` if nothing strikes.
     """
-    strikes = [event for event in model.simulate(scene).event_list if event.kind.endswith("impact")]
-    if not strikes:
+    events = model.simulate(scene).event_list
+    first = next((event for event in events if event.kind.endswith("impact")), None)
+    if first is None:
         raise InputError(f"nothing strikes in scene {scene.name!r}")
-    first = strikes[0]
     contact_time = 1.0 / math.sqrt(model.stiffness_in(scene))
     sample = max(0.05 * contact_time, first.t / 2e6)
     history = model.simulate(
@@ -311,23 +302,17 @@ def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
 
 def _contacts(
     scene: Scene, history: History, kind: str
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Gap (m) and rate (m/s) of every corner that may meet the floor, or a wall."""
     c, block = history.channels, scene.block
     sin, cos, w = np.sin(c["theta"]), np.cos(c["theta"]), c["theta_dot"]
-    found = []
     for outward in (1.0, -1.0):  # the left and the right side
         for up in (-1.0, 1.0):
             a, b = -outward * block.half_width, up * block.half_height
             rx, ry = a * cos - b * sin, a * sin + b * cos
             wall = scene.wall("left" if outward > 0.0 else "right")
             if kind == "floor impact" and up < 0.0:
-                found.append((c["y"] + ry, c["y_dot"] + w * rx))
+                yield c["y"] + ry, c["y_dot"] + w * rx
             elif kind == "wall impact" and wall is not None:
-                found.append(
-                    (
-                        outward * (c["x"] + rx) + block.half_width + wall.gap,
-                        outward * (c["x_dot"] - w * ry),
-                    )
-                )
-    return found
+                gap = outward * (c["x"] + rx) + block.half_width + wall.gap
+                yield gap, outward * (c["x_dot"] - w * ry)

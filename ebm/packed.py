@@ -36,8 +36,16 @@ class Packed:
 
     def part(self, part: slice) -> Rows:
         """Some of the runs. The samples stay those of all."""
-        *columns, samples = self.rows
-        return Rows(*(column[part] for column in columns), samples)
+        rows = self.rows
+        return Rows(
+            rows.settings[part],
+            rows.horizontal[part],
+            rows.vertical[part],
+            rows.starts[part],
+            rows.durations[part],
+            rows.output_steps[part],
+            rows.samples,
+        )
 
     def changed(self, **columns: Any) -> Packed:
         """The same runs with other `durations` or `output_steps`."""
