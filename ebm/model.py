@@ -121,18 +121,6 @@ class EventBasedModel(Frozen):
 
         Raises `InputError` (see `check`) or `ModelFailure`.
         """
-        history = self._simulate(scene)
-        if not self.estimate_error:
-            return history
-        finer = self.finer()._simulate(scene)
-        rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
-        change = (
-            np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows]))
-            / scene.block.alpha
-        )
-        return replace(history, cost=replace(history.cost, error_estimate=float(change)))
-
-    def _simulate(self, scene: Scene) -> History:
         began = time.perf_counter()
         from rockcheck.ebm import natural, packed
         from rockcheck.ebm.core import names, state
@@ -170,7 +158,16 @@ class EventBasedModel(Frozen):
         found, (out, modes, log) = states[0], (rows[0] for rows in records)
         rows = max(written, 1)
         out[0] = natural.state_of(scene) if written == 0 else out[0]
-        events = _events(log[: min(found.events, len(log))], unit, scene.block.radius)
+        events = [
+            Event(
+                t=at * unit,
+                kind=names.EVENT_NAMES[int(kind)],
+                mode_before=names.MODE_NAMES[int(before)],
+                mode_after=names.MODE_NAMES[int(after)],
+                impulse=impulse * (scene.block.radius / unit),
+            )
+            for at, kind, before, after, impulse in log[: min(found.events, len(log))].tolist()
+        ]
         cost = Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
@@ -186,7 +183,7 @@ class EventBasedModel(Frozen):
         outcome = "at rest" if at_rest else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"
-        return observe(
+        history = observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
@@ -196,23 +193,13 @@ class EventBasedModel(Frozen):
             cost=cost,
             settings=self.model_dump(),
         )
-
-
-def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
-    """The event log (natural units) as events (SI)."""
-    from rockcheck.ebm.core import names
-
-    modes, kinds, speed = names.MODE_NAMES, names.EVENT_NAMES, radius / unit
-    return [
-        Event(
-            t=t * unit,
-            kind=kinds[int(kind)],
-            mode_before=modes[int(before)],
-            mode_after=modes[int(after)],
-            impulse=impulse * speed,
-        )
-        for t, kind, before, after, impulse in log.tolist()
-    ]
+        if not self.estimate_error:
+            return history
+        finer = self.finer().model_copy(update={"estimate_error": False}).simulate(scene)
+        thetas = finer.channels["theta"], history.channels["theta"]
+        fine, coarse = (theta[: min(map(len, thetas))] for theta in thetas)
+        change = np.max(np.abs(fine - coarse)) / scene.block.alpha
+        return replace(history, cost=replace(cost, error_estimate=float(change)))
 
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.

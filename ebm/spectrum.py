@@ -348,10 +348,9 @@ def _vary(outcomes: NDArray[np.int8], width: int) -> NDArray[np.bool_]:
 
 def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:
     """Every `step`-th node of each axis, and the last one."""
-    i, j = np.zeros(rows, dtype=bool), np.zeros(columns, dtype=bool)
-    i[::step] = j[::step] = True
-    i[-1] = j[-1] = True
-    return i[:, None] & j[None, :]
+    places = np.arange(rows), np.arange(columns)
+    i, j = ((place % step == 0) | (place == place[-1]) for place in places)
+    return i[:, None] & j
 
 
 def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
@@ -359,14 +358,19 @@ def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
         axis = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("numbers are asked for", key) from None
-    if axis.ndim != 1 or axis.size == 0:
-        raise InputError(
+    refusals = (
+        (
+            axis.ndim != 1 or axis.size == 0,
             f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked"
             " for",
-            key,
-        )
-    if not np.all(np.isfinite(axis)) or axis[0] <= 0.0:
-        raise InputError("positive finite numbers are asked for", key)
-    if np.any(np.diff(axis) <= 0.0):
-        raise InputError("increasing numbers are asked for", key)
+        ),
+        (
+            not np.all(np.isfinite(axis)) or np.any(axis[:1] <= 0.0),
+            "positive finite numbers are asked for",
+        ),
+        (np.any(np.diff(axis) <= 0.0), "increasing numbers are asked for"),
+    )
+    for refused, reason in refusals:
+        if refused:
+            raise InputError(reason, key)
     return axis
