@@ -345,7 +345,8 @@ def closes(
         memory[one, IMPULSE] = 0.0
     if parameters.calibrated:
         left, right, bottom, top = parameters.reach
-        spring, ratio = 1.0, other.rate / comes.rate
+        spring = 1.0
+        ratio = other.rate / comes.rate
         both = other.rate < 0.1 * comes.rate and other.gap < -other.rate * contact_time
         mass = shared_mass(comes.mobility, other.mobility, coupling, ratio)
         if both and (left != right if surface == FLOOR else bottom != top) and mass > 0.0:
@@ -418,7 +419,8 @@ def pushed(
     The loss is for a unit of velocity gained. Third is the step that the contact needs, infinite
     unless it has just closed.
     """
-    memory, before, fine = contacts.memory, touches.before, math.inf
+    memory, before = contacts.memory, touches.before
+    fine = math.inf
     if memory[one, CLOSED] == 0.0:
         fine = closes(contacts, one, touches, other, coupling, now.t)
     k, damping = memory[one, STIFFNESS], memory[one, DAMPING]
@@ -503,7 +505,8 @@ def press(
     n, r1, r2 = facing(surface, now.corners)
     away = n[0] * now.x + n[1] * now.y + parameters.distance[surface]
     first, second = seen(now, v, n, away, r1, inverse), seen(now, v, n, away, r2, inverse)
-    rate1, rate2, coupling = first.rate, second.rate, 1.0 + inverse * first.lever * second.lever
+    rate1, rate2 = first.rate, second.rate
+    coupling = 1.0 + inverse * first.lever * second.lever
     closed1 = is_closed(memory, one, first.gap, rate1, ahead, now.t)
     closed2 = is_closed(memory, two, second.gap, rate2, ahead, now.t)
     fine = asked = closing = math.inf
@@ -578,7 +581,8 @@ def kick(
         for surface in surfaces:
             v = with_forces(contacts, surface, corners, v, step)
     closing = young = math.inf
-    sweeps, ahead = 0, step if settled else 0.0
+    sweeps = 0
+    ahead = step if settled else 0.0
     for _ in range(MOST_SWEEPS):
         sweeps += 1
         closing = math.inf

@@ -157,6 +157,7 @@ class EventBasedModel(Frozen):
             raise ModelFailure(f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s")
         found, (out, modes, log) = states[0], (rows[0] for rows in records)
         rows = max(written, 1)
+        speed = scene.block.radius / unit
         out[0] = natural.state_of(scene) if written == 0 else out[0]
         events = [
             Event(
@@ -164,7 +165,7 @@ class EventBasedModel(Frozen):
                 kind=names.EVENT_NAMES[int(kind)],
                 mode_before=names.MODE_NAMES[int(before)],
                 mode_after=names.MODE_NAMES[int(after)],
-                impulse=impulse * (scene.block.radius / unit),
+                impulse=impulse * speed,
             )
             for at, kind, before, after, impulse in log[: min(found.events, len(log))].tolist()
         ]

@@ -226,7 +226,8 @@ def play_motions(
 
     nodes = zip(amplitude_ratios.tolist(), frequency_ratios.tolist(), strict=True)
     # The nodes of a record are blocks of other sizes; the length of a pulse is its period's.
-    changing, made = scene.excitation.kind == "record", cache(partial(node_scene, scene))
+    changing = scene.excitation.kind == "record"
+    made = cache(partial(node_scene, scene))
     played = [made(a if changing else 1.0, f) for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
     packed = _packed(scene, amplitude_ratios, frequency_ratios, model).changed(durations=lengths)

@@ -95,7 +95,8 @@ class March(NamedTuple):
 
 def course_of(scene: Scene, longest: float, short: float) -> Course:
     """Steps of at most `longest` s, and near events `short` times the usual."""
-    base, moment = BaseMotion(scene), short / scene.frequency_parameter
+    base = BaseMotion(scene)
+    moment = short / scene.frequency_parameter
     across, up = (
         (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
         for one in (base.across, base.up)
@@ -119,7 +120,8 @@ def course_of(scene: Scene, longest: float, short: float) -> Course:
 
 def begun(scene: Scene, contacts: int) -> March:
     """A run at its start."""
-    state, (closed, before) = np.zeros(CARRY_Y + 1), np.zeros((2, contacts), dtype=bool)
+    state = np.zeros(CARRY_Y + 1)
+    closed, before = np.zeros((2, contacts), dtype=bool)
     state[:6] = kinematics.of_mass(scene.block, scene.initial_state)
     return March(state, closed, before, np.zeros(IMPACT + 1))
 
