@@ -3,7 +3,9 @@
 Three surfaces (left wall, right wall, floor) face two corners of the block each. A contact is known
 by the unit normal n of its surface (into the free space) and by the offset r of its corner from the
 mass's centre c: its gap is n.(c + r) + distance, its lever the third entry of J = (n_x, n_y, r x
-n), its rate J.(vx, vy, w), its mobility K = J M^-1 J^T. All per unit mass.
+n), its rate J.(vx, vy, w), its mobility K = J M^-1 J^T. All per unit mass: stiffness in 1/s^2,
+damping in 1/s, force in m/s^2. A contact's effective mass is the share of the block's mass that its
+corner feels, 1/m_eff = K, without unit.
 
 **The integrator.** Position Verlet (half a step of motion, a kick at the middle, half a step of
 motion) with implicit dampers and friction, in steps that know events: long ones (3/sqrt(k/m)) while
@@ -42,22 +44,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.cm import contact
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Velocity of the block: vx, vy, w.
 Velocity = tuple[float, float, float]
+#: Across the plane, right and up.
+Vector = tuple[float, float]
+#: Samples of the base acceleration along one axis, and how many there are a second.
+Samples = tuple[Floats, float]
 #: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top
 #: right.
 Corners = tuple[float, float, float, float, float, float, float, float]
-
-effective_mass = kernel(contact.effective_mass)
-felt_share = kernel(contact.felt_share)
-friction_force = kernel(contact.friction_force)
-normal_forces = kernel(contact.normal_forces)
-shared_mass = kernel(contact.shared_mass)
 
 SURFACES = LEFT_WALL, RIGHT_WALL, FLOOR = 0, 1, 2
 #: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the
@@ -101,9 +100,9 @@ class Parameters(NamedTuple):
     friction_damping: float
     mu_s: float
     mu_k: float
-    restitution: tuple[float, float, float]
-    damping_ratio: tuple[float, float, float]
-    distance: tuple[float, float, float]
+    restitution: tuple[float, ...]
+    damping_ratio: tuple[float, ...]
+    distance: tuple[float, ...]
     calibrated: bool
     time_step: float
 
@@ -136,51 +135,121 @@ class Step(NamedTuple):
     t: float
 
 
-class Arrival(NamedTuple):
-    """A corner (0 or 1) that comes to a surface.
+class Corner(NamedTuple):
+    """A corner in a step, and how it meets a surface: gap, rate before and after the step, slip.
 
-    Its offset, its mobility, the mobility of the surface's other corner and their coupling, its
-    rate (< 0) and slip; gap and rate of the other corner.
+    The rates are those at the step's middle, as they would be without the surface's forces.
     """
 
-    surface: int
-    corner: int
     rx: float
     ry: float
+    lever: float
     mobility: float
-    other: float
-    coupling: float
+    gap: float
+    before: float
     rate: float
     slip: float
-    other_gap: float
-    other_rate: float
 
 
-class Pair(NamedTuple):
-    """The two corners that face a surface.
+@kernel
+def felt_share(x: float) -> float:
+    """Share of a step's change of speed that a damper feels within that step.
 
-    The forces f as if they did not move the corners, the loss d of force for a unit of velocity,
-    the mobilities k11 and k22 and their coupling k12, and the levers.
+    The argument is x = c K step (damping, mobility, step).
+
+    The Kelvin-Voigt force is k depth - c (rate + share change), change = K step force: the speed
+    then decays by 1/(1 + x + x^2/2), of second order and without overshoot however large x is, and
+    at rest the spring alone carries the load.
     """
-
-    f1: float
-    f2: float
-    d1: float
-    d2: float
-    k11: float
-    k12: float
-    k22: float
-    lever1: float
-    lever2: float
+    return (1.0 + x) / (2.0 + x)
 
 
-class Shaking(NamedTuple):
-    """Samples of the base acceleration, sideways and upward, and how many there are a second."""
+@kernel
+def normal_forces(
+    f1: float, f2: float, d1: float, d2: float, k11: float, k12: float, k21: float, k22: float
+) -> tuple[float, float]:
+    """Forces of two Kelvin-Voigt contacts that can only push, coupled within the step.
 
-    horizontal: Floats
-    horizontal_rate: float
-    vertical: Floats
-    vertical_rate: float
+    Here f is the force k depth - c rate that a contact would have if neither force acted, and d the
+    loss of force for a unit of velocity gained within the step. K_ij is the velocity (over the
+    step's length) that a unit of force j gives to corner i. So F_i + d_i (K F)_i = f_i, but F_i >=
+    0. An open contact has f = d = 0.
+    """
+    a11, a12, a21, a22 = 1.0 + d1 * k11, d1 * k12, d2 * k21, 1.0 + d2 * k22
+    determinant = a11 * a22 - a12 * a21
+    force1, force2 = (a22 * f1 - a12 * f2) / determinant, (a11 * f2 - a21 * f1) / determinant
+    if force1 <= 0.0:
+        return 0.0, max(0.0, f2 / a22)
+    if force2 <= 0.0:
+        return max(0.0, f1 / a11), 0.0
+    return force1, force2
+
+
+@kernel
+def friction_force(
+    stiffness: float,
+    damping: float,
+    mobility: float,
+    holds: float,
+    mu_k: float,
+    normal: float,
+    stretch: float,
+    rate: float,
+) -> tuple[float, bool]:
+    """Stick-slip friction: a spring-damper whose force stays within Coulomb's cone.
+
+    Returns force and whether it slips.
+
+    `stretch` (m) is the spring's memory, `rate` (m/s) the corner's tangential velocity as it would
+    be without this force, and `mobility` how much of that velocity a unit of force takes away: the
+    damper acts on the velocity that is left (implicit, so that it may be stiff; then friction
+    follows the normal force without lag). A corner sticks up to `holds` `normal`: mu_s where it
+    stuck before, mu_k where it slipped. Else it is held at mu_k `normal`.
+    """
+    force = -(stiffness * stretch + damping * rate) / (1.0 + damping * mobility)
+    if abs(force) <= holds * normal:
+        return force, False
+    return math.copysign(mu_k * normal, force), True
+
+
+@kernel
+def effective_mass(
+    k_n: float,
+    k_t: float,
+    k_c: float,
+    normal: float,
+    tangential: float,
+    friction: float,
+    restitution: float,
+) -> float:
+    """Share of the block's mass that a corner brings to an impact with friction.
+
+    It arrives at `normal` (< 0) and `tangential` speed.
+
+    A unit impulse along the normal changes the corner's velocity by k_n = 1 + 3 r_t^2/R^2 along the
+    normal and by k_c = -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3
+    r_n^2/R^2 (r_n, r_t: offset of the corner from the centroid). Friction that holds the corner
+    makes it heavier, 1/m = k_n - k_c^2/k_t; friction mu N that it slips against gives 1/m = k_n +
+    mu k_c, signed as it acts. The rigid impact decides which of the two holds. Slip that stops or
+    reverses within the impact is left out.
+    """
+    held = k_n - k_c * k_c / k_t
+    push = (-(1.0 + restitution) * normal + k_c * tangential / k_t) / held
+    shear = -(tangential + k_c * push) / k_t
+    if push > 0.0 and abs(shear) <= friction * push:
+        return 1.0 / held
+    return 1.0 / (k_n + math.copysign(friction, shear) * k_c)
+
+
+@kernel
+def shared_mass(own: float, other: float, coupling: float, ratio: float) -> float:
+    """Share of the block's mass that a corner brings to a frictionless impact of two corners.
+
+    The other corner arrives `ratio` times as fast. A unit impulse at a corner changes its own
+    velocity by `own` (by `other` at that one) and the other corner's by `coupling`. Negative where
+    the other corner's impact throws this one off.
+    """
+    return (other - coupling * ratio) / (own * other - coupling * coupling)
 
 
 @kernel
@@ -194,21 +263,19 @@ def sampled(samples: Floats, rate: float, t: float) -> float:
 
 
 @kernel
-def facing(surface: int, corners: Corners) -> tuple[float, float, float, float, float, float]:
+def facing(surface: int, corners: Corners) -> tuple[Vector, Vector, Vector]:
     """Normal of a surface and offsets of the two corners that face it."""
     if surface == FLOOR:
-        return 0.0, 1.0, corners[0], corners[1], corners[2], corners[3]
+        return (0.0, 1.0), corners[0:2], corners[2:4]
     if surface == LEFT_WALL:
-        return 1.0, 0.0, corners[0], corners[1], corners[4], corners[5]
-    return -1.0, 0.0, corners[2], corners[3], corners[6], corners[7]
+        return (1.0, 0.0), corners[0:2], corners[4:6]
+    return (-1.0, 0.0), corners[2:4], corners[6:8]
 
 
 @kernel
-def kicked(
-    v: Velocity, inverse: float, nx: float, ny: float, lever: float, impulse: float
-) -> Velocity:
+def kicked(v: Velocity, inverse: float, n: Vector, lever: float, impulse: float) -> Velocity:
     """Velocity after an impulse along n with that lever; `inverse` is 1/I."""
-    return v[0] + nx * impulse, v[1] + ny * impulse, v[2] + inverse * lever * impulse
+    return v[0] + n[0] * impulse, v[1] + n[1] * impulse, v[2] + inverse * lever * impulse
 
 
 @inner_kernel
@@ -217,31 +284,61 @@ def with_forces(
 ) -> Velocity:
     """Velocity after the remembered forces of a surface have acted for `step`."""
     memory, inverse = contacts.memory, contacts.parameters.inverse_inertia
-    nx, ny, ax, ay, bx, by = facing(surface, corners)
-    v = kicked(v, inverse, nx, ny, ax * ny - ay * nx, step * memory[2 * surface, FORCE])
-    v = kicked(v, inverse, nx, ny, bx * ny - by * nx, step * memory[2 * surface + 1, FORCE])
+    n, (ax, ay), (bx, by) = facing(surface, corners)
+    v = kicked(v, inverse, n, ax * n[1] - ay * n[0], step * memory[2 * surface, FORCE])
+    v = kicked(v, inverse, n, bx * n[1] - by * n[0], step * memory[2 * surface + 1, FORCE])
     if surface == FLOOR:
-        v = kicked(v, inverse, 1.0, 0.0, -min(ay, by), step * contacts.friction[SHEAR])
+        v = kicked(v, inverse, (1.0, 0.0), -min(ay, by), step * contacts.friction[SHEAR])
     return v
 
 
 @inner_kernel
-def closes(contacts: Contacts, arrival: Arrival, t: float) -> float:
-    """A contact closes at `t`: choose spring and damper, begin a strike if it was open for long.
+def seen(now: Step, v: Velocity, n: Vector, away: float, r: Vector, inverse: float) -> Corner:
+    """The corner at `r` over a surface with the normal `n`, `away` from the mass's centre."""
+    (nx, ny), (rx, ry), v0 = n, r, now.v0
+    lever = rx * ny - ry * nx
+    # J belongs to the middle of the step, v to its end and v0 to its start: J changes by -w^2 (n.r)
+    # a unit of time.
+    turn = 0.5 * now.length * v0[2] ** 2 * (nx * rx + ny * ry)
+    return Corner(
+        rx,
+        ry,
+        lever,
+        1.0 + inverse * lever * lever,
+        away + nx * rx + ny * ry,
+        nx * v0[0] + ny * v0[1] + lever * v0[2] + turn,
+        nx * v[0] + ny * v[1] + lever * v[2] - turn,
+        v[0] - v[2] * ry,
+    )
 
-    Returns the step that it asks for.
 
-    When the surface's other corner arrives within the contact's own time, the two share the block's
-    mass as their speeds say. Where the mass lies nearer to one of them, equal springs would turn
-    the block, and neither corner would leave with the scene's restitution: there each spring is as
-    stiff as its share is large.
+@inner_kernel
+def lower_corner(now: Step, v: Velocity) -> Vector:
+    """Height of the floor's lower corner from the mass's centre, and its slip (m/s)."""
+    ax, ay, bx, by = now.corners[0:4]
+    arm, place = (ay, ax) if ay < by else (by, bx)
+    return arm, v[0] - v[2] * arm - 0.5 * now.length * now.v0[2] ** 2 * place
+
+
+@inner_kernel
+def closes(
+    contacts: Contacts, one: int, comes: Corner, other: Corner, coupling: float, t: float
+) -> float:
+    """Contact `one` closes at `t`: choose spring and damper, begin a strike if it was open long.
+
+    Returns the step that it asks for. `other` is the surface's other corner, and `coupling` their
+    mobility.
+
+    When the other corner arrives within the contact's own time, the two share the block's mass as
+    their speeds say. Where the mass lies nearer to one of them, equal springs would turn the block,
+    and neither corner would leave with the scene's restitution: there each spring is as stiff as
+    its share is large.
     """
-    memory, parameters = contacts.memory, contacts.parameters
+    memory, parameters, surface = contacts.memory, contacts.parameters, one // 2
     inverse = parameters.inverse_inertia
-    one = 2 * arrival.surface + arrival.corner
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
     memory[one, CLOSED] = 1.0
-    if arrival.rate > -GENTLE * parameters.gravity * contact_time:
+    if comes.rate > -GENTLE * parameters.gravity * contact_time:
         return math.inf
     if t - memory[one, LAST_CLOSED] > STRIKE:
         memory[one, STRUCK] = t
@@ -249,62 +346,30 @@ def closes(contacts: Contacts, arrival: Arrival, t: float) -> float:
     if parameters.calibrated:
         left, right, bottom, top = parameters.reach
         spring = 1.0
-        both = (
-            arrival.other_rate < 0.1 * arrival.rate
-            and arrival.other_gap < -arrival.other_rate * contact_time
-        )
-        mass = shared_mass(
-            arrival.mobility, arrival.other, arrival.coupling, arrival.other_rate / arrival.rate
-        )
-        if both and (left != right if arrival.surface == FLOOR else bottom != top) and mass > 0.0:
+        ratio = other.rate / comes.rate
+        both = other.rate < 0.1 * comes.rate and other.gap < -other.rate * contact_time
+        mass = shared_mass(comes.mobility, other.mobility, coupling, ratio)
+        if both and (left != right if surface == FLOOR else bottom != top) and mass > 0.0:
             spring = 2.0 * mass
         elif both:
-            mass = 1.0 / (
-                arrival.mobility + arrival.coupling * min(1.0, arrival.other_rate / arrival.rate)
-            )
-        elif arrival.surface == FLOOR:
+            mass = 1.0 / (comes.mobility + coupling * min(1.0, ratio))
+        elif surface == FLOOR:
             mass = effective_mass(
-                arrival.mobility,
-                1.0 + inverse * arrival.ry * arrival.ry,
-                -inverse * arrival.rx * arrival.ry,
-                arrival.rate,
-                arrival.slip,
+                comes.mobility,
+                1.0 + inverse * comes.ry * comes.ry,
+                -inverse * comes.rx * comes.ry,
+                comes.rate,
+                comes.slip,
                 parameters.mu_s,
-                parameters.restitution[arrival.surface],
+                parameters.restitution[surface],
             )
         else:
-            mass = 1.0 / arrival.mobility
+            mass = 1.0 / comes.mobility
         memory[one, STIFFNESS] = spring * parameters.stiffness
         memory[one, DAMPING] = (
-            2.0
-            * parameters.damping_ratio[arrival.surface]
-            * math.sqrt(spring * mass)
-            / contact_time
+            2.0 * parameters.damping_ratio[surface] * math.sqrt(spring * mass) / contact_time
         )
-    return min(
-        FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * arrival.mobility + 1e-300)
-    )
-
-
-@kernel
-def response(
-    k: float,
-    damping: float,
-    mobility: float,
-    gap: float,
-    before: float,
-    rate: float,
-    step: float,
-    ahead: float,
-) -> tuple[float, float]:
-    """Force of a closed contact as if its own forces did not move it, and the loss of force.
-
-    The loss is for a unit of velocity gained.
-    """
-    share = felt_share(damping * mobility * step)
-    return -k * (gap + ahead * rate) - damping * (before + share * (rate - before)), step * (
-        share * damping + k * ahead
-    )
+    return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * comes.mobility + 1e-300))
 
 
 @kernel
@@ -341,36 +406,53 @@ def is_closed(
 
 @inner_kernel
 def pushed(
-    contacts: Contacts, arrival: Arrival, gap: float, before: float, now: Step, ahead: float
+    contacts: Contacts,
+    one: int,
+    touches: Corner,
+    other: Corner,
+    coupling: float,
+    now: Step,
+    ahead: float,
 ) -> tuple[float, float, float]:
-    """The `response` of a closed contact, and the step that it needs.
+    """Force of a closed contact as if its own forces did not move it, and the loss of force.
 
-    The step is infinite unless the contact has just closed.
+    The loss is for a unit of velocity gained. Third is the step that the contact needs, infinite
+    unless it has just closed.
     """
-    memory, one = contacts.memory, 2 * arrival.surface + arrival.corner
+    memory, before = contacts.memory, touches.before
     fine = math.inf
     if memory[one, CLOSED] == 0.0:
-        fine = closes(contacts, arrival, now.t)
+        fine = closes(contacts, one, touches, other, coupling, now.t)
     k, damping = memory[one, STIFFNESS], memory[one, DAMPING]
-    force, lowers = response(
-        k, damping, arrival.mobility, gap, before, arrival.rate, now.length, ahead
-    )
-    return force, lowers, fine
+    share = felt_share(damping * touches.mobility * now.length)
+    felt = before + share * (touches.rate - before)
+    force = -k * (touches.gap + ahead * touches.rate) - damping * felt
+    return force, now.length * (share * damping + k * ahead), fine
 
 
 @inner_kernel
 def floor_forces(
-    contacts: Contacts, pair: Pair, arm: float, slip: float, step: float
-) -> tuple[float, float, float]:
-    """The normal forces of the floor and its friction, which is also written into `friction`.
+    contacts: Contacts,
+    now: Step,
+    v: Velocity,
+    levers: Vector,
+    mobilities: tuple[float, float, float],
+    pushes: tuple[float, float, float, float],
+) -> tuple[float, float, Velocity, float, float]:
+    """The normal forces of the floor, and what its friction does, which `friction` remembers.
 
-    Friction acts at the lower corner, within the cone of both: they slip together or not at all. It
-    is first solved as if it stuck.
+    That is the velocity with the friction, and what it adds to the rates of the two corners.
+    `mobilities` are those of the corners and their coupling, `pushes` the forces as if they did not
+    move the corners, and the loss of each. Friction acts at the lower corner, within the cone of
+    both: they slip together or not at all. It is first solved as if it stuck.
     """
-    f1, f2, d1, d2, k11, k12, k22, lever1, lever2 = pair
-    friction, parameters = contacts.friction, contacts.parameters
+    k11, k22, k12 = mobilities
+    f1, f2, d1, d2 = pushes
+    friction, parameters, step = contacts.friction, contacts.parameters, now.length
     k, inverse = parameters.stiffness, parameters.inverse_inertia
-    kt1, kt2, ktt = -inverse * arm * lever1, -inverse * arm * lever2, 1.0 + inverse * arm * arm
+    arm, slip = lower_corner(now, v)
+    kt1, kt2 = -inverse * arm * levers[0], -inverse * arm * levers[1]
+    ktt = 1.0 + inverse * arm * arm
     stop = parameters.friction_damping * step / (1.0 + parameters.friction_damping * step * ktt)
     free, _ = friction_force(
         k, parameters.friction_damping, step * ktt, 1e300, 1e300, 1.0, friction[STRETCH], slip
@@ -385,7 +467,6 @@ def floor_forces(
         k12 - stop * kt2 * kt1,
         k22 - stop * kt2 * kt2,
     )
-    slip += step * (kt1 * force1 + kt2 * force2)
     shear, slips = friction_force(
         k,
         parameters.friction_damping,
@@ -394,7 +475,7 @@ def floor_forces(
         parameters.mu_k,
         force1 + force2,
         friction[STRETCH],
-        slip,
+        slip + step * (kt1 * force1 + kt2 * force2),
     )
     if slips:
         mu = math.copysign(parameters.mu_k, shear)
@@ -403,7 +484,8 @@ def floor_forces(
         )
         shear = mu * (force1 + force2)
     friction[SHEAR], friction[SLIPS] = shear, 1.0 if slips else 0.0
-    return force1, force2, shear
+    v = kicked(v, inverse, (1.0, 0.0), -arm, step * shear)
+    return force1, force2, v, step * kt1 * shear, step * kt2 * shear
 
 
 @inner_kernel
@@ -419,75 +501,46 @@ def press(
     needs, else infinity.
     """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
-    x, y, corners, v0, step, t = now
-    inverse = parameters.inverse_inertia
-    nx, ny, ax, ay, bx, by = facing(surface, corners)
-    away = nx * x + ny * y + parameters.distance[surface]
-    gap1, gap2 = away + nx * ax + ny * ay, away + nx * bx + ny * by
-    one, two = 2 * surface, 2 * surface + 1
-    lever1, lever2 = ax * ny - ay * nx, bx * ny - by * nx
-    k11, k22, k12 = (
-        1.0 + inverse * lever1 * lever1,
-        1.0 + inverse * lever2 * lever2,
-        1.0 + inverse * lever1 * lever2,
-    )
-    # J belongs to the middle of the step, v to its end and v0 to its start: J changes by -w^2 (n.r)
-    # a unit of time.
-    half = 0.5 * step
-    turn = half * v0[2] ** 2
-    turn1, turn2 = turn * (nx * ax + ny * ay), turn * (nx * bx + ny * by)
-    rate1, rate2 = (
-        nx * v[0] + ny * v[1] + lever1 * v[2] - turn1,
-        nx * v[0] + ny * v[1] + lever2 * v[2] - turn2,
-    )
-    before1 = nx * v0[0] + ny * v0[1] + lever1 * v0[2] + turn1
-    before2 = nx * v0[0] + ny * v0[1] + lever2 * v0[2] + turn2
-    closed1, closed2 = (
-        is_closed(memory, one, gap1, rate1, ahead, t),
-        is_closed(memory, two, gap2, rate2, ahead, t),
-    )
-    fine = asked = math.inf
+    inverse, step, one, two = parameters.inverse_inertia, now.length, 2 * surface, 2 * surface + 1
+    n, r1, r2 = facing(surface, now.corners)
+    away = n[0] * now.x + n[1] * now.y + parameters.distance[surface]
+    first, second = seen(now, v, n, away, r1, inverse), seen(now, v, n, away, r2, inverse)
+    rate1, rate2 = first.rate, second.rate
+    coupling = 1.0 + inverse * first.lever * second.lever
+    closed1 = is_closed(memory, one, first.gap, rate1, ahead, now.t)
+    closed2 = is_closed(memory, two, second.gap, rate2, ahead, now.t)
+    fine = asked = closing = math.inf
     force1 = force2 = f1 = f2 = d1 = d2 = 0.0
-    slip1, slip2 = v[0] - v[2] * ay, v[0] - v[2] * by
     if closed1:
-        comes = Arrival(surface, 0, ax, ay, k11, k22, k12, rate1, slip1, gap2, rate2)
-        f1, d1, fine = pushed(contacts, comes, gap1, before1, now, ahead)
+        f1, d1, fine = pushed(contacts, one, first, second, coupling, now, ahead)
     if closed2:
-        comes = Arrival(surface, 1, bx, by, k22, k11, k12, rate2, slip2, gap1, rate1)
-        f2, d2, asked = pushed(contacts, comes, gap2, before2, now, ahead)
-    fine = min(fine, asked)
+        f2, d2, asked = pushed(contacts, two, second, first, coupling, now, ahead)
     if closed1 or closed2:
+        k11, k22 = first.mobility, second.mobility
         if surface != FLOOR:
-            force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k12, k22)
+            force1, force2 = normal_forces(f1, f2, d1, d2, k11, coupling, coupling, k22)
         else:
-            pair = Pair(f1, f2, d1, d2, k11, k12, k22, lever1, lever2)
-            arm, place = (ay, ax) if ay < by else (by, bx)
-            slip = v[0] - v[2] * arm - turn * place
-            force1, force2, shear = floor_forces(contacts, pair, arm, slip, step)
-            v = kicked(v, inverse, 1.0, 0.0, -arm, step * shear)
-            kt1, kt2 = -inverse * arm * lever1, -inverse * arm * lever2
-            rate1, rate2 = rate1 + step * kt1 * shear, rate2 + step * kt2 * shear
-        v = kicked(
-            kicked(v, inverse, nx, ny, lever1, step * force1),
-            inverse,
-            nx,
-            ny,
-            lever2,
-            step * force2,
-        )
-        rate1, rate2 = (
-            rate1 + step * (k11 * force1 + k12 * force2),
-            rate2 + step * (k12 * force1 + k22 * force2),
-        )
+            force1, force2, v, more1, more2 = floor_forces(
+                contacts,
+                now,
+                v,
+                (first.lever, second.lever),
+                (k11, k22, coupling),
+                (f1, f2, d1, d2),
+            )
+            rate1, rate2 = rate1 + more1, rate2 + more2
+        v = kicked(v, inverse, n, first.lever, step * force1)
+        v = kicked(v, inverse, n, second.lever, step * force2)
+        rate1 += step * (k11 * force1 + coupling * force2)
+        rate2 += step * (coupling * force1 + k22 * force2)
     elif surface == FLOOR:
         friction[SHEAR] = friction[SLIPS] = 0.0
     memory[one, FORCE], memory[two, FORCE] = force1, force2
-    closing = math.inf
     if not closed1:
-        closing = closes_in(parameters, gap1, before1, rate1, step)
+        closing = closes_in(parameters, first.gap, first.before, rate1, step)
     if not closed2:
-        closing = min(closing, closes_in(parameters, gap2, before2, rate2, step))
-    return v, closing, fine
+        closing = min(closing, closes_in(parameters, second.gap, second.before, rate2, step))
+    return v, closing, min(fine, asked)
 
 
 @kernel
@@ -511,31 +564,6 @@ def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
 
 
 @inner_kernel
-def sweep(
-    contacts: Contacts, now: Step, v: Velocity, ahead: float, takes_back: bool
-) -> tuple[Velocity, float, float, float, float]:
-    """Replaces the force of each surface in turn.
-
-    With `takes_back` a surface first takes back the force that it has; else it has none yet.
-    Returns what `press` returns, of all surfaces, the change of the forces, and their sum.
-    """
-    memory = contacts.memory
-    closing = young = math.inf
-    change = whole = 0.0
-    for surface in contacts.surfaces:
-        if takes_back:
-            v = with_forces(contacts, surface, now.corners, v, -now.length)
-        force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
-        v, next_closing, fine = press(contacts, surface, now, v, ahead)
-        closing, young = min(closing, next_closing), min(young, fine)
-        change += abs(memory[2 * surface, FORCE] - force1) + abs(
-            memory[2 * surface + 1, FORCE] - force2
-        )
-        whole += memory[2 * surface, FORCE] + memory[2 * surface + 1, FORCE]
-    return v, closing, young, change, whole
-
-
-@inner_kernel
 def kick(
     contacts: Contacts, now: Step, v: Velocity, settled: bool
 ) -> tuple[Velocity, float, float, int]:
@@ -554,11 +582,20 @@ def kick(
             v = with_forces(contacts, surface, corners, v, step)
     closing = young = math.inf
     sweeps = 0
+    ahead = step if settled else 0.0
     for _ in range(MOST_SWEEPS):
         sweeps += 1
-        ahead = step if settled else 0.0
-        v, closing, fine, change, whole = sweep(contacts, now, v, ahead, touching)
-        young = min(young, fine)
+        closing = math.inf
+        change = whole = 0.0
+        for surface in surfaces:
+            if touching:
+                v = with_forces(contacts, surface, corners, v, -step)
+            force1, force2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
+            v, closes_next, fine = press(contacts, surface, now, v, ahead)
+            closing, young = min(closing, closes_next), min(young, fine)
+            new1, new2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
+            change += abs(new1 - force1) + abs(new2 - force2)
+            whole += new1 + new2
         if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
             break
         touching = True
@@ -572,14 +609,10 @@ def stretch(contacts: Contacts, now: Step, v: Velocity) -> None:
     A spring that slips keeps the length of its largest force.
     """
     memory, friction, parameters = contacts.memory, contacts.friction, contacts.parameters
-    corners, v0, step = now.corners, now.v0, now.length
     friction[SLIPPED] = friction[SLIPS]
     load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
     if load > 0.0:
-        arm, place = (
-            (corners[1], corners[0]) if corners[1] < corners[3] else (corners[3], corners[2])
-        )
-        friction[STRETCH] += step * (v[0] - v[2] * arm - 0.5 * step * v0[2] ** 2 * place)
+        friction[STRETCH] += now.length * lower_corner(now, v)[1]
         if friction[SLIPS] != 0.0:  # the spring slips along, so that slip leaves no other memory
             longest = parameters.mu_k * load / parameters.stiffness
             friction[STRETCH] = min(max(friction[STRETCH], -longest), longest)
@@ -624,7 +657,7 @@ def gather(memory: Floats, step: float, first_strike: float) -> None:
 @inner_kernel
 def run_to(
     contacts: Contacts,
-    base: Shaking,
+    base: tuple[Samples, Samples],
     times: tuple[float, float],
     state: Floats,
     events: Floats,
@@ -656,10 +689,7 @@ def run_to(
         y += half * v[1]
         theta += half * v[2]
         v0 = v
-        u, vg = (
-            sampled(base.horizontal, base.horizontal_rate, middle),
-            sampled(base.vertical, base.vertical_rate, middle),
-        )
+        u, vg = sampled(*base[0], middle), sampled(*base[1], middle)
         v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
         now = Step(x, y, corners_at(parameters, theta), v0, step, middle)
         v, closing, young, swept = kick(contacts, now, v, settled)
@@ -686,12 +716,12 @@ def run_to(
 @kernel
 def advance(
     contacts: Contacts,
-    first_row: int,
+    base: tuple[Samples, Samples],
     output_step: float,
-    base: Shaking,
     state: Floats,
-    output: Floats,
     events: Floats,
+    first_row: int,
+    output: Floats,
 ) -> tuple[int, int, int, int, int, float]:
     """Fills the rows of `output` with the motion that follows `state`, which is moved along.
 

@@ -1,11 +1,12 @@
-"""The Continuous Model as a model of a scene: settings, set-up, run."""
+"""The Continuous Model as a model of a scene: settings, set-up, run; the restitution reached."""
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,7 @@ class ContinuousModel(Frozen):
     damping_rule
         "calibrated": a contact that closes is given the damping with which a clamped contact of its
         effective mass has the scene's restitution (`contact.damping_ratio`,
-        `contact.effective_mass`). "paper": (33) with the whole mass, constant.
+        `kernels.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
     the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
@@ -68,15 +69,12 @@ class ContinuousModel(Frozen):
     zero is reached within `contact.least_restitution`, 7e-5 for the paper's block.
     """
 
+    #: The name by which reports and the command line call this model.
+    name: ClassVar[str] = "cm"
     penetration: Positive = 1e-8
     stiffness: Positive | None = None
     time_step: Positive | None = None
     damping_rule: Literal["calibrated", "paper"] = "calibrated"
-
-    @property
-    def name(self) -> str:
-        """The name by which reports and the command line call this model."""
-        return "cm"
 
     @model_validator(mode="after")
     def _one_stiffness(self) -> ContinuousModel:
@@ -126,14 +124,8 @@ class ContinuousModel(Frozen):
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
-        walls = [kernels.LEFT_WALL] * (scene.wall("left") is not None) + [kernels.RIGHT_WALL] * (
-            scene.wall("right") is not None
-        )
-        surfaces = np.array([*walls, kernels.FLOOR])
-        horizontal, horizontal_rate = _samples(scene.excitation, scene.duration)
-        vertical, vertical_rate = _samples(scene.vertical, scene.duration)
+        base = _samples(scene.excitation, scene.duration), _samples(scene.vertical, scene.duration)
         state, memory = self._initial(scene, parameters)
-        friction = np.zeros(4)
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
@@ -141,26 +133,16 @@ class ContinuousModel(Frozen):
             (len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3)
         )
 
-        contacts = kernels.Contacts(memory, friction, parameters, surfaces)
-        base = kernels.Shaking(horizontal, horizontal_rate, vertical, vertical_rate)
+        surfaces = np.flatnonzero(np.isfinite(parameters.distance))
+        contacts = kernels.Contacts(memory, np.zeros(4), parameters, surfaces)
 
-        def advance(row: int, rows: int) -> tuple[int, int, int, int, int, float]:
-            return kernels.advance(
-                contacts,
-                row,
-                scene.output_step,
-                base,
-                state,
-                output[row : row + rows],
-                events,
-            )
-
-        advance(1, 0)  # compiles, or reads the compiled loop from its cache
+        advance = partial(kernels.advance, contacts, base, scene.output_step, state, events)
+        advance(1, output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
         strikes: list[NDArray[np.float64]] = []
         row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
         while row < len(times) and ending == kernels.DONE:
-            slab = partial(advance, row, min(rows_a_slab, len(times) - row))
+            slab = partial(advance, row, output[row : row + rows_a_slab])
             ending, rows, found, more_steps, more_sweeps, reached = interruptible(slab)
             row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
             strikes.append(events[:found].copy())
@@ -215,17 +197,10 @@ class ContinuousModel(Frozen):
             contact.damping_ratio, least=contact.least_restitution(k, scene.frequency_parameter)
         )
         ratio = calibrated if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
-        left, right = scene.wall("left"), scene.wall("right")
+        walls = scene.wall("left"), scene.wall("right")
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
-        restitution = (
-            left.restitution if left else 0.0,
-            right.restitution if right else 0.0,
-            scene.floor.restitution,
-        )
-        distance = [
-            math.inf if wall is None else scene.block.half_width + wall.gap
-            for wall in (left, right)
-        ]
+        restitution = [wall.restitution if wall else 0.0 for wall in walls]
+        restitution.append(scene.floor.restitution)
         return kernels.Parameters(
             reach=(b + dx, b - dx, h + dz, h - dz),
             inverse_inertia=3.0 / (b * b + h * h)
@@ -236,9 +211,9 @@ class ContinuousModel(Frozen):
             friction_damping=FRICTION_DAMPING * math.sqrt(k),
             mu_s=scene.floor.mu_s,
             mu_k=scene.floor.friction,
-            restitution=restitution,
-            damping_ratio=(ratio(restitution[0]), ratio(restitution[1]), ratio(restitution[2])),
-            distance=(distance[0], distance[1], 0.0),
+            restitution=tuple(restitution),
+            damping_ratio=tuple(ratio(one) for one in restitution),
+            distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
             calibrated=self.damping_rule == "calibrated",
             time_step=self.time_step_in(scene),
         )
@@ -297,3 +272,47 @@ def _samples(
     step = excitation.period / SAMPLES_A_PERIOD
     until = min(excitation.quiet_after, duration)
     return excitation.acceleration(step * np.arange(math.ceil(until / step) + 2)), 1.0 / step
+
+
+def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
+    """Restitution of the first impact in `scene`: normal speed after over normal speed before.
+
+    The scene is played twice, the second time up to that impact with 20 output times in every
+    1/sqrt(k/m). Raises `InputError` if nothing strikes.
+    """
+    events = model.simulate(scene).event_list
+    first = next((event for event in events if event.kind.endswith("impact")), None)
+    if first is None:
+        raise InputError(f"nothing strikes in scene {scene.name!r}")
+    contact_time = 1.0 / math.sqrt(model.stiffness_in(scene))
+    sample = max(0.05 * contact_time, first.t / 2e6)
+    history = model.simulate(
+        scene.replace(duration=first.t + 6.0 * contact_time, output_step=sample)
+    )
+    onset = int(first.t / sample)
+    # Of the corners about to touch, the fastest.
+    near = [
+        rate
+        for gap, rate in _contacts(scene, history, first.kind)
+        if rate[onset] < 0.0 and gap[onset] < -3.0 * sample * rate[onset]
+    ]
+    struck = min(near, key=lambda rate: float(rate[onset]))
+    return float(max(np.max(struck[onset:]), 0.0) / -struck[onset])
+
+
+def _contacts(
+    scene: Scene, history: History, kind: str
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Gap (m) and rate (m/s) of every corner that may meet the floor, or a wall."""
+    c, block = history.channels, scene.block
+    sin, cos, w = np.sin(c["theta"]), np.cos(c["theta"]), c["theta_dot"]
+    for outward in (1.0, -1.0):  # the left and the right side
+        for up in (-1.0, 1.0):
+            a, b = -outward * block.half_width, up * block.half_height
+            rx, ry = a * cos - b * sin, a * sin + b * cos
+            wall = scene.wall("left" if outward > 0.0 else "right")
+            if kind == "floor impact" and up < 0.0:
+                yield c["y"] + ry, c["y_dot"] + w * rx
+            elif kind == "wall impact" and wall is not None:
+                gap = outward * (c["x"] + rx) + block.half_width + wall.gap
+                yield gap, outward * (c["x_dot"] - w * ry)

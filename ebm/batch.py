@@ -171,19 +171,17 @@ def play_ensemble(
     if failed.any():
         i = int(np.argmax(failed))
         raise ModelFailure(f"{model.name}: scene {i} of the ensemble: {FAILURES[int(ending[i])]}")
-    placed = [natural.to_si(scene, z[None, :])[0] for scene, z in zip(scenes, motion, strict=True)]
-    slip = [
-        float(kinematics.slip(scene.block, z[0], z[2]))
-        for scene, z in zip(scenes, placed, strict=True)
-    ]
-    alpha = np.array([scene.block.alpha for scene in scenes])
+    slip = np.empty(count)
+    for i, (scene, z) in enumerate(zip(scenes, motion, strict=True)):
+        ((x, _, tilt, *_),) = natural.to_si(scene, z[None, :])
+        slip[i] = kinematics.slip(scene.block, x, tilt)
     return Ensemble(
         t=t,
         theta=theta,
         side=sides_of(found),
         peak=found["peak"].copy(),
-        last_slip=np.array(slip),
-        alpha=alpha,
+        last_slip=slip,
+        alpha=np.array([scene.block.alpha for scene in scenes]),
     )
 
 

@@ -1,6 +1,7 @@
 """The event-based models: `ebm`, `ebm-unilateral` and `ebm-bouc-wen`."""
 
 import time
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal, Self
 
@@ -67,72 +68,59 @@ class EventBasedModel(Frozen):
 
         The limit is double precision's.
         """
-        return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, 1e-15)})
+        return self.model_copy(update={"tolerance": max(self.tolerance / 100.0, FINEST)})
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
         check_kind(scene, Scene, "load_scene", "scene")
-        if self.friction == "bouc-wen":
-            self._check_bouc_wen(scene)
-        if self.friction == "no-slip" and scene.initial_velocity != 0.0:
-            raise InputError(
-                f'{scene.initial_velocity:g} is not allowed with friction="no-slip":'
-                " it never slips",
+        floor, height, speed = scene.floor, scene.initial_height, scene.initial_velocity
+        bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
+        refusals = (
+            (
+                bouc_wen and not bilateral,
+                f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is',
+                "pivot",
+            ),
+            (
+                bouc_wen and floor.mu_s != floor.friction,
+                f"{floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient,"
+                f" {floor.friction:g}",
+                "floor.static_friction",
+            ),
+            (
+                self.friction == "no-slip" and speed != 0.0,
+                f'{speed:g} is not allowed with friction="no-slip": it never slips',
                 "initial_velocity",
-            )
-        if self.pivot == "bilateral":
-            if scene.floor.restitution > 0.0:
-                raise InputError(
-                    f"{scene.floor.restitution:g} is not allowed with the bilateral pivot: a floor"
-                    " impact that rebounds is free flight,"
-                    ' which this model excludes; use 0, or pivot="unilateral"',
-                    "floor.restitution",
-                )
-            if scene.initial_height > 0.0:
-                raise InputError(
-                    f"{scene.initial_height:g} is not allowed with the bilateral pivot, which"
-                    " never leaves the floor; use 0, or"
-                    ' pivot="unilateral"',
-                    "initial_height",
-                )
-        elif scene.floor.restitution == 1.0:
-            raise InputError(
+            ),
+            (
+                bilateral and floor.restitution > 0.0,
+                f"{floor.restitution:g} is not allowed with the bilateral pivot: a floor impact"
+                " that rebounds is free flight, which this model excludes; use 0, or"
+                ' pivot="unilateral"',
+                "floor.restitution",
+            ),
+            (
+                bilateral and height > 0.0,
+                f"{height:g} is not allowed with the bilateral pivot, which never leaves the"
+                ' floor; use 0, or pivot="unilateral"',
+                "initial_height",
+            ),
+            (
+                floor.restitution == 1.0,
                 "1 is not allowed: a block that loses nothing at the floor never settles; use less"
                 " than 1",
                 "floor.restitution",
-            )
-
-    def _check_bouc_wen(self, scene: Scene) -> None:
-        if self.pivot != "bilateral":
-            raise InputError(
-                f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is',
-                "pivot",
-            )
-        if scene.floor.mu_s != scene.floor.friction:
-            raise InputError(
-                f"{scene.floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient,"
-                f" {scene.floor.friction:g}",
-                "floor.static_friction",
-            )
+            ),
+        )
+        for refused, reason, key in refusals:
+            if refused:
+                raise InputError(reason, key)
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid.
 
         Raises `InputError` (see `check`) or `ModelFailure`.
         """
-        history = self._simulate(scene)
-        if not self.estimate_error:
-            return history
-        finer = self.finer()._simulate(scene)
-        rows = min(len(finer.channels["theta"]), len(history.channels["theta"]))
-        change = (
-            np.max(np.abs(finer.channels["theta"][:rows] - history.channels["theta"][:rows]))
-            / scene.block.alpha
-        )
-        cost = Cost(**(vars(history.cost) | {"error_estimate": float(change)}))
-        return History(**(vars_of(history) | {"cost": cost}))
-
-    def _simulate(self, scene: Scene) -> History:
         began = time.perf_counter()
         from rockcheck.ebm import natural, packed
         from rockcheck.ebm.core import names, state
@@ -169,8 +157,18 @@ class EventBasedModel(Frozen):
             raise ModelFailure(f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s")
         found, (out, modes, log) = states[0], (rows[0] for rows in records)
         rows = max(written, 1)
+        speed = scene.block.radius / unit
         out[0] = natural.state_of(scene) if written == 0 else out[0]
-        events = _events(log[: min(found.events, len(log))], unit, scene.block.radius)
+        events = [
+            Event(
+                t=at * unit,
+                kind=names.EVENT_NAMES[int(kind)],
+                mode_before=names.MODE_NAMES[int(before)],
+                mode_after=names.MODE_NAMES[int(after)],
+                impulse=impulse * speed,
+            )
+            for at, kind, before, after, impulse in log[: min(found.events, len(log))].tolist()
+        ]
         cost = Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
@@ -186,7 +184,7 @@ class EventBasedModel(Frozen):
         outcome = "at rest" if at_rest else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"
-        return observe(
+        history = observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
@@ -196,28 +194,13 @@ class EventBasedModel(Frozen):
             cost=cost,
             settings=self.model_dump(),
         )
-
-
-def _events(log: np.ndarray, unit: float, radius: float) -> list[Event]:
-    """The event log (natural units) as events (SI)."""
-    from rockcheck.ebm.core import names
-
-    modes, kinds, speed = names.MODE_NAMES, names.EVENT_NAMES, radius / unit
-    return [
-        Event(
-            t=t * unit,
-            kind=kinds[int(kind)],
-            mode_before=modes[int(before)],
-            mode_after=modes[int(after)],
-            impulse=impulse * speed,
-        )
-        for t, kind, before, after, impulse in log.tolist()
-    ]
-
-
-def vars_of(history: History) -> dict[str, Any]:
-    """The fields of a history, without its cached values."""
-    return {name: getattr(history, name) for name in History.__dataclass_fields__}
+        if not self.estimate_error:
+            return history
+        finer = self.finer().model_copy(update={"estimate_error": False}).simulate(scene)
+        thetas = finer.channels["theta"], history.channels["theta"]
+        fine, coarse = (theta[: min(map(len, thetas))] for theta in thetas)
+        change = np.max(np.abs(fine - coarse)) / scene.block.alpha
+        return replace(history, cost=replace(cost, error_estimate=float(change)))
 
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.

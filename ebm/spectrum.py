@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.model import FINEST, EventBasedModel
 from rockcheck.scenes import Block, InputError, Record, Scene
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import check_kind
@@ -169,28 +170,16 @@ def play_nodes(
     The ratios are 1-D arrays of one length. A run that fails is made once more at a hundredth of
     the tolerance.
     """
-    sides, failed = _batch_of(scene, amplitude_ratios, frequency_ratios, model, jobs, on_progress)
-    if failed.any():
-        finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, 1e-15)})
-        sides[failed], failed[failed] = _batch_of(
-            scene, amplitude_ratios[failed], frequency_ratios[failed], finer, jobs, unheard
-        )
-    return sides, failed
-
-
-def _batch_of(
-    scene: Scene,
-    amplitude_ratios: Floats,
-    frequency_ratios: Floats,
-    model: EventBasedModel,
-    jobs: int | None,
-    on_progress: OnProgress,
-) -> Nodes:
     from rockcheck.ebm import batch
 
-    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
-    found = batch.run_batch(packed, model, jobs=jobs, on_progress=on_progress, strict=False)
-    return found.side, found.failed
+    sides, failed = np.zeros(len(amplitude_ratios), np.int8), np.ones(len(amplitude_ratios), bool)
+    finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, FINEST)})
+    for player, told in ((model, on_progress), (finer, unheard)):
+        if failed.any():
+            packed = _packed(scene, amplitude_ratios[failed], frequency_ratios[failed], player)
+            found = batch.run_batch(packed, player, jobs=jobs, on_progress=told, strict=False)
+            sides[failed], failed[failed] = found.side, found.failed
+    return sides, failed
 
 
 def _packed(
@@ -240,15 +229,11 @@ def play_motions(
     """
     from rockcheck.ebm import batch, natural
 
-    nodes = list(zip(amplitude_ratios.tolist(), frequency_ratios.tolist(), strict=True))
-    changing = (
-        scene.excitation.kind == "record"
-    )  # its nodes are blocks of other sizes; the length of a pulse is its period's
-    scenes = {
-        key: node_scene(scene, *key)
-        for key in (nodes if changing else [(1.0, f) for f in np.unique(frequency_ratios).tolist()])
-    }
-    played = [scenes[a if changing else 1.0, f] for a, f in nodes]
+    nodes = zip(amplitude_ratios.tolist(), frequency_ratios.tolist(), strict=True)
+    # The nodes of a record are blocks of other sizes; the length of a pulse is its period's.
+    changing = scene.excitation.kind == "record"
+    made = cache(partial(node_scene, scene))
+    played = [made(a if changing else 1.0, f) for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
     packed = _packed(scene, amplitude_ratios, frequency_ratios, model).changed(durations=lengths)
     found = batch.run_batch(
@@ -259,13 +244,9 @@ def play_motions(
         played, found.failed, found.side, found.at_rest, found.motion, found.written, strict=True
     ):
         x, y, theta = natural.to_si(one, states[: max(int(written), 1)])[:, :3].T
-        upright = (
-            int(np.argmax(fallen))
-            if (fallen := np.abs(theta) >= 0.5 * math.pi).any()
-            else len(theta)
-        )
         t = one.duration / parts * np.arange(len(theta))
-        rows = np.column_stack([t, theta, x, y])[: max(upright, 1)]
+        upright = np.logical_and.accumulate(np.abs(theta) < 0.5 * math.pi)
+        rows = np.column_stack([t, theta, x, y])[: max(int(upright.sum()), 1)]
         outcome = {LEFT: "overturned left", RIGHT: "overturned right"}.get(
             int(side), "at rest" if at_rest else "moving"
         )
@@ -333,7 +314,8 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
     run(lattice)
     while step > 1:
         half = step // 2
-        differs = _mixed_cells(outcomes, step)
+        corners = outcomes[np.ix_(lattice.any(axis=1), lattice.any(axis=0))]
+        differs = _vary(corners, 2)[1:, 1:]  # in the cells that end at these corners
         near = ndimage.binary_dilation(differs, np.ones((3, 3)))  # and a ring of cells around each
         wanted = np.zeros(outcomes.shape, dtype=bool)
         for i, j in zip(*np.nonzero(near), strict=True):
@@ -341,50 +323,40 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
                 i * step : min((i + 1) * step, rows - 1) + 1 : 1,
                 j * step : min((j + 1) * step, columns - 1) + 1,
             ] = True
-        finer = _lattice(rows, columns, half)
-        run(wanted & finer)
+        lattice = _lattice(rows, columns, half)
+        run(wanted & lattice)
         # Cells without a boundary are uniform: their inner nodes take the value of a corner.
-        open_nodes = finer & (outcomes == _UNKNOWN)
+        open_nodes = lattice & (outcomes == _UNKNOWN)
         i, j = np.nonzero(open_nodes)
         outcomes[i, j] = outcomes[i // step * step, j // step * step]
         inferred |= open_nodes
         step = half
-    while (doubtful := inferred & _near_another(outcomes)).any():
+    while (doubtful := inferred & _vary(outcomes, 2 * FOLLOWED + 1)).any():
         inferred &= ~doubtful
         outcomes[doubtful] = _UNKNOWN
         run(doubtful)
 
 
-def _near_another(outcomes: NDArray[np.int8]) -> NDArray[np.bool_]:
-    """Which nodes have one of another outcome within `FOLLOWED` nodes, diagonals included."""
+def _vary(outcomes: NDArray[np.int8], width: int) -> NDArray[np.bool_]:
+    """Where the outcomes are not all the same in the square of `width` nodes around a node.
+
+    A square of two nodes ends at the node.
+    """
     from scipy import ndimage
 
-    width = 2 * FOLLOWED + 1
     least, most = (
         extreme(outcomes, width, mode="nearest")
         for extreme in (ndimage.minimum_filter, ndimage.maximum_filter)
     )
-    near: NDArray[np.bool_] = least != most
-    return near
+    vary: NDArray[np.bool_] = least != most
+    return vary
 
 
 def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:
     """Every `step`-th node of each axis, and the last one."""
-    i, j = np.zeros(rows, dtype=bool), np.zeros(columns, dtype=bool)
-    i[::step] = j[::step] = True
-    i[-1] = j[-1] = True
-    return i[:, None] & j[None, :]
-
-
-def _mixed_cells(outcomes: NDArray[np.int8], step: int) -> NDArray[np.bool_]:
-    """Whether the corners of each cell of the lattice differ."""
-    rows, columns = outcomes.shape
-    i = np.append(np.arange(0, rows - 1, step), rows - 1)
-    j = np.append(np.arange(0, columns - 1, step), columns - 1)
-    corner = outcomes[np.ix_(i, j)]
-    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[:-1, 1:], corner[1:, 1:]
-    mixed: NDArray[np.bool_] = (a != b) | (a != c) | (a != d)
-    return mixed
+    places = np.arange(rows), np.arange(columns)
+    i, j = ((place % step == 0) | (place == place[-1]) for place in places)
+    return i[:, None] & j
 
 
 def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
@@ -392,14 +364,19 @@ def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
         axis = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("numbers are asked for", key) from None
-    if axis.ndim != 1 or axis.size == 0:
-        raise InputError(
+    refusals = (
+        (
+            axis.ndim != 1 or axis.size == 0,
             f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked"
             " for",
-            key,
-        )
-    if not np.all(np.isfinite(axis)) or axis[0] <= 0.0:
-        raise InputError("positive finite numbers are asked for", key)
-    if np.any(np.diff(axis) <= 0.0):
-        raise InputError("increasing numbers are asked for", key)
+        ),
+        (
+            not np.all(np.isfinite(axis)) or np.any(axis[:1] <= 0.0),
+            "positive finite numbers are asked for",
+        ),
+        (np.any(np.diff(axis) <= 0.0), "increasing numbers are asked for"),
+    )
+    for refused, reason in refusals:
+        if refused:
+            raise InputError(reason, key)
     return axis

@@ -1,7 +1,7 @@
 """The base motion as a velocity: its differences are exact mean accelerations over a step."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,44 +11,39 @@ from rockcheck.scenes.excitations import FloatArray, Ricker, Sine
 SAMPLES_A_PERIOD = 1000  # of a pulse: a cubic spline through them is good to 1e-11 of its amplitude
 
 
-class BaseVelocity:
-    """The time integral of one excitation: of a record's straight lines, of a pulse's spline."""
+class BaseVelocity(NamedTuple):
+    """The time integral of one excitation: of a record's straight lines, of a pulse's spline.
 
-    def __init__(self, excitation: Rest | Ricker | Sine | Record) -> None:
-        from scipy.interpolate import CubicSpline, PPoly
+    The `pieces` are polynomials in the time since their start, each of `interval` s; after all of
+    them the velocity is `last`, m/s.
+    """
 
-        if isinstance(excitation, Record):
-            self.interval = excitation.time_step
-        elif isinstance(excitation, Rest):
-            self.interval = 1.0
-        else:
-            self.interval = excitation.period / SAMPLES_A_PERIOD
-        self.times = self.interval * np.arange(
-            math.ceil(excitation.quiet_after / self.interval - 1e-9) + 1
-        )
-        # Lists: an engine's loop asks for one time after another.
-        self.pieces: list[list[float]] = []
-        self.last = 0.0
-        if len(self.times) > 1:
-            samples = excitation.acceleration(self.times)
-            lines = np.array([np.diff(samples) / self.interval, samples[:-1]])
-            pieces = PPoly(
-                lines if isinstance(excitation, Record) else CubicSpline(self.times, samples).c,
-                self.times,
-            )
-            velocity = pieces.antiderivative()
-            self.pieces, self.last = velocity.c[::-1].T.tolist(), float(velocity(self.times[-1]))
+    pieces: list[list[float]]  # lists: an engine's loop asks for one time after another
+    interval: float
+    last: float
 
-    def __call__(self, t: float) -> float:
-        """Velocity of the base in m/s at the time `t` >= 0 in s, zero at t = 0."""
-        return float(velocity_at(t, self.pieces, self.interval, self.last))
+
+def velocity_of(excitation: Rest | Ricker | Sine | Record) -> BaseVelocity:
+    """The velocity of the base, zero at t = 0; for `velocity_at`."""
+    from scipy.interpolate import CubicSpline, PPoly
+
+    if isinstance(excitation, Rest) or excitation.quiet_after == 0.0:  # a record of one sample
+        return BaseVelocity([], 1.0, 0.0)
+    interval = (
+        excitation.time_step
+        if isinstance(excitation, Record)
+        else excitation.period / SAMPLES_A_PERIOD
+    )
+    times = interval * np.arange(math.ceil(excitation.quiet_after / interval - 1e-9) + 1)
+    samples = excitation.acceleration(times)
+    lines = np.array([np.diff(samples) / interval, samples[:-1]])
+    pieces = lines if isinstance(excitation, Record) else CubicSpline(times, samples).c
+    velocity = PPoly(pieces, times).antiderivative()
+    return BaseVelocity(velocity.c[::-1].T.tolist(), interval, float(velocity(times[-1])))
 
 
 def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
-    """Velocity at the time `t`; after all `pieces` it is `last`.
-
-    The pieces are polynomials in the time since their start; each lasts `interval` s.
-    """
+    """Velocity in m/s at the time `t` >= 0 in s, from what a `BaseVelocity` holds."""
     index = int(t / interval)
     if index >= len(pieces):
         return last
@@ -66,18 +61,14 @@ class BaseMotion:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.across, self.up, self.gravity = (
-            BaseVelocity(scene.excitation),
-            BaseVelocity(scene.vertical),
-            scene.gravity,
-        )
-        self.starts = _starts_of_motion(
-            scene, np.unique(np.concatenate([self.across.times, self.up.times]))
-        )
+        self.across, self.up = velocity_of(scene.excitation), velocity_of(scene.vertical)
+        self.gravity = scene.gravity
+        ends = [one.interval * np.arange(len(one.pieces) + 1) for one in (self.across, self.up)]
+        self.starts = _starts_of_motion(scene, np.unique(np.concatenate(ends)))
 
     def velocity(self, t: float) -> tuple[float, float]:
         """Velocity of the base to the right and up in m/s at the time `t` >= 0 in s."""
-        return self.across(t), self.up(t)
+        return velocity_at(t, *self.across), velocity_at(t, *self.up)
 
     def felt_acceleration(self, edges: FloatArray) -> FloatArray:
         """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).

@@ -1,7 +1,7 @@
 """Box2D v3 (pyb2d3) as a model of the rocking block."""
 
 import math
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
@@ -21,30 +21,23 @@ class _Box2DWorld(World):
     def __init__(self, scene: Scene) -> None:
         import pyb2d3
 
-        self.box2d: Any = pyb2d3
         self.world = pyb2d3.World(gravity=(0.0, 0.0))
         # Of two frictions the geometric mean counts, of two restitutions the larger.
-        for surface in surfaces_of(scene):
-            slab = self.world.create_static_body(position=surface.behind(SLAB))
-            width, _, height = surface.extent(SLAB, REACH)
-            slab.create_shape(
-                self._shape(surface.friction, surface.restitution), pyb2d3.box(width, height)
-            )
+        for face in surfaces_of(scene):
+            slab = self.world.create_static_body(position=face.behind(SLAB))
+            width, _, height = face.extent(SLAB, REACH)
+            stuff = pyb2d3.surface_material(friction=face.friction, restitution=face.restitution)
+            slab.create_shape(pyb2d3.shape_def(material=stuff), pyb2d3.box(width, height))
         self.body = self.world.create_dynamic_body(position=(0.0, scene.block.half_height))
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
-        self.body.create_shape(
-            self._shape(scene.floor.friction, 0.0),
-            pyb2d3.box(b, h, center=(-dx, -dz), rotation=0.0),
-        )
+        stuff = pyb2d3.surface_material(friction=scene.floor.friction, restitution=0.0)
+        box = pyb2d3.box(b, h, center=(-dx, -dz), rotation=0.0)
+        self.body.create_shape(pyb2d3.shape_def(material=stuff), box)
         mass = pyb2d3.MassData()
         mass.mass, mass.center = 1.0, (0.0, 0.0)
         mass.rotational_inertia = scene.block.gyration_squared
         self.body.mass_data = mass
         self.turned = pyb2d3.Rot(0.0)
-
-    def _shape(self, friction: float, restitution: float) -> Any:
-        material = self.box2d.surface_material(friction=friction, restitution=restitution)
-        return self.box2d.shape_def(material=material)
 
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         self.turned.c, self.turned.s = math.cos(theta), math.sin(theta)

@@ -58,16 +58,6 @@ def rate_of(nx: Any, nz: Any, x_dot: Any, y_dot: Any, theta_dot: Any, arm: Arm) 
     return nx * (x_dot - theta_dot * arm[1]) + nz * (y_dot + theta_dot * arm[0])
 
 
-def acceleration_of(
-    nx: Any, nz: Any, x_ddot: Any, y_ddot: Any, theta_ddot: Any, theta_dot: Any, arm: Arm
-) -> Any:
-    """The acceleration of the gap to a surface with the normal (nx, nz), m/s^2."""
-    turning = theta_dot * theta_dot
-    return nx * (x_ddot - theta_ddot * arm[1] - turning * arm[0]) + nz * (
-        y_ddot + theta_ddot * arm[0] - turning * arm[1]
-    )
-
-
 def surfaces_of(scene: Scene) -> tuple[Surface, ...]:
     """The floor and the walls of a scene; the walls are smooth."""
     floor, b = scene.floor, scene.block.half_width
@@ -115,3 +105,8 @@ def contacts_of(scene: Scene) -> tuple[Contact, ...]:
 def corners_of(scene: Scene) -> list[Point]:
     """The corners that can touch something, from the mass's centre, m."""
     return list(dict.fromkeys(contact.corner for contact in contacts_of(scene)))
+
+
+def rebounds(scene: Scene) -> bool:
+    """Whether any contact of a scene has restitution."""
+    return any(surface.restitution > 0.0 for surface in surfaces_of(scene))

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rockcheck.engines.contacts import Surface, surfaces_of
+from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep
 from rockcheck.engines.world import State, World
@@ -49,7 +49,15 @@ class _DartWorld(World):
             body.getShapeNode(0).setRelativeTranslation([-dx, 0.0, -dz])
         self.world.addSkeleton(self.block)
         for surface in surfaces_of(scene):
-            self._slab(surface, scale)
+            slab = dartpy.dynamics.Skeleton(surface.surface)
+            joint, body = slab.createWeldJointAndBodyNodePair()
+            x, z = surface.behind(SLAB)
+            place = dartpy.math.Isometry3()
+            place.set_translation([scale * x, 0.0, scale * z])
+            joint.setTransformFromParentBodyNode(place)
+            size = surface.extent(2.0 * scale * SLAB, 2.0 * scale * REACH)
+            self._box(body, size, surface.friction, surface.restitution)
+            self.world.addSkeleton(slab)
 
     def _box(self, body: Any, size: Any, friction: float, restitution: float) -> Any:
         """A box as a body's shape; returns what holds its friction and restitution."""
@@ -59,17 +67,6 @@ class _DartWorld(World):
         contact.setFrictionCoeff(friction)
         contact.setRestitutionCoeff(restitution)
         return contact
-
-    def _slab(self, surface: Surface, scale: float) -> None:
-        slab = self.dart.dynamics.Skeleton(surface.surface)
-        joint, body = slab.createWeldJointAndBodyNodePair()
-        x, z = surface.behind(SLAB)
-        place = self.dart.math.Isometry3()
-        place.set_translation([scale * x, 0.0, scale * z])
-        joint.setTransformFromParentBodyNode(place)
-        size = surface.extent(2.0 * scale * SLAB, 2.0 * scale * REACH)
-        self._box(body, size, surface.friction, surface.restitution)
-        self.world.addSkeleton(slab)
 
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         self.block.setPositions(self.scale * (x, y, theta))
@@ -131,4 +128,4 @@ class Dart(Engine):
     def notes(self, scene: Scene) -> list[str]:
         """Also that a flat landing may not stay flat on a floor that bounces."""
         tips = "dart does not keep a bouncing block flat: it may tip at its second landing"
-        return [*super().notes(scene), *([tips] if scene.floor.restitution > 0.0 else [])]
+        return super().notes(scene) + [tips] * (scene.floor.restitution > 0.0)

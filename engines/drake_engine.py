@@ -49,10 +49,7 @@ class _DrakeWorld(World):
         try:
             self.simulator.AdvanceTo(self.steps * dt)
         except RuntimeError as error:  # its solver has not converged
-            self.step_unsolved(felt, dt, ModelFailure(f"Drake: {printable(error, 200)}"))
-
-    def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
-        raise failure
+            raise ModelFailure(f"Drake: {printable(error, 200)}") from None
 
     def state(self) -> State:
         state: State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
@@ -121,23 +118,26 @@ class _RigidDrakeWorld(_DrakeWorld):
         self.stiffness, self.dissipation, self.stiction = stiffness, dissipation, stiction
         self.coarser: _RigidDrakeWorld | None = None
 
-    def step_unsolved(self, felt: tuple[float, float], dt: float, failure: ModelFailure) -> None:
-        """Repeat the step with a stiction speed ten times as large.
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step; repeated with a stiction speed ten times as large where it is not solved.
 
-        This smooths the transition from stick to slip at which TAMSI fails to converge. Raises
-        `failure` where the stiction speed has reached `COARSEST_STICTION`.
+        This smooths the transition from stick to slip at which TAMSI fails to converge. Fails where
+        the stiction speed has reached `COARSEST_STICTION`.
         """
-        if self.stiction >= COARSEST_STICTION:
-            raise failure
-        if self.coarser is None:
-            self.coarser = _RigidDrakeWorld(
-                self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction
-            )
-        self.coarser.place(*self.state())
-        self.coarser.step(felt, dt)
-        self.place(*self.coarser.state())
-        self.simulator.get_mutable_context().SetTime(self.steps * dt)
-        self.simulator.Initialize()
+        try:
+            super().step(felt, dt)
+        except ModelFailure:
+            if self.stiction >= COARSEST_STICTION:
+                raise
+            if self.coarser is None:
+                self.coarser = _RigidDrakeWorld(
+                    self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction
+                )
+            self.coarser.place(*self.state())
+            self.coarser.step(felt, dt)
+            self.place(*self.coarser.state())
+            self.simulator.get_mutable_context().SetTime(self.steps * dt)
+            self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
         plant, geometry, contacts = self.plant, self.geometry, self.contacts

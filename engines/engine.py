@@ -5,13 +5,13 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
+from dataclasses import astuple
 from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import field_validator, model_validator
 
-from rockcheck.engines.base_motion import BaseMotion
-from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.contacts import rebounds
 from rockcheck.engines.events import events_of
 from rockcheck.engines.steps import AdaptiveStep, FixedStep, at_output_times, in_units_of
 from rockcheck.engines.world import World
@@ -69,7 +69,8 @@ class Engine(Frozen):
         if not isinstance(given, dict):
             return given
         if isinstance(step := given.get("time_step"), FixedStep | AdaptiveStep):
-            given = {**given, **step.settings()}
+            fields = zip(step.knobs, astuple(step), strict=True)
+            given = {**given, "time_step": "adaptive", **dict(fields)}
         fixed = cls.fixed_because or given.get("settings") == "default"
         return {"time_step": STOCK_STEP, **given} if fixed else given
 
@@ -89,11 +90,9 @@ class Engine(Frozen):
     @model_validator(mode="after")
     def _possible(self) -> Self:
         stock = self.settings == "default"
-        if isinstance(self.steps, AdaptiveStep) and (stock or self.fixed_because):
-            why = ' with settings = "default"' if stock else f": {self.fixed_because}"
-            separator = ":" if stock else ";"
-            reason = f'"adaptive" is not allowed{why}{separator} give a step in s'
-            raise InputError(reason, "time_step")
+        if self.time_step == "adaptive" and (stock or self.fixed_because):
+            why = ' with settings = "default":' if stock else f": {self.fixed_because};"
+            raise InputError(f'"adaptive" is not allowed{why} give a step in s', "time_step")
         return self
 
     @property
@@ -162,18 +161,14 @@ class Engine(Frozen):
 
     def notes(self, scene: Scene) -> list[str]:
         """What this engine cannot do of the scene, a line each."""
-        notes = []
-        if scene.floor.mu_s != scene.floor.friction:
-            friction = f"kinetic {scene.floor.friction:g} is used for static {scene.floor.mu_s:g}"
-            notes.append(f"the engine has one friction coefficient: {friction}")
-        if "restitution" in self.lacks() and any(
-            contact.restitution > 0.0 for contact in contacts_of(scene)
-        ):
-            notes.append(
-                f"{self.name} has no coefficient of restitution with these settings; that of the"
-                " scene is not used"
-            )
-        return notes
+        kinetic, static = scene.floor.friction, scene.floor.mu_s
+        notes = {
+            "the engine has one friction coefficient:"
+            f" kinetic {kinetic:g} is used for static {static:g}": static != kinetic,
+            f"{self.name} has no coefficient of restitution with these settings; that of the"
+            " scene is not used": "restitution" in self.lacks() and rebounds(scene),
+        }
+        return [note for note, applies in notes.items() if applies]
 
     def simulate(self, scene: Scene) -> History:
         """The history of the scene as the engine plays it.
@@ -196,9 +191,8 @@ class Engine(Frozen):
         best = self.settings == "best"
         unit = scene.block.radius if best else 1.0  # of length, m
         played = in_units_of(unit, scene)
-        base = BaseMotion(played)
         with closing(self.rigid_world(played) if best else self.stock_world(played)) as world:
-            march = steps.ready(world, played, base)
+            march = steps.ready(world, played)
             begin, begin_cpu = time.perf_counter(), time.process_time()
             times, states, felt = march()
             cost = Cost(
@@ -212,7 +206,7 @@ class Engine(Frozen):
             scene,
             self.name,
             kinematics.of_box(scene.block, at_output_times(scene, times, states)),
-            events=events_of(scene, contacts_of(scene), times, states, unit * felt),
+            events=events_of(scene, times, states, unit * felt),
             cost=cost,
             settings=self.model_dump(),
             notes=self.notes(scene),

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.contacts import Contact, arm_of, gap_of, rate_of
+from rockcheck.engines.contacts import Contact, arm_of, contacts_of, gap_of, rate_of
 from rockcheck.engines.steps import LYING, FloatArray
 from rockcheck.scenes import Event, Scene, kinematics
 from rockcheck.scenes.observation import STATE, modes_of
@@ -25,9 +25,7 @@ SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
 
-def events_of(
-    scene: Scene, contacts: Sequence[Contact], t: FloatArray, states: FloatArray, felt: FloatArray
-) -> list[Event]:
+def events_of(scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray) -> list[Event]:
     """Events in order of time.
 
     `t` (n) and `states` (n, 6) are those of the mass's centre at step ends, `felt` (n-1 or more, 2)
@@ -38,14 +36,9 @@ def events_of(
     closed for more than 20 ms; "lift-off", "landing": of both; "release": a wall contact opens
     after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
-    motion = _Motion(scene, contacts, t, states, felt)
-    closed = [motion.closed(contact) for contact in contacts]
-    found = [
-        event
-        for contact, flags in zip(contacts, closed, strict=True)
-        for event in motion.at_contact(contact, flags)
-    ]
-    found += motion.at_floor(closed[0], closed[1])
+    motion = _Motion(scene, t, states, felt)
+    found = [event for contact in motion.contacts for event in motion.at_contact(contact)]
+    found += motion.at_floor()
     if abs(states[-1, 2]) >= LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
         side = "left" if states[-1, 2] > 0 else "right"
@@ -70,77 +63,59 @@ def events_of(
 class _Motion:
     """The states at all step ends, and what can be told from them."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        contacts: Sequence[Contact],
-        t: FloatArray,
-        states: FloatArray,
-        felt: FloatArray,
-    ) -> None:
-        self.scene, self.contacts, self.t, self.states, self.felt = scene, contacts, t, states, felt
-        self.near = (
-            CLOSED * scene.block.radius
-            + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
-        )
-        #: Whether each contact touches at each step end.
-        self.touching = {contact: self._touches(contact) for contact in contacts}
+    def __init__(self, scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
+        self.scene, self.t, self.states, self.felt = scene, t, states, felt
+        self.contacts = contacts_of(scene)
+        step = float(np.min(np.diff(t), initial=1e-3))
+        self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * step**2
+        x, y, theta, x_dot, y_dot, theta_dot = states.T
+        cos, sin = np.cos(theta), np.sin(theta)
+        #: Of each contact at step ends: its gap, m; whether it touches, or has struck in the step
+        #: before; whether it is closed, openings of less than 2 ms left out.
+        self.gap: dict[Contact, FloatArray] = {}
+        self.touching: dict[Contact, Flags] = {}
+        self.closed: dict[Contact, Flags] = {}
+        for contact in self.contacts:
+            arm = arm_of(*contact.corner, cos, sin)
+            gap = gap_of(*contact.normal, contact.distance, x, y, arm)
+            rate = rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
+            # An engine that looks ahead stops a block, or turns it round, up to two steps before it
+            # arrives.
+            arrives = gap[:-1] + 2.0 * np.diff(t) * rate[:-1] < self.near
+            struck = (rate[:-1] < -HOLD * scene.gravity) & (rate[1:] > 0.5 * rate[:-1])
+            touching = (gap < self.near) | np.concatenate([[False], arrives & struck])
+            self.gap[contact], self.touching[contact] = gap, touching
+            self.closed[contact] = _held(touching, t)
         #: The states of the box's centre.
         self.box = kinematics.of_box(scene.block, states)
-        self.slip_rate = kinematics.slip_rate(
-            scene.block, states[:, 2], self.box[:, 3], states[:, 5]
-        )
-
-    def gap(self, contact: Contact, rows: slice = slice(None)) -> FloatArray:
-        """Gaps of a contact at step ends, m."""
-        x, y, theta = self.states[rows, :3].T
-        arm = arm_of(*contact.corner, np.cos(theta), np.sin(theta))
-        return np.asarray(gap_of(*contact.normal, contact.distance, x, y, arm))
-
-    def _touches(self, contact: Contact) -> Flags:
-        """Whether the contact touches at each step end, or has struck in the step before it.
-
-        An engine that looks ahead stops a block, or turns it round, up to two steps before it
-        arrives.
-        """
-        gap, (x_dot, y_dot, theta_dot) = self.gap(contact), self.states[:, 3:].T
-        arm = arm_of(*contact.corner, np.cos(self.states[:, 2]), np.sin(self.states[:, 2]))
-        rate = rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
-        arrives = gap[:-1] + 2.0 * np.diff(self.t) * rate[:-1] < self.near
-        struck = (rate[:-1] < -HOLD * self.scene.gravity) & (rate[1:] > 0.5 * rate[:-1])
-        return (gap < self.near) | np.concatenate([[False], arrives & struck])
-
-    def closed(self, contact: Contact) -> Flags:
-        """Whether the contact is closed at each step end, openings of less than 2 ms left out."""
-        return _held(self.touching[contact], self.t)
+        self.slip_rate = kinematics.slip_rate(scene.block, theta, self.box[:, 3], theta_dot)
 
     def onset(self, contact: Contact, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
-        if index == 0:
-            return float(self.t[0])
-        before, after = self.gap(contact, slice(index - 1, index + 1))
+        before, after = self.gap[contact][index - 1 : index + 1]
         part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
 
-    def at_contact(self, contact: Contact, closed: Flags) -> list[Found]:
+    def at_contact(self, contact: Contact) -> list[Found]:
         """Impacts of a contact; of one with a wall, releases too."""
-        kind, t = "floor impact" if contact.surface == "floor" else "wall impact", self.t
-        impacts = [
-            (self.onset(contact, i), kind, i, self.impulse(contact, i)) for i in _rises(closed)
-        ]
+        kind = "floor impact" if contact.surface == "floor" else "wall impact"
+        t, closed = self.t, self.closed[contact]
+        strikes = _rises(closed)
+        impacts = [(self.onset(contact, i), kind, i, self.impulse(contact, i)) for i in strikes]
         if contact.surface == "floor":
             return impacts
         return impacts + [
             (t[end], "release", end, 0.0)
             for end in _falls(closed)
-            if t[end] - t[_run_start(closed, end)] > HOLD
+            if t[end] - t[max((i for i in strikes if i < end), default=0)] > HOLD
         ]
 
-    def at_floor(self, left: Flags, right: Flags) -> list[Found]:
+    def at_floor(self) -> list[Found]:
         """Uplift, flight, slip and rest, from which lower corners are closed."""
-        t, flat, flight = self.t, left & right, ~(left | right)
+        t, (left, right) = self.t, (self.closed[contact] for contact in self.contacts[:2])
+        flat, flight = left & right, ~(left | right)
         noise = GAP_NOISE * self.near
-        lowest, highest = np.sort([self.gap(contact) for contact in self.contacts[:2]], axis=0)
+        lowest, highest = np.sort([self.gap[contact] for contact in self.contacts[:2]], axis=0)
         speed = np.abs(self.slip_rate)
         slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
         still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
@@ -171,7 +146,7 @@ class _Motion:
         """
         from scipy.optimize import nnls
 
-        first, last = max(index - 1, 0), self.later(index)
+        first, last = index - 1, self.later(index)
         gained = self.states[last, 3:] - self.states[first, 3:]
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
         theta = self.states[index, 2]
@@ -226,12 +201,6 @@ def _start(values: FloatArray, index: int, noise: float) -> int:
     while index > 0 and values[index] > max(values[index - 1], noise):
         index -= 1
     return index
-
-
-def _run_start(flags: Flags, end: int) -> int:
-    """Where the run of set flags that ends before `end` began."""
-    unset = np.flatnonzero(~flags[:end])
-    return int(unset[-1]) + 1 if unset.size else 0
 
 
 def _held(flags: Flags, t: FloatArray, hold: float = HOLD, *, value: bool = False) -> Flags:

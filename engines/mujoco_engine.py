@@ -67,15 +67,13 @@ def model_of(scene: Scene, planes: str, geoms: str, settings: str = "", raised: 
     The body moves in the plane x, z; its origin is `raised` m above the floor's.
     """
     inertia = scene.block.gyration_squared
-    body = f"""
+    return f"""<mujoco><option gravity="0 0 0"/>{settings}<worldbody>{planes}
 <body pos="0 0 {raised!r}">
   <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>\
 <joint type="hinge" axis="0 -1 0"/>
   <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
   {geoms}
-</body>"""
-    world = f"<worldbody>{planes}{body}</worldbody>"
-    return f'<mujoco><option gravity="0 0 0"/>{settings}{world}</mujoco>'
+</body></worldbody></mujoco>"""
 
 
 def plane_of(surface: Surface, inset: float, attributes: str) -> str:

@@ -4,7 +4,7 @@ import math
 import warnings
 from typing import Any, ClassVar, Literal
 
-from rockcheck.engines.contacts import Surface, corners_of, surfaces_of
+from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
 from rockcheck.engines.world import State, World
 from rockcheck.scenes import Scene
@@ -49,26 +49,22 @@ class _PhysXWorld(World):
         self.body.set_linear_damping(0.0)
         self.body.set_angular_damping(0.0)
         self.body.set_disable_gravity(True)
-        for surface in surfaces_of(scene):
-            self._plane(surface)
+        for face in surfaces_of(scene):
+            rough, bounce = (self.shares[1] * one for one in (face.friction, face.restitution))
+            plane = physx.PhysxCollisionShapePlane(physx.PhysxMaterial(rough, rough, bounce))
+            (x, z), (nx, nz) = face.behind(self.inset), face.normal
+            half = -0.5 * math.atan2(nz, nx)  # a plane looks along its own x axis
+            turn = [math.cos(half), 0.0, math.sin(half), 0.0]
+            plane.set_local_pose(sapien.Pose([x, 0.0, z], turn))
+            fixed = physx.PhysxRigidStaticComponent()
+            fixed.attach(plane)
+            self._entity(fixed)
 
     def _entity(self, component: Any) -> Any:
         entity = self.sapien.Entity()
         entity.add_component(component)
         self.world.add_entity(entity)
         return entity
-
-    def _plane(self, face: Surface) -> None:
-        rough, bounce = (self.shares[1] * one for one in (face.friction, face.restitution))
-        material = self.physx.PhysxMaterial(rough, rough, bounce)
-        shape = self.physx.PhysxCollisionShapePlane(material)
-        (x, z), (nx, nz) = face.behind(self.inset), face.normal
-        half = -0.5 * math.atan2(nz, nx)  # a plane looks along its own x axis
-        turn = [math.cos(half), 0.0, math.sin(half), 0.0]
-        shape.set_local_pose(self.sapien.Pose([x, 0.0, z], turn))
-        plane = self.physx.PhysxRigidStaticComponent()
-        plane.attach(shape)
-        self._entity(plane)
 
     def shape(self, scene: Scene, material: Any) -> None:
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset

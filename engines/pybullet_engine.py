@@ -5,7 +5,7 @@ import os
 from functools import cache
 from typing import Any, ClassVar
 
-from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
+from rockcheck.engines.contacts import Surface, corners_of, rebounds, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
 from rockcheck.engines.world import FloatArray, State, Vector, World
 from rockcheck.scenes import Scene
@@ -121,7 +121,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self.bounces = any(contact.restitution > 0.0 for contact in contacts_of(scene))
+        self.bounces = rebounds(scene)
         # Where it would add to a bounce or make one, a penetration is left as it is.
         self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
         self.bouncing: bool | None = None

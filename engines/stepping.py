@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.base_motion import velocity_at
-from rockcheck.engines.contacts import acceleration_of, arm_of, gap_of, rate_of
-from rockcheck.scenes import Scene
+from rockcheck.engines.base_motion import BaseMotion, velocity_at
+from rockcheck.engines.contacts import arm_of, contacts_of, gap_of, rate_of
+from rockcheck.scenes import Scene, kinematics
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
@@ -48,35 +48,21 @@ OVER, GOES_ON, LOST = 0, 1, 2
 #: Columns of a row of the march: time, state (6), felt acceleration (2).
 COLUMNS = 9
 # The state: pose, velocity; mean acceleration and length of the step before, and whether they are
-# known; time, velocity of the base then.
-X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T, BASE_X, BASE_Y = range(14)
+# known; time, velocity of the base then; whether the step ends where slip stops, and the velocity
+# at which a contact is carried along its arc.
+X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T = range(12)
+BASE_X, BASE_Y, STOPS, CARRY_X, CARRY_Y = range(12, 17)
 # The request to the engine: mean pose, velocity, length of the step, felt acceleration, and whether
 # the step is an impact.
 POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
 
 
-class Limits(NamedTuple):
-    """Thresholds for near, short, long and slow in a scene, in R, s and R/s.
-
-    `gravity` is the scene's; `standing` is the height of the centre of mass at rest.
-    """
-
-    longest: float
-    closed: float
-    probe: float
-    shortest: float
-    long_approach: float
-    resting: float
-    staying: float
-    gravity: float
-    standing: float
-
-
 class Course(NamedTuple):
-    """The input of a run.
+    """The input of a run: what it meets, and how long and slow is long and slow; in R, s and R/s.
 
     Contacts, times at which the base may set a resting block in motion, the base motion to the
-    right and up, and the end of the run in s.
+    right and up, the end of the run, and gravity; thresholds for near, short, long and slow.
+    `standing` is the height of the centre of mass at rest.
     """
 
     corners: Floats
@@ -84,6 +70,14 @@ class Course(NamedTuple):
     across: Base
     up: Base
     end: float
+    gravity: float
+    standing: float
+    longest: float
+    closed: float
+    probe: float
+    shortest: float
+    long_approach: float
+    resting: float
 
 
 class March(NamedTuple):
@@ -96,48 +90,44 @@ class March(NamedTuple):
     state: Floats
     closed: NDArray[np.bool_]
     before: NDArray[np.bool_]
-    #: Whether the step ends where slip stops; the velocity at which a contact is carried along its
-    #: arc, right and up.
-    stops: NDArray[np.bool_]
-    carry: Floats
     asked: Floats
-    #: Index of the next time at which the base may set a resting block in motion.
-    next_start: NDArray[np.int64]
 
 
-def limits_of(scene: Scene, longest: float, short: float) -> Limits:
+def course_of(scene: Scene, longest: float, short: float) -> Course:
     """Steps of at most `longest` s, and near events `short` times the usual."""
+    base = BaseMotion(scene)
     moment = short / scene.frequency_parameter
-    probe = min(PROBE_STEP * moment, longest)
-    return Limits(
+    across, up = (
+        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
+        for one in (base.across, base.up)
+    )
+    return Course(
+        corners=np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
+        starts=np.array([*base.starts, math.inf]),
+        across=across,
+        up=up,
+        end=float(scene.output_times[-1]),
+        gravity=scene.gravity,
+        standing=scene.block.weaker_pivot.height,
         longest=longest,
         closed=max(CLOSED, DRIFT * longest * scene.frequency_parameter),
-        probe=probe,
+        probe=min(PROBE_STEP * moment, longest),
         shortest=min(SHORTEST_STEP * moment, longest),
         long_approach=LONG_APPROACH * moment,
         resting=RESTING * longest * scene.gravity,
-        staying=SETTLING_TIME * probe * scene.gravity,
-        gravity=scene.gravity,
-        standing=scene.block.weaker_pivot.height,
     )
 
 
-def begun(state: Floats, base: tuple[float, float], contacts: int) -> March:
-    """A run at its start, from the state of the mass's centre and the velocity of the base."""
-    whole = np.zeros(BASE_Y + 1)
-    whole[:6], whole[BASE_X : BASE_Y + 1] = state, base
-    closed, before, stops = (np.zeros(count, dtype=bool) for count in (contacts, contacts, 1))
-    return March(
-        whole, closed, before, stops, np.zeros(2), np.zeros(IMPACT + 1), np.zeros(1, dtype=np.int64)
-    )
+def begun(scene: Scene, contacts: int) -> March:
+    """A run at its start."""
+    state = np.zeros(CARRY_Y + 1)
+    closed, before = np.zeros((2, contacts), dtype=bool)
+    state[:6] = kinematics.of_mass(scene.block, scene.initial_state)
+    return March(state, closed, before, np.zeros(IMPACT + 1))
 
 
 _velocity_at, _rate_of = inner_kernel(velocity_at), inner_kernel(rate_of)
-_arm_of, _gap_of, _acceleration_of = (
-    inner_kernel(arm_of),
-    inner_kernel(gap_of),
-    inner_kernel(acceleration_of),
-)
+_arm_of, _gap_of = inner_kernel(arm_of), inner_kernel(gap_of)
 
 
 @inner_kernel
@@ -152,13 +142,16 @@ def seen(corner: Floats, z: Floats, cos: float, sin: float) -> tuple[Any, float,
 @inner_kernel
 def pulled(corner: Floats, z: Floats, arm: Any) -> float:
     """The acceleration of a contact's gap."""
-    return _acceleration_of(corner[2], corner[3], z[AX], z[AY], z[SPIN], z[W], arm)
+    turning = z[W] * z[W]
+    return corner[2] * (z[AX] - z[SPIN] * arm[1] - turning * arm[0]) + corner[3] * (
+        z[AY] + z[SPIN] * arm[0] - turning * arm[1]
+    )
 
 
 @inner_kernel
-def trusted(predicted: float, limits: Limits) -> float:
+def trusted(predicted: float, course: Course) -> float:
     """How much of the predicted time to an event one step may take, s."""
-    return 0.95 * predicted if predicted > limits.long_approach else predicted
+    return 0.95 * predicted if predicted > course.long_approach else predicted
 
 
 @inner_kernel
@@ -177,64 +170,66 @@ def time_to_close(corner: Floats, z: Floats, arm: Any, gap: float, rate: float) 
 
 
 @inner_kernel
-def stopping_time(z: Floats, arm: Any, dt: float, limits: Limits) -> float:
+def stopping_time(z: Floats, arm: Any, dt: float, course: Course) -> float:
     """When the slip of a corner on the floor stops within `dt`, s; infinity if never or unknown."""
     slip = z[VX] - z[W] * arm[1]
     slowing = z[AX] - z[SPIN] * arm[1] - z[W] * z[W] * arm[0]
     if (
         z[KNOWN] != 0.0
         and slip * slowing < 0.0
-        and 0.2 * limits.resting < abs(slip) < abs(slowing) * dt
+        and 0.2 * course.resting < abs(slip) < abs(slowing) * dt
     ):
         return abs(slip / slowing)
     return math.inf
 
 
 @inner_kernel
-def length(run: March, corners: Floats, limits: Limits, dt: float) -> tuple[float, bool]:
+def length(run: March, course: Course, dt: float) -> tuple[float, bool]:
     """The next step, at most `dt` s long, and whether it is an impact.
 
     It ends before a gap closes or a slip stops that the present acceleration brings.
     """
-    z, known, resting = run.state, run.state[KNOWN] != 0.0, limits.resting
-    dt = min(dt, limits.longest if known else limits.probe)
-    leaving = resting if known else max(resting, limits.staying)
+    z, known, resting = run.state, run.state[KNOWN] != 0.0, course.resting
+    corners = course.corners
+    dt = min(dt, course.longest if known else course.probe)
+    staying = SETTLING_TIME * course.probe * course.gravity
+    leaving = resting if known else max(resting, staying)
     stops, slowest = False, math.inf
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
         arm, gap, rate = seen(corners[i], z, cos, sin)
-        run.closed[i] = not (gap > limits.closed or rate > leaving)
+        run.closed[i] = not (gap > course.closed or rate > leaving)
         if not run.closed[i]:
             closing = time_to_close(corners[i], z, arm, gap, rate)
             if closing < dt:
-                dt, stops = max(trusted(closing, limits), limits.shortest), False
+                dt, stops = max(trusted(closing, course), course.shortest), False
         elif rate < -resting:
             slowest = min(slowest, -rate)
         elif i < FLOOR:
-            stopping = stopping_time(z, arm, dt, limits)
+            stopping = stopping_time(z, arm, dt, course)
             if stopping < math.inf:
-                dt = trusted(stopping, limits)
+                dt = trusted(stopping, course)
                 stops = dt == stopping
-    run.stops[0] = stops
+    z[STOPS] = stops
     if slowest == math.inf:
         return dt, False
-    join(run, corners, limits, slowest)
-    return limits.shortest, True
+    join(run, course, slowest)
+    return course.shortest, True
 
 
 @inner_kernel
-def join(run: March, corners: Floats, limits: Limits, speed: float) -> None:
+def join(run: March, course: Course, speed: float) -> None:
     """Lets corners share an impact that would strike at the same moment, not a hair later.
 
     The corner that strikes touches from `closed` away, at `speed`, so the impact is early by the
     time in which it would arrive. What comes down k times as fast is then still k times as far.
     """
-    z = run.state
+    z, corners = run.state, course.corners
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(len(corners)):
         _, gap, rate = seen(corners[i], z, cos, sin)
         run.closed[i] = run.closed[i] or (
-            rate < -speed and gap < limits.closed * min(-rate / speed, TOGETHER)
+            rate < -speed and gap < course.closed * min(-rate / speed, TOGETHER)
         )
 
 
@@ -243,9 +238,9 @@ def drift(run: March, corners: Floats, dt: float) -> None:
     """The mean pose of the step and the velocity that the engine sees, into `asked`.
 
     The engine sees the block in its mean pose, with the corners that touch just below the surface.
-    What rests on a surface at the step's end still moves along its arc in the mean pose; `carry` is
-    that velocity. The engine's contacts know nothing of arcs, but in a frame that moves with it
-    they are right.
+    What rests on a surface at the step's end still moves along its arc in the mean pose; the state
+    remembers that velocity. The engine's contacts know nothing of arcs, but in a frame that moves
+    with it they are right.
     """
     z, (ax, ay, spin) = run.state, smooth(run)[:3]
     half, sixth, later = 0.5 * dt, dt * dt / 6.0, z[W] + dt * spin
@@ -254,7 +249,7 @@ def drift(run: March, corners: Floats, dt: float) -> None:
         z[Y] + half * z[VY] + sixth * ay,
         z[THETA] + half * z[W] + sixth * spin,
     )
-    run.carry[:] = 0.0
+    z[CARRY_X] = z[CARRY_Y] = 0.0
     cos, sin = math.cos(mean), math.sin(mean)
     for first, end in ((0, FLOOR), (FLOOR, len(corners))):
         highest, last = -math.inf, -1
@@ -270,13 +265,13 @@ def drift(run: March, corners: Floats, dt: float) -> None:
             px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
             final = z[THETA] + half * (z[W] + later)
             arm, ends = _arm_of(bx, bz, cos, sin), _arm_of(bx, bz, math.cos(final), math.sin(final))
-            run.carry[0] = -later * (ends[1] - arm[1])
+            z[CARRY_X] = -later * (ends[1] - arm[1])
             if nz != 0.0:
-                run.carry[1] = later * (ends[0] - arm[0])
+                z[CARRY_Y] = later * (ends[0] - arm[0])
     run.asked[POSE], run.asked[POSE + 1], run.asked[POSE + 2] = px, py, mean
     run.asked[VELOCITY], run.asked[VELOCITY + 1], run.asked[VELOCITY + 2] = (
-        z[VX] + run.carry[0],
-        z[VY] + run.carry[1],
+        z[VX] + z[CARRY_X],
+        z[VY] + z[CARRY_Y],
         z[W],
     )
 
@@ -294,21 +289,20 @@ def smooth(run: March) -> tuple[float, float, float, bool]:
 
 
 @kernel
-def plan(run: March, course: Course, limits: Limits) -> int:
+def plan(run: March, course: Course) -> int:
     """Asks for the next step; returns OVER at the end or where the block lies, else GOES_ON."""
-    z, starts, left = run.state, course.starts, course.end - run.state[T]
+    z, starts = run.state, course.starts
     if not (z[T] < course.end - 1e-12 and abs(z[THETA]) < math.pi / 2):
         return OVER
-    while starts[run.next_start[0]] <= z[T] + 1e-9:
-        run.next_start[0] += 1
-    dt, impact = length(run, course.corners, limits, min(left, starts[run.next_start[0]] - z[T]))
+    start = starts[np.searchsorted(starts, z[T] + 1e-9, side="right")]
+    dt, impact = length(run, course, min(course.end - z[T], start - z[T]))
     z[T] += dt
     base_x = _velocity_at(z[T], *course.across)
     base_y = _velocity_at(z[T], *course.up)
     run.asked[DT], run.asked[IMPACT] = dt, impact
     run.asked[FELT_X], run.asked[FELT_Y] = (
         (z[BASE_X] - base_x) / dt,
-        (z[BASE_Y] - base_y) / dt - limits.gravity,
+        (z[BASE_Y] - base_y) / dt - course.gravity,
     )
     z[BASE_X], z[BASE_Y] = base_x, base_y
     drift(run, course.corners, dt)
@@ -316,18 +310,18 @@ def plan(run: March, course: Course, limits: Limits) -> int:
 
 
 @kernel
-def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floats) -> int:
+def step(run: March, course: Course, kicked: Velocity, row: Floats) -> int:
     """End the step with the engine's velocity `kicked`, write its `row` and plan the next step.
 
     Returns LOST where the motion has blown up.
     """
-    z, dt, corners = run.state, run.asked[DT], course.corners
+    z, dt = run.state, run.asked[DT]
     known = z[KNOWN] != 0.0
-    move(run, kicked[0] - run.carry[0], kicked[1] - run.carry[1], kicked[2], dt)
-    put_back(run, corners, limits)
-    if not known and (run.closed[0] or run.closed[1]) and settles(z, corners, limits):
-        z[Y], z[THETA], z[VY], z[W] = limits.standing, 0.0, 0.0, 0.0
-    z[KNOWN] = run.asked[IMPACT] == 0.0 and not run.stops[0]
+    move(run, kicked[0] - z[CARRY_X], kicked[1] - z[CARRY_Y], kicked[2], dt)
+    put_back(run, course)
+    if not known and (run.closed[0] or run.closed[1]) and settles(z, course):
+        z[Y], z[THETA], z[VY], z[W] = course.standing, 0.0, 0.0, 0.0
+    z[KNOWN] = run.asked[IMPACT] == 0.0 and z[STOPS] == 0.0
     z[PAST_DT] = dt
     run.before[:] = run.closed
     row[0], row[7], row[8] = z[T], run.asked[FELT_X], run.asked[FELT_Y]
@@ -335,7 +329,7 @@ def step(run: March, course: Course, limits: Limits, kicked: Velocity, row: Floa
         row[1 + i] = z[i]
     if not math.sqrt(z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W]) < 1e6:  # nan, too
         return LOST
-    return plan(run, course, limits)
+    return plan(run, course)
 
 
 @inner_kernel
@@ -357,9 +351,9 @@ def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
 
 
 @inner_kernel
-def put_back(run: March, corners: Floats, limits: Limits) -> None:
+def put_back(run: March, course: Course) -> None:
     """The pose with the one corner that stays on a surface put back onto it."""
-    z = run.state
+    z, corners = run.state, course.corners
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for first, end in ((0, FLOOR), (FLOOR, len(corners))):
         count, last = 0, -1
@@ -368,17 +362,17 @@ def put_back(run: March, corners: Floats, limits: Limits) -> None:
                 count, last = count + 1, i
         if count == 1:
             _, gap, rate = seen(corners[last], z, cos, sin)
-            if abs(rate) < limits.resting:
+            if abs(rate) < course.resting:
                 z[X], z[Y] = z[X] - corners[last, 2] * gap, z[Y] - corners[last, 3] * gap
 
 
 @inner_kernel
-def settles(z: Floats, corners: Floats, limits: Limits) -> bool:
+def settles(z: Floats, course: Course) -> bool:
     """Whether both lower corners are on the floor, or so near and slow that they return at once."""
     cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
     for i in range(FLOOR):
-        arm, gap, rate = seen(corners[i], z, cos, sin)
-        back = -SETTLING_TIME * limits.longest * pulled(corners[i], z, arm)
+        arm, gap, rate = seen(course.corners[i], z, cos, sin)
+        back = -SETTLING_TIME * course.longest * pulled(course.corners[i], z, arm)
         if gap > SETTLING_GAP or not abs(rate) <= max(SETTLING_GAP, back):
             return False
     return True

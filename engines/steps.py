@@ -13,12 +13,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from rockcheck.engines.base_motion import BaseMotion
-from rockcheck.engines.contacts import contacts_of
 from rockcheck.engines.world import FloatArray, Vector, World
 from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
@@ -118,41 +117,25 @@ Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
 
 
 def adaptive_march(
-    scene: Scene, base: BaseMotion, push: Push, longest: float, short: float = 1.0
+    scene: Scene, push: Push, longest: float, short: float = 1.0
 ) -> Callable[[], Marched]:
     """The march of a scene until |theta| = pi/2, to be called once; its compiled step is loaded.
 
-    The scene is one of a block with R = 1, see `in_units_of`; `base` is its base
-    motion. No step is longer than `longest` s; the steps at impacts and after events are `short`
-    times their usual length. The march raises `ModelFailure` if the motion blows up or needs more
-    than 100,000 + 20 end / `longest` steps, `end` the scene's last output time.
+    The scene is one of a block with R = 1, see `in_units_of`. No step is longer than `longest` s;
+    the steps at impacts and after events are `short` times their usual length. The march raises
+    `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end / `longest` steps,
+    `end` the scene's last output time.
     """
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of
 
-    limits = stepping.limits_of(scene, longest, short)
-    across, up = (
-        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
-        for one in (base.across, base.up)
-    )
-    course = stepping.Course(
-        np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
-        np.array([*base.starts, math.inf]),
-        across,
-        up,
-        float(scene.output_times[-1]),
-    )
+    course = stepping.course_of(scene, longest, short)
     most_steps = 100_000 + 20 * int(course.end / longest)
-
-    run = stepping.begun(
-        np.array(kinematics.of_mass(scene.block, scene.initial_state), dtype=float),
-        base.velocity(0.0),
-        len(course.corners),
-    )
+    run = stepping.begun(scene, len(course.corners))
     first = np.empty((_ROOM, stepping.COLUMNS))
     first[0, :7] = 0.0, *run.state[:6]
-    step = for_types_of(stepping.step, run, course, limits, (0.0, 0.0, 0.0), first[0])
-    planned = stepping.plan(run, course, limits)
+    step = for_types_of(stepping.step, run, course, (0.0, 0.0, 0.0), first[0])
+    planned = stepping.plan(run, course)
 
     def march() -> Marched:
         rows, count, going = first, 1, planned
@@ -161,7 +144,7 @@ def adaptive_march(
             kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
             if count == len(rows):
                 rows = np.concatenate([rows, np.empty_like(rows)])
-            going = step(run, course, limits, kicked, rows[count])
+            going = step(run, course, kicked, rows[count])
             count += 1
             if count % 512 == 0:
                 tell(rows[count - 1, 0], course.end)
@@ -180,19 +163,16 @@ class FixedStep:
     """Steps of `largest` s, each."""
 
     largest: float
-    #: The settings of an engine that say so; the first is its largest step.
+    #: The settings of an engine that hold its fields.
     knobs: ClassVar[tuple[str, ...]] = ("time_step",)
 
-    def settings(self) -> dict[str, Any]:
-        """The settings of an engine that steps so."""
-        return {"time_step": self.largest}
-
-    def ready(self, world: World, scene: Scene, base: BaseMotion) -> Callable[[], Marched]:
+    def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
         """The march of a world through a scene, which is still to be called."""
         count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
-        return partial(march_fixed, world, scene, times, base.felt_acceleration(times))
+        felt = BaseMotion(scene).felt_acceleration(times)
+        return partial(march_fixed, world, scene, times, felt)
 
 
 @dataclass(frozen=True)
@@ -206,11 +186,6 @@ class AdaptiveStep:
     short: float = 1.0
     knobs: ClassVar[tuple[str, ...]] = ("largest_step", "short_steps")
 
-    def settings(self) -> dict[str, Any]:
-        """The settings of an engine that steps so."""
-        knobs = zip(self.knobs, (self.largest, self.short), strict=True)
-        return {"time_step": "adaptive", **dict(knobs)}
-
-    def ready(self, world: World, scene: Scene, base: BaseMotion) -> Callable[[], Marched]:
+    def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
         """The march of a world through a scene, which is still to be called."""
-        return adaptive_march(scene, base, world.push, self.largest, self.short)
+        return adaptive_march(scene, world.push, self.largest, self.short)

@@ -33,14 +33,11 @@ def _batches(name: str) -> None:
 
 
 def _engine_steps() -> None:
-    from rockcheck.engines.base_motion import BaseMotion
     from rockcheck.engines.steps import adaptive_march, in_units_of
 
     scene = load_scene("fig5a").replace(duration=0.1)
     scene = in_units_of(scene.block.radius, scene)
-    adaptive_march(
-        scene, BaseMotion(scene), lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3
-    )
+    adaptive_march(scene, lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
 
 
 #: The parts that are compiled, the longest first. Batches share the loop of histories, so they come

@@ -1,64 +1,35 @@
 """What the tests of the event-based models share."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from types import SimpleNamespace
 
 import pytest
 from cases import ricker
 from stepping import play
 
 from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.core.state import workspace
 from rockcheck.scenes import Block, Floor, Scene, Wall
 
 
-@dataclass(frozen=True)
-class Run:
-    """One run to its end, with what a History does not hold. SI units."""
-
-    ending: int
-    t: float
-    x: float
-    theta: float
-    #: Largest |theta|/alpha, located between the rows of a history.
-    peak: float
-    wall_impacts: int
-    steps: int
-    energy_gains: int
-
-    @property
-    def outcome(self) -> str:
-        """As the reference tables name it."""
-        if self.ending == 0:
-            return "safe"
-        return (
-            ("ccw" if self.theta > 0.0 else "cw") if self.ending == 1 else f"failed ({self.ending})"
-        )
-
-
-Runner = Callable[..., Run]
-
-
 @pytest.fixture(scope="session")
-def run_to_end() -> Runner:
+def run_to_end() -> Callable[..., SimpleNamespace]:
     """Runs a scene to its end without sampling it; the compiled loop is called as the model calls
-    it."""
+    it. Tells its time and place (SI units), the largest |theta|/alpha, located between the rows of
+    a history, and the outcome, as the reference tables name it."""
     work = workspace()
 
-    def run(
-        scene: Scene, *, pivot: str = "bilateral", tolerance: float = 1e-12, impacts: str = "moreau"
-    ) -> Run:
-        model = EventBasedModel(pivot=pivot, tolerance=tolerance, impacts=impacts)
+    def run(scene: Scene, **settings: object) -> SimpleNamespace:
+        model = EventBasedModel(**{"tolerance": 1e-12} | settings)
         found = play(scene, model, work)
-        return Run(
-            ending=int(found.ending),
+        fallen = "ccw" if found.motion.theta > 0.0 else "cw"
+        return SimpleNamespace(
+            outcome={Ending.DONE: "safe", Ending.OVERTURNED: fallen}.get(found.ending, "failed"),
             t=found.t * natural.time_unit(scene),
             x=found.motion.x * scene.block.radius,
-            theta=found.motion.theta,
             peak=found.peak / scene.block.alpha,
             wall_impacts=int(found.wall_impacts),
-            steps=int(found.steps),
-            energy_gains=int(found.gains),
         )
 
     return run

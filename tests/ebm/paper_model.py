@@ -296,10 +296,8 @@ class PaperModel:
                     return self
                 self.events.append((t, "uplift"))
                 continue
-            if mode.name == "lean":
-                t, y, kind = self.lean_until(mode, t, y)
-            else:
-                t, y, kind = self.step(mode, t, y)
+            advance = self.lean_until if mode.name == "lean" else self.step
+            t, y, kind = advance(mode, t, y)
             if kind == "end":
                 return self
             if kind != "sense":
@@ -331,15 +329,7 @@ class PaperModel:
             return self.with_sense(Mode(mode.S, -sign(Q), mode.Sw), t, y), y
         if kind == "sense":
             return Mode(mode.S, mode.d, mode.Sw, -mode.sense), y
-        if mode.d:  # released while it slips down the wall
-            return self.with_sense(Mode(mode.S, mode.d), t, y), y
-        Q = self.motion(Mode(mode.S), t, y)[3]
-        P = self.motion(Mode(mode.S), t, y)[2]
-        return (
-            Mode(mode.S)
-            if abs(Q) <= self.mu_s * abs(P)
-            else self.with_sense(Mode(mode.S, -sign(Q)), t, y)
-        ), y
+        return self.tilted(t, y, closed=False), y  # released
 
     def on_pivot(self, y: State) -> State:
         """Slip that is only rounding is taken out."""

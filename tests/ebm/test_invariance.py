@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from stepping import assert_contacts_hold
+from stepping import EVEN, ODD, assert_contacts_hold, assert_mirror_images
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
     Block,
     Floor,
-    History,
     Record,
     Rest,
     Ricker,
@@ -22,8 +21,6 @@ from rockcheck.scenes import (
 )
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
-EVEN = ("t", "y", "y_dot", "mode")
 PIVOTS = ["bilateral", "unilateral"]
 SLOPE = 9.81 * math.tan(PAPER_BLOCK.alpha)
 RICKER = Ricker(amplitude=4.0 * SLOPE, period=0.65)
@@ -91,23 +88,11 @@ SCENES = {
 }
 
 
-def assert_mirror_images(a: History, b: History) -> None:
-    for name in EVEN:
-        np.testing.assert_array_equal(a.channels[name], b.channels[name], err_msg=name)
-    for name in ODD:
-        np.testing.assert_array_equal(a.channels[name], -b.channels[name], err_msg=name)
-    swap = {"overturned left": "overturned right", "overturned right": "overturned left"}
-    assert b.outcome == swap.get(a.outcome, a.outcome)
-    assert [
-        (e.t, swap.get(e.kind, e.kind), e.mode_before, e.mode_after, e.impulse)
-        for e in a.event_list
-    ] == [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in b.event_list]
-
-
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("pivot", PIVOTS)
-def test_mirror_image_to_the_bit(pivot, name):
-    model, scene = EventBasedModel(pivot=pivot), SCENES[name]
+@pytest.mark.parametrize("kind", [*PIVOTS, "bouc-wen"])
+def test_mirror_image_to_the_bit(kind, name):
+    settings = {"friction": kind} if kind == "bouc-wen" else {"pivot": kind}
+    model, scene = EventBasedModel(**settings), SCENES[name]
     assert_mirror_images(model.simulate(scene), model.simulate(scene.mirrored()))
     assert scene.mirrored().mirrored() == scene
 

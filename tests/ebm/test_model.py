@@ -143,9 +143,11 @@ def test_note_where_a_record_is_short():
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+@pytest.mark.parametrize(
+    "settings", [{}, {"pivot": "unilateral"}, {"friction": "bouc-wen"}], ids=str
+)
 @pytest.mark.parametrize(("tilt", "spin"), [(0.99, 0.3), (1.3, 0.0)])
-def test_overturning_ends_the_history(tilt, spin, pivot, side):
+def test_overturning_ends_the_history(tilt, spin, settings, side):
     """Also from past the balance point, at rest."""
     sign = 1.0 if side == "left" else -1.0
     scene = scene_of(
@@ -153,7 +155,7 @@ def test_overturning_ends_the_history(tilt, spin, pivot, side):
         initial_angular_velocity=sign * spin,
         duration=30.0,
     )
-    history = EventBasedModel(pivot=pivot).simulate(scene)
+    history = EventBasedModel(**settings).simulate(scene)
     assert history.outcome == f"overturned {side}"
     last = history.event_list[-1]
     assert last.kind == f"overturned {side}"

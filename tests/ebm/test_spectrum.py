@@ -55,10 +55,6 @@ def test_outcomes_agree_with_reference_runs(setting, rows):
         assert spectrum.outcomes[i, j] == SIDES[row["outcome"]], row
 
 
-def test_all_reference_runs_are_asked():
-    assert sum(len(rows) for _, rows in reference_runs()) == 390
-
-
 @pytest.mark.parametrize("walls", [(), (Wall(side="right", gap=0.103),)], ids=["free", "right"])
 def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
     frequencies, amplitudes = np.linspace(0.5, 8.0, 129), np.linspace(1.0, 12.0, 129)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from paper_model import PaperModel
 
 from rockcheck import engines
+from rockcheck.cm import ContinuousModel
 from rockcheck.scenes import Floor, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -26,7 +27,8 @@ MARKS = {"dart": pytest.mark.long} | dict.fromkeys(("drake", "physx", "jolt"), p
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """Every engine that is installed: as a class, as one of that precision, as one whose steps can
-    vary, or as a model in double precision with its steps; some take their time."""
+    vary, or as a model in double precision with its steps; some take their time. The continuous
+    model is one of the models."""
 
     def parameters(models: list[Any]) -> list:
         return [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
@@ -39,8 +41,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
         "single_engine": SINGLE,
         "varying_engine": VARYING,
         "bouncing_engine": BOUNCING,
-        "model": [*fixed, *adaptive],
-        "bouncing_model": [*bouncing, *adaptive],
+        "model": [*fixed, *adaptive, ContinuousModel()],
+        "bouncing_model": [*bouncing, *adaptive, ContinuousModel()],
     }.items():
         if name in metafunc.fixturenames:
             words = [

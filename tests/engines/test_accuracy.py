@@ -7,7 +7,6 @@ from cases import UNAMBIGUOUS, peak_errors
 from rockcheck import engines
 from rockcheck.ebm import EventBasedModel
 from rockcheck.engines import MuJoCo, PyBullet
-from rockcheck.engines.base_motion import BaseMotion
 from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
 
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
@@ -209,5 +208,5 @@ def test_drakes_plant_is_made_before_the_time_is_taken(settings, free_rocking):
     scene = free_rocking(0.5).replace(duration=0.1)
     model = engines.Drake(time_step=1e-2, settings=settings)
     world = (model.rigid_world if settings == "best" else model.stock_world)(scene)
-    model.steps.ready(world, scene, BaseMotion(scene))
+    model.steps.ready(world, scene)
     assert world.state()[2] == 0.0

@@ -4,18 +4,23 @@ import math
 
 import numpy as np
 import pytest
+from loaded import RACK
 from scipy.integrate import quad
 
 from rockcheck import engines
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
-from rockcheck.engines.base_motion import BaseVelocity
-from rockcheck.engines.contacts import contacts_of
+from rockcheck.engines.base_motion import velocity_at, velocity_of
 from rockcheck.engines.events import events_of
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 SQUAT = Block(half_width=1.0, half_height=0.5)
+
+
+def within(model, engines: float, continuous: float) -> float:
+    """A tolerance: that of the engines, or of the continuous model."""
+    return continuous if isinstance(model, ContinuousModel) else engines
 
 
 def test_rest_stays_at_rest(model, block):
@@ -44,7 +49,7 @@ def test_impact_obeys_housner(model, free_rocking):
     # The new pivot takes up all of the vertical momentum, and carries the block for the 2 ms that
     # are counted.
     upward = scene.block.radius * math.sin(alpha) * (1.0 + after / before) * speed
-    assert impact.impulse == pytest.approx(upward + 9.81 * 2e-3, rel=0.02)
+    assert impact.impulse == pytest.approx(upward + 9.81 * 2e-3, rel=within(model, 0.02, 0.008))
 
 
 def test_quarter_period(model, free_rocking):
@@ -61,7 +66,7 @@ def test_quarter_period(model, free_rocking):
         * scene.frequency_parameter
     )
     quarter = 0.5 * math.sqrt(tilt) * float(np.sum(weights * 2.0 * v / speed))
-    assert impact.t == pytest.approx(quarter, abs=2e-4)
+    assert impact.t == pytest.approx(quarter, abs=within(model, 2e-4, 1e-6))
 
 
 @pytest.mark.parametrize(("speed", "friction"), [(1.0, 0.2), (-1.5, 0.5)])
@@ -75,14 +80,16 @@ def test_sliding_distance(model, speed, friction):
     )
     history = model.simulate(scene)
     assert history.channels["x"][-1] == pytest.approx(
-        math.copysign(speed**2 / (2 * friction * 9.81), speed), rel=5e-4
+        math.copysign(speed**2 / (2 * friction * 9.81), speed), rel=within(model, 5e-4, 1e-5)
     )
     assert history.peak_rotation < 1e-5
+    assert history.outcome == "at rest"
+    if model.name == "cm":  # tells impacts alone
+        return
     stick = next(event for event in history.event_list if event.kind == "stick")
     assert stick.t == pytest.approx(
         abs(speed) / (friction * 9.81), abs=0.003
     )  # the event is told at 1 mm/s
-    assert history.outcome == "at rest"
     assert [event.kind for event in history.event_list] == ["stick", "settled"]
 
 
@@ -134,8 +141,9 @@ def test_flush_impact_on_a_wall(bouncing_model, side, restitution):
     assert history.peak_rotation < 1e-6
     impacts = [event for event in history.event_list if event.kind == "wall impact"]
     assert len(impacts) == 2  # both corners
-    assert impacts[0].t == pytest.approx(0.050737, abs=1e-4)
-    assert sum(event.impulse for event in impacts) == pytest.approx(1.0 + restitution, rel=2e-3)
+    times, impulse = [event.t for event in impacts], sum(event.impulse for event in impacts)
+    assert times == pytest.approx([0.050737] * 2, abs=within(bouncing_model, 1e-4, 1e-6))
+    assert impulse == pytest.approx(1.0 + restitution, rel=within(bouncing_model, 2e-3, 1e-3))
 
 
 def test_both_walls(bouncing_model):
@@ -170,7 +178,7 @@ def test_both_walls(bouncing_model):
 def test_the_base_gains_what_its_acceleration_gives(excitation):
     """The velocity of the base against an integral of its own, to rounding; it stays when the
     shaking has ended."""
-    velocity = BaseVelocity(excitation)
+    velocity = velocity_of(excitation)
     for share in (0.1, 0.37, 0.5, 0.81, 1.0, 1.3):
         t = share * excitation.quiet_after
         kinks = 0.2 * np.arange(1, 5) if excitation.kind == "record" else None
@@ -182,7 +190,7 @@ def test_the_base_gains_what_its_acceleration_gives(excitation):
             epsabs=1e-13,
             limit=500,
         )[0]
-        assert velocity(t) == pytest.approx(gained, abs=1e-10)
+        assert velocity_at(t, *velocity) == pytest.approx(gained, abs=1e-10)
 
 
 def test_base_motion_moves_the_floor_under_a_loose_block(model):
@@ -210,8 +218,8 @@ def test_vertical_acceleration_adds_to_gravity(model):
     assert np.max(np.abs(height - 0.5 * (15.0 - 9.81) * history.channels["t"] ** 2)) < 1e-4
 
 
-@pytest.mark.parametrize("amplitude", [6.0, -6.0])
-def test_overturning_ends_the_run(model, block, amplitude):
+@pytest.mark.parametrize(("amplitude", "side"), [(6.0, "left"), (-6.0, "right")])
+def test_overturning_ends_the_run(model, block, amplitude, side):
     scene = Scene(
         name="over",
         block=block,
@@ -220,12 +228,12 @@ def test_overturning_ends_the_run(model, block, amplitude):
         duration=20.0,
     )
     history = model.simulate(scene)
-    assert history.outcome.startswith("overturned")
-    assert history.event_list[-1].kind == history.outcome
-    assert history.event_list[-1].t < history.channels["t"][-1] + scene.output_step
+    assert history.event_list[-1].kind == history.outcome == f"overturned {side}"
+    last = history.channels["t"][-1]
+    assert last <= history.event_list[-1].t < last + scene.output_step + 1e-9
     assert np.max(np.abs(history.channels["theta"])) < math.pi / 2
     assert np.max(np.abs(history.channels["theta"])) > 0.9 * math.pi / 2
-    assert history.channels["t"][-1] < 19.0
+    assert last < 19.0
 
 
 def test_mirrored_scene_gives_mirrored_motion(model, block):
@@ -239,9 +247,8 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     )
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
-        assert np.max(np.abs(history.channels[channel] + mirrored.channels[channel])) < 2e-3, (
-            channel
-        )
+        apart = np.max(np.abs(history.channels[channel] + mirrored.channels[channel]))
+        assert apart < within(model, 2e-3, 1e-7), channel
     assert history.peak_rotation > 0.2 * block.alpha
     assert "wall impact" in [event.kind for event in history.event_list]
     assert [event.kind for event in history.event_list][:4] == [
@@ -299,13 +306,6 @@ def test_a_rocking_block_comes_to_rest_once(varying_engine, block):
     assert set(kinds) == {"floor impact", "settled"}
 
 
-RACK = Block(
-    half_width=0.3,
-    half_height=1.0,
-    mass=400.0,
-    centre_of_mass=(0.08, -0.25),
-    moment_of_inertia=110.0,
-)
 PULSE = Ricker(amplitude=6.5, period=0.8)
 SCENES = {
     "on its left pivot": {"initial_rotation": 0.1, "duration": 1.5},
@@ -378,7 +378,7 @@ def test_an_impact_before_the_block_arrives_is_an_impact(rebound):
     fallen = np.concatenate([[0.0], np.cumsum(1e-3 * states[1:, 4])])
     states[:, 1] = PAPER_BLOCK.half_height + fallen - fallen[turn] + 1e-3  # by half a step early
     felt = np.tile([0.0, -9.81], (399, 1))
-    found = events_of(scene, contacts_of(scene), t, states, felt)
+    found = events_of(scene, t, states, felt)
     impacts = [event for event in found if event.kind == "floor impact"]
     assert [event.t for event in impacts] == pytest.approx([0.2, 0.2], abs=2e-3)
     assert sum(event.impulse for event in impacts) == pytest.approx(
