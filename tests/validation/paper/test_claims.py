@@ -14,7 +14,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.paper import kept_spectra, paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
-from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
+from rockcheck.validation.studies.spectrum.tiles import nodes_of
 
 ROOT = Path(__file__).parents[3]
 
@@ -225,7 +225,7 @@ def test_impacts_before_the_fall_are_counted():
     (task,) = nodes_of(
         panel.scene, amplitudes, frequencies, "ebm", {"tolerance": TOLERANCE}, "one impact"
     )
-    one = np.array([letter == "Y" for letter in play(task).letters])
+    one = np.array([letter == "Y" for letter in task.play().letters])
     assert one[sides == 1].any()
     for amplitude in amplitudes[one & (sides == 1)]:
         history = EventBasedModel().simulate(node_scene(panel.scene, float(amplitude), 2.5))
