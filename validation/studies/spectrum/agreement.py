@@ -91,7 +91,12 @@ def agree(
     ]
     requests = {one.model: one for one in (request, *others)}
     shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
-    maps = list(_maps(book, list(spectra), requests))
+    coarse = {
+        model: replace(one, size=MAP_SIZE, refine=False)
+        for model, one in requests.items()
+        if model not in PLAYED_SHARE
+    }
+    maps = list(_maps(book, list(spectra), coarse))
     if book.wanted:
         return None
     fewer = [one.model for one in others if one.model in PLAYED_SHARE]
@@ -109,8 +114,8 @@ def agree(
         "versions": provenance.versions(),
         "settings": {model: dict(one.settings) for model, one in requests.items()},
         "shares": [share for some in shares for share in some],
-        "map_frequencies": _coarse(request).frequencies.tolist(),
-        "map_amplitudes": _coarse(request).amplitudes.tolist(),
+        "map_frequencies": coarse["ebm"].frequencies.tolist(),
+        "map_amplitudes": coarse["ebm"].amplitudes.tolist(),
         "maps": maps,
     }
 
@@ -151,10 +156,6 @@ def _shares(
             }
 
 
-def _coarse(request: Request) -> Request:
-    return replace(request, size=MAP_SIZE, refine=False)
-
-
 def mapped(panels: Sequence[Panel]) -> list[Panel]:
     """The panels of the figure of which every model draws a map."""
     figures = [panel.figure for panel in panels]
@@ -166,9 +167,7 @@ def _maps(
 ) -> Iterator[dict[str, Any]]:
     chosen = mapped(panels)
     drawn = {
-        model: [book.spectrum(panel, _coarse(one)) for panel in chosen]
-        for model, one in requests.items()
-        if model not in PLAYED_SHARE
+        model: [book.spectrum(panel, one) for panel in chosen] for model, one in requests.items()
     }
     if book.wanted:
         return
