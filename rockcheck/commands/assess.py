@@ -23,7 +23,8 @@ from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import UncertainScene, load_uncertain_scene
 from rockcheck.validation.criteria import sampled
-from rockcheck.validation.studies.population.assess import Assessment, gaps_of
+from rockcheck.validation.studies.population.answers import Assessment
+from rockcheck.validation.studies.population.runs import gaps_of
 from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida
 from rockcheck.validation.suite.motions import under_records
 
@@ -179,7 +180,7 @@ def population_of(tried: Tried, scene: Scene, cases: dict[str, UncertainScene]) 
     if not cases:
         if measure not in ("", "pga-ratio"):
             raise InputError(f"{measure} needs records; of pulses it is pga-ratio", "--levels")
-        return fragility(scene, [], values, FREQUENCIES, model=REFERENCE)
+        return fragility(scene, values, FREQUENCIES)
     return ida(
         scene,
         [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],

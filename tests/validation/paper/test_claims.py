@@ -14,7 +14,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.paper import kept_spectra, paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
-from rockcheck.validation.studies.spectrum.tiles import nodes_of, play
+from rockcheck.validation.studies.spectrum.tiles import nodes_of
 
 ROOT = Path(__file__).parents[3]
 
@@ -216,7 +216,7 @@ def test_impacts_before_the_fall_are_counted():
     nodes = panel.scene, amplitudes, np.full(23, 2.5)
     sides, _ = play_nodes(*nodes, model=MODEL)
     (task,) = nodes_of(*nodes, "ebm", {"tolerance": TOLERANCE}, "one impact")
-    after_one = np.array([letter == "Y" for letter in play(task).letters]) & (sides == 1)
+    after_one = np.array([letter == "Y" for letter in task.play().letters]) & (sides == 1)
     assert after_one.any()
     for amplitude in amplitudes[after_one]:
         history = EventBasedModel().simulate(node_scene(panel.scene, float(amplitude), 2.5))

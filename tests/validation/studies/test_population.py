@@ -1,6 +1,7 @@
 """Populations: what is scaled and played, what is said of a block that overturns, curves and
 fits."""
 
+import itertools
 import math
 
 import numpy as np
@@ -21,10 +22,12 @@ from rockcheck.scenes import (
     Wall,
     load_scene,
 )
+from rockcheck.scenes.files import UncertainScene
 from rockcheck.scenes.recordings import Recording
 from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.finding import Finding
+from rockcheck.validation.studies.population.answers import Assessment
 from rockcheck.validation.studies.population.study import (
-    CAPACITIES,
     MEASURES,
     PULSES,
     fragility,
@@ -57,9 +60,9 @@ MOTIONS = [("H1", motion(1.0)), ("H2", motion(2.5, 5.0)), ("H3", motion(0.3, 2.0
 
 
 def played(study):
-    """What a study's tasks gave, and its finding."""
-    done = {task: study.play(task) for task in study.tasks({})}
-    return done, study.gather(done)
+    """What the tasks gave, and the finding."""
+    done = {task: task.play() for task in study.batches}
+    return done, Finding("", "", *study.gather(done))
 
 
 @pytest.fixture(scope="module")
@@ -74,13 +77,12 @@ def lines():
 def records(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rack.toml").write_text(TOML, encoding="utf-8")
-    (tmp_path / "records").mkdir()
-    (tmp_path / "empty").mkdir()
+    for name in ("records", "empty"):
+        (tmp_path / name).mkdir()
     for name, one in MOTIONS:
         rows = "\n".join(f"{0.02 * k:.2f},{a!r}" for k, a in enumerate(one.samples.tolist()))
-        path = tmp_path / "records" / f"{name}.csv"
-        path.write_text(f"time_s,acceleration_m_s2\n{rows}\n", encoding="utf-8")
-    return tmp_path / "records"
+        text = f"time_s,acceleration_m_s2\n{rows}\n"
+        (tmp_path / "records" / f"{name}.csv").write_text(text, encoding="utf-8")
 
 
 # Lines
@@ -88,20 +90,17 @@ def records(tmp_path, monkeypatch):
 
 def test_a_run_is_the_record_at_that_intensity(lines):
     peaks, found = lines
-    rows, model = iter(found.table("ida").rows), EventBasedModel(pivot="unilateral", tolerance=1e-8)
-    for (name, one), both in zip(MOTIONS, peaks, strict=True):
-        record = Record.from_samples(one.samples, one.time_step)
-        for sign, line in zip((1, -1), both, strict=True):
-            for level, peak in zip(LEVELS, line, strict=True):
-                scaled = record.scaled(sign * level * 9.80665 / np.max(np.abs(one.samples)))
-                history = model.simulate(SCENE.replace(excitation=scaled, output_step=0.002))
-                fell = history.outcome.startswith("overturned")
-                own = math.inf if fell else history.peak_rotation / SCENE.block.alpha
-                assert peak == pytest.approx(own, abs=2e-4)
-                shown = math.nan if fell else peak
-                assert next(rows) == pytest.approx(
-                    [name, sign, level, shown, int(fell)], nan_ok=True
-                )
+    rows, model = found.table("ida").rows, EventBasedModel(pivot="unilateral", tolerance=1e-8)
+    runs = itertools.product(MOTIONS, (1, -1), LEVELS)
+    for ((name, one), sign, level), peak, row in zip(runs, peaks.ravel(), rows, strict=True):
+        factor = sign * level * 9.80665 / np.max(np.abs(one.samples))
+        scaled = Record.from_samples(one.samples, one.time_step).scaled(factor)
+        history = model.simulate(SCENE.replace(excitation=scaled, output_step=0.002))
+        fell = history.outcome.startswith("overturned")
+        own = math.inf if fell else history.peak_rotation / SCENE.block.alpha
+        assert peak == pytest.approx(own, abs=2e-4)
+        shown = math.nan if fell else peak
+        assert row == pytest.approx([name, sign, level, shown, int(fell)], nan_ok=True)
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
 
 
@@ -116,20 +115,17 @@ def test_a_share_of_the_motions_stays_below_its_quantile(lines):
 def test_a_capacity_is_exceeded_not_met(lines):
     """Of a limit that is a motion's own peak, that motion stays within it."""
     peaks, found = lines
-    fits = found.table("fits").records()
-    assert [one["case"] for one in fits] == [
+    assert [one["case"] for one in found.table("fits").records()] == [
         "peak above 0.1 α",
         "peak above 0.5 α",
         "peak above α, or overturned",
     ]
-    assert found.data["capacities"] == list(CAPACITIES)
-    shares = [row[2] for row in found.table("fragility").rows]
-    assert shares[-6:] == np.mean(peaks > 1.0, axis=(0, 1)).tolist()
     limit = float(np.max(peaks[np.isfinite(peaks)]))
-    _, again = played(ida(SCENE, MOTIONS, LEVELS, capacities=[limit]))
-    assert [row[2] for row in again.table("fragility").rows] == np.mean(
-        peaks > limit, axis=(0, 1)
-    ).tolist()
+    study = ida(SCENE, MOTIONS, LEVELS, capacities=[limit])
+    assert study.data["capacities"] == [limit]
+    for most, one in ((1.0, found), (limit, played(study)[1])):
+        shares = [row[2] for row in one.table("fragility").rows]
+        assert shares[-6:] == np.mean(peaks > most, axis=(0, 1)).tolist()
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
@@ -150,14 +146,16 @@ def test_measures_have_the_units_of_engineers():
     assert measure_of("sa:0.5")[:2] == ("Sa(0.5 s), 5 %", "g")
 
 
-def test_what_failed_says_nothing_and_ends_the_command_so(monkeypatch):
+def test_what_failed_says_nothing_and_ends_the_command_so():
     study = ida(SCENE, MOTIONS, LEVELS, capacities=[1.0])
     done, whole = played(study)
-    last = list(done)[-1]
-    part = study.gather({**done, last: Failure("did not end")})
-    assert (whole.exit_code, part.exit_code) == (0, 3)
+    done[list(done)[-1]] = Failure("did not end")
+    own = UncertainScene(SCENE, {}, np.eye(0))
+    part = Assessment(own=own, cases={"rack": own}, levels=study).gather(done)
+    assert part.exit_code == 3
     assert {row[0] for row in part.table("ida").rows} == {"H1", "H2"}
-    assert study.gather({}).table("motions").rows
+    assert {row[0] for row in whole.table("ida").rows} == {"H1", "H2", "H3"}
+    assert Finding("", "", *study.gather({})).table("motions").rows
 
 
 # Playing
@@ -185,16 +183,15 @@ def test_another_model_plays_until_the_outcome_is_certain():
 
 
 def test_a_task_depends_on_all_that_its_runs_do():
-    key = ida(SCENE, MOTIONS, LEVELS).tasks({})[0].key
+    key = ida(SCENE, MOTIONS, LEVELS).batches[0].key
     others = [
         ida(SCENE, MOTIONS, 2.0 * LEVELS),
         ida(SCENE.replace(gravity=9.8), MOTIONS, LEVELS),
-        ida(SCENE, MOTIONS, LEVELS, model="ebm"),
         ida(SCENE, MOTIONS[1:], LEVELS),
         ida(SCENE, MOTIONS, LEVELS, measure="pgv"),
     ]
-    assert key not in {study.tasks({})[0].key for study in others}
-    assert ida(SCENE, MOTIONS, LEVELS, capacities=[0.3]).tasks({})[0].key == key
+    assert key not in {study.batches[0].key for study in others}
+    assert ida(SCENE, MOTIONS, LEVELS, capacities=[0.3]).batches[0].key == key
 
 
 # Fragility
@@ -203,7 +200,7 @@ def test_a_task_depends_on_all_that_its_runs_do():
 def test_both_cases_and_directions_are_played():
     """Reversed, a symmetric block without a wall does the mirror image."""
     scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
-    study = fragility(scene, (), np.linspace(1.0, 6.0, 4), (1.0, 3.0), model="ebm-unilateral")
+    study = fragility(scene, np.linspace(1.0, 6.0, 4), (1.0, 3.0))
     done, found = played(study)
     assert [batch.of[0] for batch in done] == ["with the wall"] * PULSES + [
         "without a wall"
@@ -216,21 +213,9 @@ def test_both_cases_and_directions_are_played():
     shares = [row[2] for row in found.table("fragility").rows]
     assert shares[4:] == pytest.approx(np.mean(sides != 0, axis=(0, 1)))
     assert shares[:4] != shares[4:]
-
-
-def test_records_are_scaled_to_the_intensity():
-    """Two records that differ only in their size: both directions of each overturn together."""
-    scene = SCENE.replace(walls=())
-    study = fragility(
-        scene, [("a", motion(1.0)), ("b", motion(4.0))], np.linspace(0.5, 12.0, 8), (1.0, 2.0)
-    )
-    done, found = played(study)
-    one, other = done.values()
-    assert one.side == other.side
-    assert {row[2] for row in found.table("fragility").rows} == {0.0, 1.0}
-    assert found.data["pga_g"] == pytest.approx(0.3 * 9.81 / 9.80665)
-    (fit,) = found.table("fits").records()
-    assert fit["median_g"] == pytest.approx(found.data["pga_g"] * fit["median"])
+    assert study.data["pga_g"] == pytest.approx(0.3 * 9.81 / 9.80665)
+    for fit in found.table("fits").records():
+        assert fit["median_g"] == pytest.approx(study.data["pga_g"] * fit["median"])
 
 
 def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
@@ -238,17 +223,15 @@ def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
     centre."""
     block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
     scene = load_scene("loaded").replace(block=block)
-    study = fragility(scene, (), LEVELS, (1.0, 2.0))
+    study = fragility(scene, LEVELS, (1.0, 2.0))
     assert study.data["pga_g"] == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
 
 
 def test_a_set_that_is_none_is_refused():
-    for motions, said in (
-        ((), "is no pulse"),
-        ([("still", motion(0.0))] * 2, "still: a record with"),
-    ):
-        with pytest.raises(InputError, match=said):
-            fragility(SCENE, motions, LEVELS, (1.0, 2.0))
+    with pytest.raises(InputError, match="is no pulse"):
+        fragility(SCENE, LEVELS, (1.0, 2.0))
+    with pytest.raises(InputError, match="still: a record with"):
+        ida(SCENE, [("still", motion(0.0))] * 2, LEVELS)
 
 
 # Curves
@@ -257,9 +240,8 @@ def test_a_set_that_is_none_is_refused():
 def test_the_lognormal_curve_is_found_again():
     intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
     counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
-    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
-        (2.5, 0.4), rel=1e-3
-    )
+    found = fit_lognormal(intensities, counts, np.full(60, motions))
+    assert found == pytest.approx((2.5, 0.4), rel=1e-3)
     for none in (np.zeros(60, dtype=np.int64), np.full(60, 10)):
         assert np.isnan(fit_lognormal(intensities, none, np.full(60, 10))).all()
 
@@ -278,11 +260,9 @@ def test_a_fitted_median_lies_inside_its_interval():
     is none."""
     hit = np.array([[[True] * 6] * 2, [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
     never = np.zeros_like(hit)
-    curve = curve_of("made", hit, never, LEVELS, 200)
-    chance, medians = np.random.default_rng(8), []
-    for _ in range(400):
-        drawn = hit[chance.integers(3, size=3)]
-        medians.append(fit_lognormal(LEVELS, drawn.sum(axis=(0, 1)), np.full(6, 6))[0])
+    curve, chance = curve_of("made", hit, never, LEVELS, 200), np.random.default_rng(8)
+    draws = [hit[chance.integers(3, size=3)].sum(axis=(0, 1)) for _ in range(400)]
+    medians = [fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
     between = np.nanquantile(medians, [0.025, 0.975]).tolist()
     assert [curve.low, curve.high] == pytest.approx(between, rel=0.2)
     assert curve.low < curve.median < curve.high
@@ -306,12 +286,8 @@ def test_the_band_covers_as_often_as_it_says():
     Counts are whole numbers: nearer to 0 and 1 Wilson's interval may hold only 83 % (Brown, Cai and
     DasGupta 2001).
     """
-    chance, intensities, median, dispersion = (
-        np.random.default_rng(3),
-        np.geomspace(0.7, 3.3, 8),
-        1.5,
-        0.4,
-    )
+    chance, intensities = np.random.default_rng(3), np.geomspace(0.7, 3.3, 8)
+    median, dispersion = 1.5, 0.4
     truth = norm.cdf(np.log(intensities / median) / dispersion)
     for motions, shared in ((10, 0.0), (20, 0.3), (50, 0.4)):
         inside = np.zeros(len(intensities))
@@ -331,24 +307,21 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
     hit = np.zeros_like(failed)
     hit[:, :, 2] = hit[:2, :, 1] = True
     plain = curve_of("made", hit, failed, intensities)
-    failed[2:, :, 1] = True  # all that did not overturn at 2: now nothing is known to be safe there
-    failed[0, 0, 2] = True
+    # all that did not overturn at 2: now nothing is known to be safe there
+    failed[2:, :, 1] = failed[0, 0, 2] = True
     curve = curve_of("made", hit, failed, intensities)
     assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
     assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
-    assert curve.points[1][2:4] == pytest.approx(
-        [2 / (2 + 3.8415), 1.0], rel=1e-4
-    )  # of both motions
+    # Wilson's band of both motions
+    assert curve.points[1][2:4] == pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4)
     assert curve.undecided == 5
     assert curve.median < plain.median
     failed[:, :, 1] = True
     nowhere = curve_of("made", hit, failed, intensities)
-    assert [point[1] for point in nowhere.points] == pytest.approx(
-        [0.0, math.nan, 1.0], nan_ok=True
-    )
+    shares = [point[1] for point in nowhere.points]
+    assert shares == pytest.approx([0.0, math.nan, 1.0], nan_ok=True)
     assert nowhere.median > 0.0
-    failed[:] = True
-    assert math.isnan(curve_of("made", hit, failed, intensities).median)
+    assert math.isnan(curve_of("made", hit, np.ones_like(failed), intensities).median)
 
 
 # The command
@@ -401,5 +374,4 @@ def test_the_command_writes_curves_tables_and_page(records, tmp_path, told):
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, told):
     assert main(["new", "pulse.toml", "-q"]) == 0
     fits = told("assess", "pulse.toml", "--levels", "1:6:6")["tables"]["fits"]
-    assert len(fits) == 2
-    assert all(1.0 < fit["median"] < 6.0 for fit in fits)
+    assert [1.0 < fit["median"] < 6.0 for fit in fits] == [True, True]

@@ -3,21 +3,20 @@
 import io
 import itertools
 import math
+import operator
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from operator import itemgetter
+from statistics import median_low
 from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.experience import WIDTH, outside, trust_of
-from rockcheck.scenes.files import UncertainScene
 from rockcheck.scenes.writing import finite
 from rockcheck.validation.criteria import CRITERIA, Criterion
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -27,32 +26,27 @@ from rockcheck.validation.finding import (
     Panel,
     Plot,
     Series,
-    Style,
     Table,
     Text,
     text,
 )
 from rockcheck.validation.studies.population.runs import (
+    LAW,
     MOST_ROWS,
-    Numbers,
+    Asked,
     Played,
     Ran,
-    Side,
     Sure,
 )
-from rockcheck.validation.studies.population.study import Population
 from rockcheck.validation.uncertainty.numerical import Numerical
 from rockcheck.validation.uncertainty.population import Inputs, share_of
 
-#: The model of runs that are drawn or have another gap.
-SWIFT = "ebm-unilateral"
-_SEED = 1
-#: Name of the runs by the other law of impacts, among the models.
-LAW = "impact law"
 #: Name of the error of a step or tolerance, among the sources of uncertainty.
 STEPS = "numerical error"
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
+#: Units as readers know them, where these are other words.
+UNITS = {"alpha": "α"}
 #: Of a probability; and what identifies a hand method.
 INTERVAL = ("probability", "low", "high")
 METHOD = ("name", "formula", "event", "source", "holds")
@@ -83,62 +77,13 @@ ASKS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
-    """What an assessment is asked for.
-
-    `cases` are the scene under each of its motions, by their names. `own` is the
-    scene with its own excitation. The first of `models` plays each case; the others are compared
-    with it; `settings` are theirs, by model. `gaps` (m) are those of the walls on `sides`.
-    `samples` numbers are drawn for each case and gap, or, without records, for the single run.
-    `levels` is the population over intensities.
-    """
-
-    own: UncertainScene
-    cases: Mapping[str, UncertainScene]
-    models: Sequence[str] = (SWIFT,)
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    gaps: Sequence[float] = ()
-    sides: Sequence[Side] = ()
-    samples: int = 0
-    recorded: bool = False
-    levels: Population | None = None
-    left_out: Sequence[str] = ()
-
-    @property
-    def model(self) -> str:
-        """The model that plays each case."""
-        return self.models[0]
-
-    @property
-    def swift(self) -> str:
-        """The event-based model that plays draws and gaps."""
-        return self.model if isinstance(build(self.model, {}), EventBasedModel) else SWIFT
-
-    @cached_property
-    def draws(self) -> tuple[Numbers, ...]:
-        """The numbers of each draw, the same for every case.
-
-        Empty without records: the numbers are then drawn about the single run.
-        """
-        first = next(iter(self.cases.values()))
-        if not (self.samples and self.recorded):
-            return ()
-        from scipy.stats import qmc
-
-        chance = np.random.default_rng(_SEED)
-        points = qmc.Sobol(len(first.spreads), seed=chance).random(self.samples)
-        for row in (values := first.values(points)):
-            first.at(row)  # names a draw that is no scene
-        return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())
-
-
-@dataclass(frozen=True, kw_only=True)
 class Found:
     """The runs of an assessment, by the case: the scene under each of its motions.
 
     `drawn` has the draws of each case with all of them; `at_gaps` the runs at each gap
     (m) and `free` those without the wall that have a motion; `others` the runs by other models;
-    `sure` how sure a run is, "" the scene's own.
+    `sure` how sure a run is, "" the scene's own; `levels` the answer and blocks over intensities;
+    `failed` whether any task did.
     """
 
     study: Asked
@@ -148,7 +93,8 @@ class Found:
     free: Sequence[Ran]
     others: Mapping[str, Mapping[str, Ran]]
     sure: Mapping[str, Sure]
-    levels: Finding | None
+    levels: tuple[str, Sequence[Block]]
+    failed: bool
 
     @cached_property
     def runs(self) -> dict[str, list[Ran]]:
@@ -161,21 +107,23 @@ class Found:
         """All runs that count, with their case."""
         return [(case, run) for case, runs in self.runs.items() for run in runs]
 
-    @cached_property
-    def nominal(self) -> dict[str, Ran]:
-        """By case, the run as it is, where it has a motion."""
-        return {case: one.runs[0] for case, one in self.shown.items() if not one.runs[0].reason}
-
     @property
     def failures(self) -> dict[str, str]:
         """Why a run as it is failed, by case, and by the other model."""
         runs = {case: one.runs[0] for case, one in self.shown.items()}
-        runs |= {
-            f"{case}, {model}": run
-            for model, others in self.others.items()
-            for case, run in others.items()
-        }
+        for model, others in self.others.items():
+            runs |= {f"{case}, {model}": run for case, run in others.items()}
         return {where: run.reason for where, run in runs.items() if run.reason}
+
+    @property
+    def own(self) -> Sure:
+        """How sure the scene under its own motion is."""
+        return self.sure.get("", Sure())
+
+    @cached_property
+    def nominal(self) -> dict[str, Ran]:
+        """By case, the run as it is, where it has a motion."""
+        return {case: one.runs[0] for case, one in self.shown.items() if not one.runs[0].reason}
 
     @cached_property
     def judged(self) -> dict[str, Numerical]:
@@ -213,18 +161,18 @@ class Found:
 
 def finding_of(found: Found) -> Finding:
     """All answers, and what `--json` says."""
-    study, own, scene = found.study, found.sure.get(""), found.study.own.scene
-    levels = found.levels or Finding("", "", "")
+    study, own, scene = found.study, found.own, found.study.own.scene
+    at_levels, levels = found.levels
     overturning, gaps = overturning_of(found.runs), gaps_of(found)
     contributions, criteria = contributions_of(found), criteria_of(found)
     quantities = quantities_of(found)
-    numerical = numerical_of(study, own)
+    numerical = numerical_of(found)
     answers = {
         "Does it fall?": [_fall(found, overturning)],
         "How far does it move?": _move(quantities),
         "Which gap is safe?": _safe_gap(gaps),
-        "At which intensity does it fall?": [levels.answer],
-        "How sure is that?": [*_sure(found, own), *_change(found, contributions)],
+        "At which intensity does it fall?": [at_levels],
+        "How sure is that?": [*_sure(found, numerical), *_change(found, contributions)],
         "What do hand methods say?": _by_hand(criteria),
     }
     blocks: list[Block] = [
@@ -238,11 +186,11 @@ def finding_of(found: Found) -> Finding:
         _criteria(criteria),
         *_strips(found),
         *_gaps(gaps["gaps"]),
-        *levels.blocks,
+        *levels,
         _contributions(contributions, found),
         *_models(found),
         *_certainty(own, numerical),
-        *(_inputs(own.inputs) if own and own.inputs else ()),
+        *(_inputs(own.inputs) if own.inputs else ()),
         Table(
             "methods",
             [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
@@ -256,9 +204,9 @@ def finding_of(found: Found) -> Finding:
         *_notes(found),
     ]
     data = {
-        **levels.data,
         "scene": scene.name,
         "model": study.model,
+        **(study.levels.data if study.levels else {}),
         "runs": len(found.each),
         "outcomes": {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES},
         "overturning": overturning,
@@ -271,17 +219,16 @@ def finding_of(found: Found) -> Finding:
         "left_out": list(study.left_out),
     }
     if not study.recorded:
-        data |= numerical | {"inputs": own.inputs.model_dump() if own and own.inputs else None}
-    failures = found.failures
-    unsure = own is not None and not (study.recorded or numerical["converged"] or found.levels)
+        data |= numerical | {"inputs": own.inputs.model_dump() if own.inputs else None}
+    unsure = "" in found.sure and not (study.recorded or numerical["converged"] or study.levels)
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
         " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
-        exit_code=3 if failures or levels.exit_code else int(unsure),
-        failures=failures,
+        exit_code=3 if found.failed or found.failures else int(unsure),
+        failures=found.failures,
         files={file_of(case): one.history for case, one in found.shown.items() if one.history},
     )
 
@@ -302,7 +249,7 @@ def quantities_of(found: Found) -> dict[str, dict[str, Any]]:
         q.name: {
             "unit": q.unit,
             **spread([value for value, _ in found.moved[q.name]]),
-            "record": max(found.moved[q.name], key=itemgetter(0), default=(0.0, None))[1],
+            "record": max(found.moved[q.name], key=operator.itemgetter(0), default=(0.0, None))[1],
             "of": len(found.moved[q.name]),
         }
         for q in QUANTITIES
@@ -317,7 +264,19 @@ def gaps_of(found: Found) -> dict[str, Any]:
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
     whether a wider gap never lets fewer runs overturn.
     """
-    rows = [_at_gap(gap, runs) for gap, runs in found.at_gaps.items() if runs]
+    rows: list[dict[str, Any]] = []
+    for gap, runs in found.at_gaps.items():
+        speeds = [v for run in runs if (v := getattr(run.motion, "wall_speed", None)) is not None]
+        speed = spread(speeds)
+        rows.append(
+            {
+                "gap": gap,
+                "runs": len(runs),
+                "overturned": sum(run.fell for run in runs),
+                "struck": len(speeds),
+                "wall_speed": {key: speed[key] for key in ("median", "largest")},
+            }
+        )
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
     reaches = (run.reach[side] for run in found.free for side in found.study.sides)
     fallen = [row["overturned"] for row in rows]
@@ -330,19 +289,6 @@ def gaps_of(found: Found) -> dict[str, Any]:
     }
 
 
-def _at_gap(gap: float, runs: Sequence[Ran]) -> dict[str, Any]:
-    motions = [run.motion for run in runs if run.motion]
-    speeds = [one.wall_speed for one in motions if one.wall_speed is not None]
-    speed = spread(speeds)
-    return {
-        "gap": gap,
-        "runs": len(runs),
-        "overturned": sum(run.fell for run in runs),
-        "struck": len(speeds),
-        "wall_speed": {key: speed[key] for key in ("median", "largest")},
-    }
-
-
 def contributions_of(found: Found) -> list[dict[str, Any]]:
     """Shares of the variance of the peak rotation by source, the largest first.
 
@@ -351,9 +297,13 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
     forms = dict(found.apart)
     laws = forms.pop(LAW, ())
     peaks = [[run.peak for run in runs] for runs in found.runs.values() if runs]
+    own = found.own.inputs.figures[:1] if found.own.inputs else ()
     squares: dict[str, list[float]] = {
         "records": [float(np.var(list(map(np.mean, peaks)), ddof=1))] if len(peaks) > 1 else [],
-        "inputs": _by_inputs(found, peaks),
+        "inputs": [
+            *(float(np.var(some)) for some in peaks if found.drawn),
+            *(((peak.high - peak.low) / (2.0 * WIDTH)) ** 2 for peak in own),
+        ],
         STEPS: _by_steps(found),
         LAW: [(0.5 * difference) ** 2 for difference in laws],
         "model form": np.square(list(itertools.chain(*forms.values()))).tolist(),
@@ -364,15 +314,6 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
         {"source": name, "share": value / total, "sd": math.sqrt(value), "unit": "alpha"}
         for name, value in sorted(variance.items(), key=lambda one: -one[1])
     ]
-
-
-def _by_inputs(found: Found, peaks: Sequence[Sequence[float]]) -> list[float]:
-    """Variances of the peak by the draws of each case, or by those of the single run."""
-    if found.drawn:
-        return [float(np.var(some)) for some in peaks]
-    own = found.sure.get("")
-    drawn = own.inputs.figures[:1] if own and own.inputs else []
-    return [((peak.high - peak.low) / (2.0 * WIDTH)) ** 2 for peak in drawn]
 
 
 def _by_steps(found: Found) -> list[float]:
@@ -386,21 +327,17 @@ def _by_steps(found: Found) -> list[float]:
     return [(error / WIDTH) ** 2 for error in errors if error is not None]
 
 
-def numerical_of(study: Asked, own: Sure | None) -> dict[str, Any]:
+def numerical_of(found: Found) -> dict[str, Any]:
     """The numerical uncertainty of each figure of the scene under its own motion.
 
     From the time on from which the motion depends on the law of impacts, no step is fine enough to
     make a figure sure.
     """
-    numerical, parts = (own.numerical, own.depends_on_law_from_s) if own else (None, None)
-    inputs = own.inputs if own else None
+    numerical, parts, inputs = (value for _, value in found.own)
     converged = numerical is not None and numerical.converged and parts is None
-    said = "a model without step or tolerance; its numerical error is not known"
-    if numerical is not None:
-        said = f"{'converged' if converged else 'not converged'}, by {numerical.method}"
     return {
-        "scene": study.own.scene.name,
-        "model": study.model,
+        "scene": found.study.own.scene.name,
+        "model": found.study.model,
         "converged": converged,
         "depends_on_law_from_s": parts,
         "method": numerical.method if numerical else "",
@@ -408,7 +345,9 @@ def numerical_of(study: Asked, own: Sure | None) -> dict[str, Any]:
             {**q.model_dump(), "u_input": inputs.u_input(q.name) if inputs else None}
             for q in (numerical.quantities if numerical else ())
         ],
-        "said": said,
+        "said": f"{'converged' if converged else 'not converged'}, by {numerical.method}"
+        if numerical
+        else "a model without step or tolerance; its numerical error is not known",
     }
 
 
@@ -421,33 +360,25 @@ EVENTS = {
 
 
 def criteria_of(found: Found) -> list[dict[str, Any]]:
-    """Predictions of hand methods for the cases, and how often they agree with the simulation."""
+    """What hand methods said of the cases against what the simulation did."""
     cases = [(run, said) for case, run in found.nominal.items() if (said := found.shown[case].said)]
     return [
-        _judged(criterion, [run for run, _ in cases], [said[k] for _, said in cases])
-        for k, criterion in enumerate(CRITERIA)
+        _judged(one, [(*said[k], getattr(run, EVENTS[one.event][0])) for run, said in cases])
+        for k, one in enumerate(CRITERIA)
     ]
 
 
-def _judged(
-    criterion: Criterion, runs: Sequence[Ran], said: Sequence[tuple[bool, float | None]]
-) -> dict[str, Any]:
-    """What a hand method said of some runs against what they did."""
-    figure, unit, least = EVENTS[criterion.event]
-    moved = [getattr(run, figure) for run in runs]
-    happens = [far > least for far in moved]
-    pairs = [
-        (estimate, far)
-        for (_, estimate), far in zip(said, moved, strict=True)
-        if estimate is not None
-    ]
+def _judged(criterion: Criterion, runs: Sequence[tuple[bool, float | None, float]]) -> Any:
+    """A hand method against some runs: what it says, its estimate, and how far the run went."""
+    _, unit, least = EVENTS[criterion.event]
+    pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
     unsafe = sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
     return {
         **{key: getattr(criterion, key) for key in METHOD},
-        "predicts": sum(says for says, _ in said),
+        "predicts": sum(says for says, *_ in runs),
         "of": len(runs),
-        "simulated": sum(happens),
-        "agrees": sum(says == does for (says, _), does in zip(said, happens, strict=True)),
+        "simulated": sum(far > least for *_, far in runs),
+        "agrees": sum(says == (far > least) for says, _, far in runs),
         "estimate": _median([estimate for estimate, _ in pairs]),
         "motion": _median([far for _, far in pairs]),
         "unit": unit,
@@ -457,7 +388,7 @@ def _judged(
 
 def _median(values: Sequence[float]) -> float | None:
     """The lower median; None where there is none, or it is infinite."""
-    middle = sorted(values)[(len(values) - 1) // 2] if values else math.inf
+    middle = median_low(values) if values else math.inf
     return middle if math.isfinite(middle) else None
 
 
@@ -483,25 +414,20 @@ def _fall(found: Found, overturning: Mapping[str, Any]) -> str:
 
 def _move(quantities: Mapping[str, Any]) -> list[str]:
     told = [
-        f"{q.label} {largest:.3g} {_unit(q.unit)}"
+        f"{q.label} {largest:.3g} {UNITS.get(q.unit, q.unit)}"
         for q in QUANTITIES
         if (largest := quantities[q.name]["largest"]) is not None
     ]
     return [f"Where it stands, at most: {', '.join(told)}."] if told else []
 
 
-def _unit(unit: str) -> str:
-    return "α" if unit == "alpha" else unit
-
-
 def _safe_gap(gaps: Mapping[str, Any]) -> list[str]:
     said, safe = [], gaps["none_overturns_up_to"]
     if gaps["gaps"]:
-        first = gaps["gaps"][0]["gap"]
         said.append(
             f"None overturns up to a gap of {safe:g} m."
             if safe is not None
-            else f"Some overturn already at the smallest gap, {first:g} m."
+            else f"Some overturn already at the smallest gap, {gaps['gaps'][0]['gap']:g} m."
         )
     if not gaps["monotonic"]:
         said.append("A larger gap is not always worse: see each.")
@@ -520,7 +446,7 @@ def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"Hand methods let it overturn: {', '.join(said)}."] if said else []
 
 
-def _sure(found: Found, own: Sure | None) -> list[str]:
+def _sure(found: Found, numerical: Mapping[str, Any]) -> list[str]:
     if found.study.recorded:
         judged = [one.converged for one in found.judged.values()]
         laws = sum(
@@ -528,9 +454,9 @@ def _sure(found: Found, own: Sure | None) -> list[str]:
         )
         said = [f"{sum(judged)} of {len(judged)} runs are numerically converged."]
         return said + ([f"The law of impacts matters in {laws}."] if laws else [])
-    if own is None or own.numerical is None:
+    if found.own.numerical is None:
         return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
-    converged = own.numerical.converged and own.depends_on_law_from_s is None
+    converged = numerical["converged"]
     return ["Numerically converged." if converged else "Not converged: no figure of it is sure."]
 
 
@@ -539,29 +465,24 @@ def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[st
     unsure = found.judged and STEPS not in [row["source"] for row in contributions]
     if unsure or not contributions or contributions[0]["sd"] <= MOVED:
         return []
-    own, shares = found.sure.get(""), input_shares(found)
-    most = max(shares, key=lambda name: shares[name], default="the uncertain numbers")
-    if own and own.inputs and own.inputs.sensitivities:
-        most = own.inputs.sensitivities[0].name
+    inputs = found.own.inputs
+    most = inputs.sensitivities[0].name if inputs and inputs.sensitivities else _leading(found)
     *_, changes = CONTRIBUTIONS[contributions[0]["source"]]
     said = changes.format(most)
     return [f"{said[0].upper()}{said[1:]} would change the answer most."]
 
 
-def input_shares(found: Found) -> dict[str, float]:
-    """Squared correlation of the peak with each number that was drawn, within the cases."""
+def _leading(found: Found) -> str:
+    """The number that was drawn with which the peak correlates most, within the cases."""
     whole = [runs for runs in found.drawn.values() if not any(run.reason for run in runs)]
     if not whole:
-        return {}
+        return "the uncertain numbers"
     peaks = np.array([[run.peak for run in runs] for runs in whole])
     peaks -= peaks.mean(axis=1, keepdims=True)
-    shares = {}
-    for draw in zip(*found.study.draws, strict=True):
-        x = np.array([value for _, value in draw])
-        x -= x.mean()
-        norm = float(np.sum(peaks**2) * np.sum(x**2) * len(whole))
-        shares[draw[0][0]] = float(np.sum(peaks @ x)) ** 2 / norm if norm > 0.0 else 0.0
-    return shares
+    numbers = np.array([[value for _, value in draw] for draw in found.study.draws])
+    numbers -= numbers.mean(axis=0)
+    covariances = np.abs(peaks.sum(axis=0) @ numbers)
+    return found.study.draws[0][np.argmax(covariances / np.linalg.norm(numbers, axis=0))][0]
 
 
 # The blocks.
@@ -600,23 +521,28 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         text("record", "its record", brief=several),
         Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
-    shown = {q.label: quantities[q.name] | {"unit": _unit(q.unit)} for q in QUANTITIES}
+    shown = {q.label: quantities[q.name] | {"unit": UNITS.get(q.unit, q.unit)} for q in QUANTITIES}
     rows = [[label, *(one[c.name] for c in columns[1:])] for label, one in shown.items()]
-    meant = "; ".join(f"{q.label}: {q.help}" for q in QUANTITIES)
-    return Table("quantities", columns, rows, note=f"{meant}.")
+    meant = (f"{q.label}: {q.help}" for q in QUANTITIES)
+    return Table("quantities", columns, rows, note=f"{'; '.join(meant)}.")
 
 
 def _strips(found: Found) -> list[Block]:
     strips = [
         {
-            "label": f"{q.label}, {_unit(q.unit)}",
+            "label": f"{q.label}, {UNITS.get(q.unit, q.unit)}",
             "values": [value for value, _ in found.moved[q.name]],
         }
         for q in QUANTITIES
         if len(found.moved[q.name]) > 1
     ]
-    note = "A point a run that stands; the bar goes from 16 to 84 %, its line is the median."
-    plot = Plot("motion", "How far each run moves", kind="strips", data=strips, note=note)
+    plot = Plot(
+        "motion",
+        "How far each run moves",
+        kind="strips",
+        data=strips,
+        note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
+    )
     return [plot] if strips else []
 
 
@@ -671,7 +597,6 @@ def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> 
         for name, (_, asks, _) in CONTRIBUTIONS.items()
         if name not in known_of
     ]
-    said = f" Not known: {', '.join(missing)}." if missing else ""
     return Table(
         "contributions",
         [
@@ -682,7 +607,8 @@ def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> 
         ],
         [[name, row["share"], row["sd"], CONTRIBUTIONS[name][0]] for name, row in known_of.items()],
         "How sure",
-        note=f"Of the variance of the peak rotation; a block that falls counts as 1 α.{said}",
+        note="Of the variance of the peak rotation; a block that falls counts as 1 α."
+        + (f" Not known: {', '.join(missing)}." if missing else ""),
     )
 
 
@@ -737,7 +663,7 @@ def _criteria(criteria: Sequence[Mapping[str, Any]]) -> Table:
         {
             **row,
             "motion": None if row["unsafe"] is None else row["motion"],
-            "unit": "" if row["unsafe"] is None else _unit(row["unit"]),
+            "unit": "" if row["unsafe"] is None else UNITS.get(row["unit"], row["unit"]),
             "predicts": f"{row['predicts']} of {row['of']}",
             "unsafe": Mark(row["unsafe"], "changed" if row["unsafe"] else ""),
         }
@@ -760,7 +686,7 @@ def _runs(found: Found) -> Table:
         [
             text("record" if found.study.recorded else "scene"),
             text("outcome"),
-            *(Column(q.name, q.label, _unit(q.unit)) for q in QUANTITIES),
+            *(Column(q.name, q.label, UNITS.get(q.unit, q.unit)) for q in QUANTITIES),
         ],
         [
             [
@@ -777,8 +703,8 @@ def _runs(found: Found) -> Table:
     )
 
 
-def _certainty(own: Sure | None, numerical: Mapping[str, Any]) -> Iterator[Block]:
-    if own and own.numerical:
+def _certainty(own: Sure, numerical: Mapping[str, Any]) -> Iterator[Block]:
+    if own.numerical:
         columns = [
             text("name", "quantity"),
             *(Column(name, name, digits=4) for name in ("value", "u_num", "order")),
@@ -795,13 +721,14 @@ def _certainty(own: Sure | None, numerical: Mapping[str, Any]) -> Iterator[Block
         )
         yield Text(items=own.numerical.reasons)
     if (parts := numerical["depends_on_law_from_s"]) is not None:
-        law = f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)"
-        yield Text(law, verdict="changed")
+        yield Text(
+            f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)",
+            verdict="changed",
+        )
 
 
 def _inputs(inputs: Inputs) -> list[Block]:
     """Tables of the figures with their input intervals, and of the sensitivities of the peak."""
-    about = f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model}"
     shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
     return [
         Table(
@@ -816,7 +743,8 @@ def _inputs(inputs: Inputs) -> list[Block]:
                 for one in (*inputs.figures, inputs.overturns)
             ],
             "Uncertain inputs",
-            note=f"{about}; 95 % of them between low and high.",
+            note=f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model};"
+            " 95 % of them between low and high.",
         ),
         Table(
             "sensitivities",
@@ -842,7 +770,6 @@ def _histories(found: Found) -> list[Block]:
     if not rows:
         return []
     times = np.linspace(0.0, max(one["t"][-1] for one in rows.values()), POINTS)
-    style: Style = "thin" if len(rows) > 1 else "smooth"
     lines = np.array(
         [
             np.interp(
@@ -855,7 +782,7 @@ def _histories(found: Found) -> list[Block]:
         ]
     )
     series = [
-        Series(case, times.tolist(), line, style=style)
+        Series(case, times.tolist(), line, style="thin" if len(rows) > 1 else "smooth")
         for case, line in zip(rows, finite(lines.tolist()), strict=True)
     ]
     low, high = float(np.nanmin(lines)), float(np.nanmax(lines))
@@ -898,3 +825,47 @@ def _notes(found: Found) -> list[Block]:
     if names and not drawn and study.recorded:
         said.append(f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them")
     return [Text(items=said, title="Notes", on="page")] if said else []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Assessment(Asked):
+    """An assessment of a scene."""
+
+    def gather(self, done: Mapping[Any, Any]) -> Finding:
+        """The answers to the engineer's questions."""
+        ended = {task: one for task, one in done.items() if not isinstance(one, Failure)}
+        first = {part: _first(tasks, ended) for part, tasks in self.parts.items()}
+        drawn = {case: _runs_of(tasks, ended) for case, tasks in self.parts["drawn"].items()}
+        count = len(self.draws)
+        at_gaps = {
+            gap: [
+                run for tasks in cases.values() for run in _runs_of(tasks, ended) if not run.reason
+            ]
+            for gap, cases in self.at_gaps.items()
+        }
+        return finding_of(
+            Found(
+                study=self,
+                shown=first["shown"],
+                drawn={case: some for case, some in drawn.items() if len(some) == count > 0},
+                free=at_gaps.pop(math.inf, []),
+                at_gaps={gap: some for gap, some in at_gaps.items() if some},
+                others={
+                    model: {case: one.runs[0] for case, one in first[model].items()}
+                    for model in (*self.models[1:], LAW)
+                    if first.get(model)
+                },
+                sure=first["sure"],
+                levels=self.levels.gather(ended) if self.levels else ("", ()),
+                failed=len(ended) < len(done),
+            )
+        )
+
+
+def _first(tasks: Mapping[str, Sequence[Any]], ended: Mapping[Any, Any]) -> dict[str, Any]:
+    """The record of the first of each list of tasks that has ended."""
+    return {key: ended[some[0]] for key, some in tasks.items() if some and some[0] in ended}
+
+
+def _runs_of(tasks: Sequence[Any], ended: Mapping[Any, Any]) -> list[Ran]:
+    return [run for task in tasks if task in ended for run in ended[task].runs]

@@ -1,33 +1,44 @@
-"""Runs of an assessment: what one is, what it gives, and how it is played."""
+"""Runs of an assessment: what one is, what it gives, and which runs are made."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
 from pydantic import Field
 
-from rockcheck.scenes import History, ModelFailure, Scene
+from rockcheck.ebm import EventBasedModel
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
 from rockcheck.scenes.files import UncertainScene, with_numbers
 from rockcheck.scenes.writing import columns_text
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.impact_laws import parting_landing
 from rockcheck.validation.discrepancy.motion import Motion, largest_reach, largest_slip, motion_of
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build, compiles, family
-from rockcheck.validation.study import Task
+from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.studies.population.study import (
+    A_RUN,
+    SOON,
+    SWIFT,
+    OneScene,
+    Population,
+    effort,
+)
+from rockcheck.validation.study import Study, Task
 from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
-from rockcheck.validation.uncertainty.population import Inputs, Runs, play, propagate
+from rockcheck.validation.uncertainty.population import Inputs, Runs, propagate
 
 Side = Literal["left", "right"]
 Numbers = tuple[tuple[str, float], ...]
 #: Rows of a history that is kept, at the most.
 MOST_ROWS = 2000
-#: Usual time of a run, s, of compiled models and of others; total time up to which separate
-#: processes are not worth while.
-A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
+#: Runs of one task, at the most.
+MOST_RUNS = 256
+_SEED = 1
+#: Name of the runs by the other law of impacts, among the models; and the law that is compared.
+LAW, OTHER_LAW = "impact law", {"impacts": "floor-first"}
 
 
 class Ran(Stored):
@@ -79,59 +90,9 @@ class Sure(Stored):
     `inputs` is the effect of its uncertain numbers.
     """
 
-    numerical: Numerical | None
-    depends_on_law_from_s: float | None
-    inputs: Inputs | None
-
-
-@dataclass(frozen=True)
-class OneScene(Task):
-    """Runs of one scene by one model; `of` names them."""
-
-    of: tuple[str, ...]
-    scene: Scene = field(repr=False)
-    model: str
-    settings: tuple[tuple[str, Any], ...] = ()
-
-    @property
-    def label(self) -> str:
-        """Which runs."""
-        return ", ".join(filter(None, self.of))
-
-    def depends(self) -> Any:
-        """The scene with its motion, the model, what else is asked for, and the code."""
-        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
-        asked = [one for one in self.fields() if one not in OneScene.__dataclass_fields__]
-        return cell, [getattr(self, one) for one in asked], provenance.code_digest(__name__)
-
-
-def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
-    """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
-    a_run = A_RUN if family(model).compiled else A_SLOW_RUN
-    return {"expected": runs * a_run, "compiles": compiles(model, settings)}
-
-
-@dataclass(frozen=True)
-class Batch(OneScene):
-    """Runs of a population that are played together: a scene at factors of its base motion.
-
-    `both`: the vertical motion is scaled too, and not mirrored.
-    """
-
-    factors: tuple[float, ...] = field(default=(), repr=False)
-    both: bool = False
-
-    def play(self) -> Runs:
-        """The runs."""
-        across, upward = self.scene.excitation, self.scene.vertical
-        scenes = [
-            self.scene.replace(
-                excitation=across.scaled(factor),
-                vertical=upward.scaled(abs(factor)) if self.both else upward,
-            )
-            for factor in self.factors
-        ]
-        return play(scenes, build(self.model, dict(self.settings)))
+    numerical: Numerical | None = None
+    depends_on_law_from_s: float | None = None
+    inputs: Inputs | None = None
 
 
 @dataclass(frozen=True)
@@ -183,14 +144,14 @@ def _ran(scene: Scene, model: Any) -> tuple[Ran, History | None]:
 
 @dataclass(frozen=True)
 class Certainty(OneScene):
-    """How sure a run is; `samples` (0: none) draws of its uncertain numbers."""
+    """How sure a run is; with `samples` draws of the uncertain numbers of `given`, if any."""
 
     samples: int = 0
     given: UncertainScene | None = field(default=None, repr=False, compare=False)
 
     def depends(self) -> Any:
-        """Also what is not known of the scene."""
-        if self.given is None or not self.samples:
+        """Also what is not known of the scene, where it is drawn."""
+        if self.given is None:
             return super().depends()
         spreads = {name: spread.model_dump() for name, spread in self.given.spreads.items()}
         return super().depends(), spreads, self.given.correlation.tolist()
@@ -201,7 +162,173 @@ class Certainty(OneScene):
         return Sure(
             numerical=numerical_uncertainty(build(self.model, dict(self.settings)), self.scene),
             depends_on_law_from_s=None if landing is None else landing.t,
-            inputs=propagate(self.given, samples=self.samples).inputs
-            if self.given and self.samples
-            else None,
+            inputs=propagate(self.given, samples=self.samples).inputs if self.given else None,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked(Study):
+    """What an assessment is asked for, and its tasks.
+
+    `cases` are the scene under each of its motions, by their names. `own` is the
+    scene with its own excitation. The first of `models` plays each case; the others are compared
+    with it; `settings` are theirs, by model. `gaps` (m) are those of the walls on `sides`.
+    `samples` numbers are drawn for each case and gap, or, without records, for the single run.
+    `levels` is the population over intensities.
+    """
+
+    own: UncertainScene
+    cases: Mapping[str, UncertainScene]
+    models: Sequence[str] = (SWIFT,)
+    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    gaps: Sequence[float] = ()
+    sides: Sequence[Side] = ()
+    samples: int = 0
+    recorded: bool = False
+    levels: Population | None = None
+    left_out: Sequence[str] = ()
+    record = Runs | Played | Sure
+    name = "assess"
+
+    @property
+    def model(self) -> str:
+        """The model that plays each case."""
+        return self.models[0]
+
+    @property
+    def swift(self) -> str:
+        """The event-based model that plays draws and gaps."""
+        return self.model if isinstance(build(self.model, {}), EventBasedModel) else SWIFT
+
+    @cached_property
+    def draws(self) -> tuple[Numbers, ...]:
+        """The numbers of each draw, the same for every case.
+
+        Empty without records: the numbers are then drawn about the single run.
+        """
+        first = next(iter(self.cases.values()))
+        if not (self.samples and self.recorded):
+            return ()
+        from scipy.stats import qmc
+
+        chance = np.random.default_rng(_SEED)
+        points = qmc.Sobol(len(first.spreads), seed=chance).random(self.samples)
+        for row in (values := first.values(points)):
+            first.at(row)  # names a draw that is no scene
+        return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())
+
+    def _runs(
+        self,
+        what: str,
+        model: str,
+        variants: Sequence[Numbers] = ((),),
+        settings: Mapping[str, Any] | None = None,
+    ) -> dict[str, list[Task]]:
+        """By case, runs as tasks of at most `MOST_RUNS`; those of the case as it is are `shown`."""
+        given = self.settings.get(model, {}) if settings is None else settings
+        parts = [
+            tuple(variants[first : first + MOST_RUNS])
+            for first in range(0, len(variants), MOST_RUNS)
+        ]
+        return {
+            case: [
+                Run(
+                    (what, case, "" if model == self.model else model),
+                    one.scene,
+                    model,
+                    tuple(given.items()),
+                    part,
+                    shown=not what and model == self.model,
+                    where=self._where,
+                    **effort(model, given, len(part)),
+                )
+                for part in parts
+            ]
+            for case, one in self.cases.items()
+        }
+
+    @cached_property
+    def _where(self) -> Literal["worker", "here"]:
+        """In this process where all of it takes less than a worker needs to start."""
+        runs = len(self.cases) * (6 + len(self.draws)) * (1 + len(self.gaps))
+        fast = all(family(model).compiled for model in self.models)
+        return "here" if fast and runs * A_RUN < SOON else "worker"
+
+    @cached_property
+    def at_gaps(self) -> dict[float, dict[str, list[Task]]]:
+        """The runs at each gap, without the walls at an infinite one."""
+        found = {}
+        for gap in (*self.gaps, np.inf) if self.sides else ():
+            walls = {f"walls.{side}.gap": gap for side in self.sides}
+            variants = [tuple({**dict(one), **walls}.items()) for one in self.draws or ((),)]
+            what = "without the wall" if gap == np.inf else f"gap {gap:g} m"
+            found[gap] = self._runs(what, self.swift, variants)
+        return found
+
+    @cached_property
+    def parts(self) -> dict[Any, dict[str, list[Task]]]:
+        """Tasks by what they are for and by case.
+
+        "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
+        among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
+        """
+        others = {model: self._runs("", model) for model in self.models[1:]}
+        if self.model == SWIFT and self.own.scene.walls:
+            others[LAW] = self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)
+        settings = self.settings.get(self.model, {})
+        own = {"": self.own, **(self.cases if self.recorded else {})}
+        drawn = bool(self.samples) and not self.recorded
+        sure: dict[str, list[Task]] = {
+            case: [
+                Certainty(
+                    ("certainty", case or given.scene.name),
+                    given.scene,
+                    self.model,
+                    tuple(settings.items()),
+                    self.samples if drawn else 0,
+                    given if drawn else None,
+                    where=self._where,
+                    **effort(self.model, settings, 4),
+                )
+            ]
+            for case, given in own.items()
+        }
+        return {
+            "shown": self._runs("", self.model),
+            "drawn": self._runs("draws", self.swift, self.draws),
+            **self.at_gaps,
+            **others,
+            "sure": sure,
+        }
+
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
+        """All of them at once."""
+        own = [task for part in self.parts.values() for some in part.values() for task in some]
+        return [*own, *(self.levels.batches if self.levels else ())]
+
+
+def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
+    """Gaps (m), their sides, and the scene with the walls that `--gaps` asks for.
+
+    `0.05,0.1` are gaps of the scene's walls, `left:0.05,0.1` of that side, where a wall without
+    rebound is put if there is none. Raises `InputError`.
+    """
+    side, colon, numbers = text.rpartition(":")
+    known = [wall.side for wall in scene.walls]
+    sides: tuple[Any, ...] = (side,) if colon else tuple(known)
+    if colon and side not in get_args(Side):
+        raise InputError(f"{side!r} is not allowed: left or right", "--gaps")
+    try:
+        gaps = sorted({float(word) for word in numbers.split(",")})
+    except ValueError:
+        gaps = [-1.0]
+    if not all(0.0 <= gap < np.inf for gap in gaps):
+        raise InputError(
+            f"{text!r} is not allowed: clear gaps in m, 0 or more, with commas between", "--gaps"
+        )
+    if not sides:
+        raise InputError(
+            f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"
+        )
+    new = [Wall(side=one, gap=gaps[-1]) for one in sides if one not in known]
+    return tuple(gaps), sides, scene.replace(walls=[*scene.walls, *new])

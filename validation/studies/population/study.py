@@ -18,13 +18,12 @@ from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.scenes.recordings import Recording, intensity
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
-from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import build, compiles, family
 from rockcheck.validation.finding import (
     Axis,
     Block,
     Column,
-    Finding,
     Panel,
     Plot,
     Series,
@@ -32,11 +31,15 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
-from rockcheck.validation.studies.population.runs import SOON, Batch, effort
-from rockcheck.validation.study import Study
-from rockcheck.validation.uncertainty.population import Curve, Floats, Runs, compiled, curve_of
+from rockcheck.validation.study import Task
+from rockcheck.validation.uncertainty.population import Curve, Floats, Runs, curve_of, play
 
 Motions = Sequence[tuple[str, Recording]]
+#: The event-based model that plays populations, draws and gaps.
+SWIFT = "ebm-unilateral"
+#: Usual time of a run, s, of compiled models and of others; total time up to which separate
+#: processes are not worth while.
+A_RUN, A_SLOW_RUN, SOON = 1e-3, 1.0, 5.0
 #: Records of a set, at the least; frequencies of a set of pulses.
 FEWEST, PULSES = 2, 50
 #: Peaks that a fragility curve is given for (alpha); a block that overturns exceeds all.
@@ -51,72 +54,108 @@ FALLEN = 1.25
 DRAWS = 200
 
 
-@dataclass(frozen=True, kw_only=True)
-class Population(Study):
-    """Scenes, each under all motions at all `levels` of intensity, in both directions.
+@dataclass(frozen=True)
+class OneScene(Task):
+    """Runs of one scene by one model; `of` names them."""
 
-    `cases` are the scenes by name. A motion has a name and its own intensity; `upward` has the
-    vertical ones that are scaled with it, by its name. `limits` are the events that have a curve:
-    peaks (alpha) by name. `across` is the intensity, `other` its axis in another unit; `data` is
-    added to the data of the finding.
+    of: tuple[str, ...]
+    scene: Scene = field(repr=False)
+    model: str
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Which runs."""
+        return ", ".join(filter(None, self.of))
+
+    def depends(self) -> Any:
+        """The scene with its motion, the model, what else is asked for, and the code."""
+        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
+        code = provenance.code_digest(type(self).__module__)
+        asked = [one for one in self.fields() if one not in OneScene.__dataclass_fields__]
+        return cell, [getattr(self, one) for one in asked], code
+
+
+def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
+    """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
+    a_run = A_RUN if family(model).compiled else A_SLOW_RUN
+    return {"expected": runs * a_run, "compiles": compiles(model, settings)}
+
+
+@dataclass(frozen=True)
+class Batch(OneScene):
+    """Runs of a population that are played together: a scene at factors of its base motion.
+
+    `both`: the vertical motion is scaled too, and not mirrored.
     """
 
-    name: str
-    title: str
+    factors: tuple[float, ...] = field(default=(), repr=False)
+    both: bool = False
+
+    def play(self) -> Runs:
+        """The runs."""
+        across, upward = self.scene.excitation, self.scene.vertical
+        scenes = [
+            self.scene.replace(
+                excitation=across.scaled(factor),
+                vertical=upward.scaled(abs(factor)) if self.both else upward,
+            )
+            for factor in self.factors
+        ]
+        return play(scenes, build(self.model, dict(self.settings)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Population:
+    """Scenes, each under all motions at all `levels` of intensity, in both directions.
+
+    `cases` are the scenes by name; "" is one whose motions each have a line. A motion has a name
+    and its own intensity; `upward` has the vertical ones that are scaled with it, by its name.
+    `limits` are the events that have a curve: peaks (alpha) by name. `across` is the intensity,
+    `other` its axis in another unit; `data` is what `--json` says besides.
+    """
+
     cases: Mapping[str, Scene]
     motions: Sequence[tuple[str, Any, float]]
     levels: Floats
     across: Column
     limits: Mapping[str, float]
-    model: str
     settings: Mapping[str, Any]
     data: Mapping[str, Any]
     other: dict[str, Any] | None = None
     upward: Mapping[str, Excitation] = field(default_factory=dict)
-    record = Runs
 
     @cached_property
-    def batches(self) -> dict[str, list[Batch]]:
-        """One a motion, by the case. Raises `InputError` where the model cannot play a scene."""
-        player = build(self.model, self.settings)
-        if compiled(player):
-            for scene in self.cases.values():
-                player.check(scene)
-        how = effort(self.model, self.settings, 2 * len(self.levels))
+    def batches(self) -> list[Batch]:
+        """One a case and motion. Raises `InputError` where the model cannot play a scene."""
+        player: Any = build(SWIFT, self.settings)
+        for scene in self.cases.values():
+            player.check(scene)
+        how = effort(SWIFT, self.settings, 2 * len(self.levels))
         soon = how["expected"] * len(self.motions) * len(self.cases) < SOON
-        return {
-            case: [
-                Batch(
-                    (case, name),
-                    scene.replace(
-                        excitation=motion, vertical=self.upward.get(name, scene.vertical)
-                    ),
-                    self.model,
-                    tuple(self.settings.items()),
-                    (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
-                    name in self.upward,
-                    where="here" if soon else "worker",
-                    **how,
-                )
-                for name, motion, own in self.motions
-            ]
+        return [
+            Batch(
+                (case, name),
+                scene.replace(excitation=motion, vertical=self.upward.get(name, scene.vertical)),
+                SWIFT,
+                tuple(self.settings.items()),
+                (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
+                name in self.upward,
+                where="here" if soon else "worker",
+                **how,
+            )
             for case, scene in self.cases.items()
-        }
+            for name, motion, own in self.motions
+        ]
 
-    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Batch]:
-        """All batches at once."""
-        return [batch for some in self.batches.values() for batch in some]
-
-    def gather(self, done: Mapping[Any, Any]) -> Finding:
-        """A curve a case and event; of one case also the lines of all motions."""
-        played = {
-            case: [batch for batch in batches if isinstance(done.get(batch), Runs)]
-            for case, batches in self.batches.items()
-        }
+    def gather(self, done: Mapping[Any, Any]) -> tuple[str, list[Block]]:
+        """The answer, and the blocks: a curve a case and event; the lines of all motions."""
+        played = [batch for batch in self.batches if isinstance(done.get(batch), Runs)]
         peaks = {
-            case: np.array([done[batch].peaks for batch in some]).reshape(len(some), 2, -1)
-            for case, some in played.items()
-            if some
+            case: np.array([done[one].peaks for one in played if one.of[0] == case]).reshape(
+                -1, 2, len(self.levels)
+            )
+            for case in dict.fromkeys(batch.of[0] for batch in played)
         }
         curves = [
             curve_of(case + event, some > limit, np.isnan(some), self.levels, DRAWS)
@@ -125,32 +164,24 @@ class Population(Study):
         ]
         blocks: list[Block] = []
         if "" in peaks:
-            names = [batch.label for batch in played[""]]
-            blocks += lines_of(names, peaks[""], self.levels, self.across)
+            blocks += lines_of([one.label for one in played], peaks[""], self.levels, self.across)
         if curves:
             blocks += blocks_of(curves, self.across, self.other)
         unit = self.across.unit
         medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
-        return Finding(
-            self.name,
-            self.title,
-            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
-            " Median"
-            f" {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}.",
-            [
-                *blocks,
-                Table(
-                    "motions",
-                    [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
-                    [[name, own] for name, _, own in self.motions],
-                    "Motions",
-                    on="page",
-                    folded=True,
-                ),
-            ],
-            {"model": self.model, **self.data},
-            exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
+        motions = Table(
+            "motions",
+            [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
+            [[name, own] for name, _, own in self.motions],
+            "Motions",
+            on="page",
+            folded=True,
         )
+        answer = (
+            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
+            f" Median {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}."
+        )
+        return answer, [*blocks, motions]
 
 
 def blocks_of(
@@ -298,33 +329,13 @@ def measure_of(word: str) -> Measure:
     return MEASURES[word]
 
 
-def _recorded(
-    motions: Motions, scene: Scene, of: Callable[[Recording, Scene], float]
-) -> list[tuple[str, Record, float]]:
-    """Records with their own intensities.
-
-    Raises `InputError` for too few, or one without motion.
-    """
-    if len(motions) < FEWEST:
-        raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
-    found = [
-        (name, Record.from_samples(r.samples, r.time_step), float(of(r, scene)))
-        for name, r in motions
-    ]
-    for name, _, own in found:
-        if own <= 0.0:
-            raise InputError(f"{name}: a record without motion has no intensity", "records")
-    return found
-
-
 def ida(
     scene: Scene,
     motions: Motions,
     levels: Floats,
     *,
-    measure: str = "",
+    measure: str = "pga",
     capacities: Sequence[float] = CAPACITIES,
-    model: str = "ebm-unilateral",
     upward: Mapping[str, Excitation] | None = None,
 ) -> Population:
     """Peak rotation of the scene's block under each record, scaled to each intensity.
@@ -332,23 +343,28 @@ def ida(
     The vertical motion `upward`, by the record's name, is scaled with it. Raises `InputError` for
     an unknown measure, fewer than two motions, or one without motion.
     """
-    label, unit, of = measure_of(measure or "pga")
+    label, unit, of = measure_of(measure)
+    if len(motions) < FEWEST:
+        raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
+    sized = [
+        (name, Record.from_samples(one.samples, one.time_step), float(of(one, scene)))
+        for name, one in motions
+    ]
+    for name, _, own in sized:
+        if own <= 0.0:
+            raise InputError(f"{name}: a record without motion has no intensity", "records")
     return Population(
-        name="ida",
-        title=f"Incremental dynamic analysis: {scene.name}",
         cases={"": scene},
-        motions=_recorded(motions, scene, of),
+        motions=sized,
         levels=levels,
         across=Column("intensity", label, unit),
         limits={
             f"peak above {'α, or overturned' if limit == 1.0 else f'{limit:g} α'}": limit
             for limit in capacities
         },
-        model=model,
         upward=upward or {},
         settings={"tolerance": 1e-8},
         data={
-            "scene": scene.name,
             "measure": measure,
             "label": label,
             "unit": unit,
@@ -358,33 +374,21 @@ def ida(
     )
 
 
-def fragility(
-    scene: Scene,
-    motions: Motions,
-    levels: Floats,
-    frequencies: tuple[float, float],
-    *,
-    model: str = "ebm",
-) -> Population:
+def fragility(scene: Scene, levels: Floats, frequencies: tuple[float, float]) -> Population:
     """The probability of overturning over the intensity, with the wall and without.
 
-    The motions are a set of records or, without any, pulses of the scene's kind at `PULSES`
-    frequencies, over p, between the two of `frequencies`.
-
-    The intensity is peak acceleration over g tan(alpha). Raises `InputError`.
+    The motions are pulses of the scene's kind at `PULSES` frequencies, over p, between the two of
+    `frequencies`. The intensity is peak acceleration over g tan(alpha). Raises `InputError`.
     """
     slope, pulse = scene.gravity * scene.block.slope, scene.excitation
-    if not motions and pulse.kind not in ("ricker", "sine"):
+    if pulse.kind not in ("ricker", "sine"):
         raise InputError("are needed: the scene's excitation is no pulse", "records")
     unit = scene.frequency_parameter / (2.0 * math.pi)
     free = {"without a wall": scene.replace(walls=())}
+    in_g = slope / GRAVITY_OF_RECORDS
     return Population(
-        name="fragility",
-        title=f"Fragility: {scene.name}",
         cases={"with the wall": scene, **free} if scene.walls else free,
-        motions=_recorded(motions, scene, MEASURES["pga-ratio"][2])
-        if motions
-        else [
+        motions=[
             (
                 f"{hertz:.4g} Hz",
                 type(pulse)(**pulse.model_dump() | {"amplitude": slope, "period": 1.0 / hertz}),
@@ -395,15 +399,7 @@ def fragility(
         levels=levels,
         across=Column("intensity", "peak acceleration / (g tan α)"),
         limits={"": MOST},
-        model=model,
         settings={},
-        data={
-            "scene": scene.name,
-            "pga_g": slope / GRAVITY_OF_RECORDS,
-        },
-        other={
-            "per_unit": slope / GRAVITY_OF_RECORDS,
-            "other_unit": "g",
-            "other_label": "peak acceleration, g",
-        },
+        data={"pga_g": in_g},
+        other={"per_unit": in_g, "other_unit": "g", "other_label": "peak acceleration, g"},
     )

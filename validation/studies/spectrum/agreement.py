@@ -4,7 +4,6 @@ At some nodes of each spectrum the outcomes are compared with those of the event
 maps are of one figure.
 """
 
-import itertools
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -39,10 +38,8 @@ MAPPED, MAP_SIZE = 8, 25
 Agreement = Mapping[str, Any]
 
 
-def choose_nodes(
-    spectrum: Spectrum, count: int, name: str
-) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """`count` nodes (i, j) of a spectrum, and whether each is near the boundary.
+def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.int64]]:
+    """`count` nodes (i, j) of a spectrum: those near the boundary, and those away from it.
 
     Half of them are near it, where there are enough. The choice is random but depends only on
     `name`. Nodes that the reference could not decide are left out.
@@ -57,27 +54,10 @@ def choose_nodes(
     decided[tuple(spectrum.undecided.T)] = False
     inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
     wanted = max(min(count // 2, len(inside)), min(count - len(outside), len(inside)))
-    chosen = [inside[random.permutation(len(inside))[:wanted]]]
-    chosen.append(outside[random.permutation(len(outside))[: count - wanted]])
-    nodes = np.concatenate(chosen)
-    return nodes, near[nodes[:, 0], nodes[:, 1]]
-
-
-def first_of(near: NDArray[np.bool_], count: int) -> NDArray[np.int64]:
-    """The indices of `count` of the chosen nodes, or of all if there are no more.
-
-    They are the first ones chosen near the boundary and away from it, half of each.
-    """
-    if count >= len(near):
-        return np.arange(len(near))
-    sides = [np.flatnonzero(near == part) for part in (True, False)]
-    wanted = [min(count // 2, len(sides[0])), min(count - count // 2, len(sides[1]))]
-    return np.concatenate([side[:number] for side, number in zip(sides, wanted, strict=True)])
-
-
-def candidates() -> tuple[str, ...]:
-    """The installed models that are compared with the event-based ones."""
-    return tuple(model for model in CANDIDATES if not not_installed(model))
+    return [
+        side[random.permutation(len(side))[:number]]
+        for side, number in ((inside, wanted), (outside, count - wanted))
+    ]
 
 
 def plays(request: Request, panel: Panel) -> bool:
@@ -104,10 +84,19 @@ def agree(
     finish, counted as unequal. A map has rows of letters by panel, lowest amplitude first; `equal`
     of its `nodes` have the unilateral event-based model's outcome.
     """
-    others = [replace(request, model=model, settings={}) for model in candidates()]
+    others = [
+        replace(request, model=model, settings={})
+        for model in CANDIDATES
+        if not not_installed(model)
+    ]
     requests = {one.model: one for one in (request, *others)}
     shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
-    maps = list(_maps(book, list(spectra), requests))
+    coarse = {
+        model: replace(one, size=MAP_SIZE, refine=False)
+        for model, one in requests.items()
+        if model not in PLAYED_SHARE
+    }
+    maps = list(_maps(book, list(spectra), coarse))
     if book.wanted:
         return None
     fewer = [one.model for one in others if one.model in PLAYED_SHARE]
@@ -125,8 +114,8 @@ def agree(
         "versions": provenance.versions(),
         "settings": {model: dict(one.settings) for model, one in requests.items()},
         "shares": [share for some in shares for share in some],
-        "map_frequencies": _coarse(request).frequencies.tolist(),
-        "map_amplitudes": _coarse(request).amplitudes.tolist(),
+        "map_frequencies": coarse["ebm"].frequencies.tolist(),
+        "map_amplitudes": coarse["ebm"].amplitudes.tolist(),
         "maps": maps,
     }
 
@@ -134,37 +123,37 @@ def agree(
 def _shares(
     book: Book, panel: Panel, spectrum: Spectrum, others: Sequence[Request], count: int
 ) -> Iterator[dict[str, Any]]:
-    nodes, near = choose_nodes(spectrum, count, panel.name)
-    i, j = nodes.T
-    sides = {"ebm": spectrum.outcomes[i, j]}
+    chosen = choose_nodes(spectrum, count, panel.name)
+    sides = {"ebm": [spectrum.outcomes[tuple(part.T)] for part in chosen]}
     for one in others:
         # at least two, one on each side
-        chosen = first_of(near, max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count)))
-        where = one.amplitudes[i[chosen]], one.frequencies[j[chosen]]
-        how = panel.scene, *where, one.model, one.settings
+        number = max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count))
+        halves = number // 2, number - number // 2
+        if number >= sum(map(len, chosen)):
+            halves = len(chosen[0]), len(chosen[1])
+        i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
+        how = panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
         if not plays(one, panel) or (found := book.outcomes(*how)) is None:
             continue
-        sides.setdefault(one.model, found[0])
-        for part in (True, False):
-            here = near[chosen] == part
-            fine = here & ~found[1]
+        ends = [len(chosen[0][: halves[0]])]
+        mine, fine = np.split(found[0], ends), np.split(~found[1], ends)
+        sides.setdefault(one.model, mine)
+        for part in (0, 1):
             yield {
                 "spectrum": panel.name,
                 "figure": panel.figure,
                 "model": one.model,
-                "near": part,
-                "nodes": int(here.sum()),
-                "failed": int(np.sum(here & found[1])),
+                "near": part == 0,
+                "nodes": len(mine[part]),
+                "failed": len(mine[part]) - int(fine[part].sum()),
                 "equal": {
-                    other: int(np.sum(fine & (found[0] == sides[other][chosen])))
+                    other: int(
+                        np.sum(fine[part] & (mine[part] == sides[other][part][: len(mine[part])]))
+                    )
                     for other in REFERENCES
                     if other != one.model and other in sides
                 },
             }
-
-
-def _coarse(request: Request) -> Request:
-    return replace(request, size=MAP_SIZE, refine=False)
 
 
 def mapped(panels: Sequence[Panel]) -> list[Panel]:
@@ -178,9 +167,7 @@ def _maps(
 ) -> Iterator[dict[str, Any]]:
     chosen = mapped(panels)
     drawn = {
-        model: [book.spectrum(panel, _coarse(one)) for panel in chosen]
-        for model, one in requests.items()
-        if model not in PLAYED_SHARE
+        model: [book.spectrum(panel, one) for panel in chosen] for model, one in requests.items()
     }
     if book.wanted:
         return
@@ -218,15 +205,20 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
     yield Text(about, "The same spectra by the other models", on="page")
     model = Column("model", kind="model")
     yield _table("agreement", found["shares"], [model])
-    by, how = [text("spectrum"), model], {"on": "page", "folded": True}
-    yield _table("agreement-by-spectrum", found["shares"], by, title="Spectrum by spectrum", **how)
+    yield _table(
+        "agreement-by-spectrum",
+        found["shares"],
+        [text("spectrum"), model],
+        title="Spectrum by spectrum",
+        on="page",
+        folded=True,
+    )
     if found["maps"]:
         yield _drawn(found, panels)
 
 
 def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
     """The shares of equal outcomes, summed up by some columns."""
-    parts = list(itertools.product(REFERENCES, (True, False)))
     columns = [
         Column(f"{side}_{short}", f"{side}, {short}", kind="percent")
         for short in REFERENCES.values()
@@ -238,12 +230,7 @@ def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) 
     rows = [
         [
             *at,
-            *(
-                _equal(
-                    [s for s in some if s["near"] == near and reference in s["equal"]], reference
-                )
-                for reference, near in parts
-            ),
+            *(_equal(some, near, one) for one in REFERENCES for near in (True, False)),
             *(sum(one[count] for one in some) for count in ("nodes", "failed")),
         ]
         for at, some in groups.items()
@@ -251,8 +238,8 @@ def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) 
     return Table(name, [*by, *columns, Column("nodes"), Column("failed")], rows, **more)
 
 
-def _equal(shares: Sequence[Any], reference: str) -> float | None:
-    mine = [share for share in shares if reference in share["equal"]]
+def _equal(shares: Sequence[Any], near: bool, reference: str) -> float | None:
+    mine = [share for share in shares if share["near"] == near and reference in share["equal"]]
     nodes = sum(share["nodes"] for share in mine)
     return sum(share["equal"][reference] for share in mine) / nodes if nodes else None
 
@@ -274,7 +261,6 @@ def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
         for row, one in enumerate(found["maps"])
         for column, panel in enumerate(panels)
     ]
-    axes = {"frequencies": found["map_frequencies"], "amplitudes": found["map_amplitudes"]}
     size = len(found["map_frequencies"])
     return Plot(
         "models",
@@ -282,5 +268,11 @@ def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
         kind="spectra",
         note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
         f" {equal}.",
-        data={**axes, "record": False, "panels": shown, "height": 0.4 + 0.92 * len(found["maps"])},
+        data={
+            "frequencies": found["map_frequencies"],
+            "amplitudes": found["map_amplitudes"],
+            "record": False,
+            "panels": shown,
+            "height": 0.4 + 0.92 * len(found["maps"]),
+        },
     )

@@ -1,7 +1,5 @@
 """`rockcheck spectrum`: overturning spectra, the paper's and one's own, as a study."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections import Counter
@@ -54,6 +52,14 @@ LAWS = (
 )
 
 
+@dataclass
+class _Found:
+    spectra: dict[Panel, Spectrum] = field(default_factory=dict)
+    motions: dict[Panel, tiles.Played] = field(default_factory=dict)
+    paper: measures.Paper | None = None
+    agreement: Mapping[str, Any] | None = None
+
+
 @dataclass(frozen=True)
 class Spectra(Study):
     """The spectra of some panels, all on one grid by one model.
@@ -67,7 +73,6 @@ class Spectra(Study):
     compared: int = 0
     name = "spectrum"
     record = tiles.Played
-    play = staticmethod(tiles.play)
 
     def __post_init__(self) -> None:
         check = getattr(build(self.request.model, self.request.settings), "check", None)
@@ -84,10 +89,8 @@ class Spectra(Study):
         """The complete spectra, and the findings from them."""
         found = self._found(Book(done))
         panels, spectra = list(found.spectra), list(found.spectra.values())
-        nodes = sum(one.outcomes.size for one in spectra)
-        answer = (
-            f"{len(spectra)} spectra: {nodes} nodes, {sum(s.evaluations for s in spectra)} runs."
-        )
+        nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
+        answer = f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
         if len(self.panels) == len(spectra) == 1:
             answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
         laws = any(one.depends_on_law is not None for one in spectra)
@@ -107,8 +110,7 @@ class Spectra(Study):
             blocks += measures.blocks(found.paper, claims)
         compared = found.agreement
         if self._papers and not self.compared:
-            compared = read_json(KEPT / "agreement.json")
-            panels = [*paper_panels()]
+            compared, panels = read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
             mapped = agreement.mapped(panels)
             blocks += agreement.blocks(compared, mapped, came=not self.compared)
@@ -146,16 +148,16 @@ class Spectra(Study):
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         for panel in self.panels:
             one = self._spectrum(book, panel)
-            if fast:
-                motions = book.ask(self._nodes(panel.scene, i.ravel(), j.ravel(), "motions"))
-                found.motions[panel] = motions[0] if motions else tiles.Played()
+            nodes = self._nodes(panel.scene, i.ravel(), j.ravel(), "motions") if fast else []
+            (found.motions[panel],) = book.ask(nodes) or [tiles.Played()]
             if one is not None:
                 found.spectra[panel] = one
-        if len(found.spectra) == len(self.panels):
-            if self._papers:
-                found.paper = self._paper(book, list(found.spectra.values()))
-            if self.compared:
-                found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
+        if len(found.spectra) < len(self.panels):
+            return found
+        if self._papers:
+            found.paper = self._paper(book, list(found.spectra.values()))
+        if self.compared:
+            found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
         return found
 
     def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
@@ -165,7 +167,7 @@ class Spectra(Study):
             book.spectrum(panel, self.request, law) for law in self.request.other_laws(panel.scene)
         ]
         known = [law for law in laws if law is not None]
-        if one is None or len(known) < len(laws) or not laws:
+        if one is None or not laws or len(known) < len(laws):
             return one
         return replace(one, depends_on_law=differing(one, known))
 
@@ -175,32 +177,29 @@ class Spectra(Study):
         return tiles.nodes_of(scene, *nodes, request.model, request.settings, what)
 
     def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
-        least = {
-            measures.SCANNED_WALLS[one.scene.name]: self._least(book, one.scene)
+        scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
+        how = self.request.model, self.request.settings
+        scanned: dict[Any, Any] = {
+            measures.SCANNED_WALLS[one.scene.name]: book.outcomes(one.scene, *scan, *how)
             for one in spectra
             if one.scene.name in measures.SCANNED_WALLS
         }
-        tongues = {
-            one.scene.floor.friction: self._one_impact(book, one)
-            for one in spectra
-            if not one.scene.walls
+        struck = [(one, *measures.near_one_impact(one)) for one in spectra if not one.scene.walls]
+        records: list[Any] = [
+            book.ask(self._nodes(one.scene, i, j, "one impact")) for one, i, j in struck
+        ]
+        if book.wanted:
+            return None
+        least = {
+            wall: float(measures.SCANNED[sides != SAFE].min(initial=np.inf))
+            for wall, (sides, _) in scanned.items()
         }
-        return None if book.wanted else measures.Paper(spectra, least, tongues)
-
-    def _least(self, book: Book, scene: Scene) -> float:
-        """The lowest amplitude of the scan that overturns; infinite while none is known."""
-        scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
-        outcomes = book.outcomes(scene, *scan, self.request.model, self.request.settings)
-        fallen = measures.SCANNED[outcomes[0] != SAFE] if outcomes else np.array([])
-        return float(fallen.min(initial=np.inf))
-
-    def _one_impact(self, book: Book, one: Spectrum) -> measures.Mask:
-        """The nodes that overturn after one impact, as far as they are known."""
-        mask = np.zeros(one.outcomes.shape, dtype=bool)
-        i, j = measures.near_one_impact(one)
-        if records := book.ask(self._nodes(one.scene, i, j, "one impact")):
-            mask[i, j] = [letter == "Y" for record in records for letter in record.letters]
-        return mask
+        tongues = {}
+        for (one, i, j), some in zip(struck, records, strict=True):
+            mask = np.zeros(one.outcomes.shape, dtype=bool)
+            mask[i, j] = [letter == "Y" for record in some for letter in record.letters]
+            tongues[one.scene.floor.friction] = mask
+        return measures.Paper(spectra, least, tongues)
 
     def _shares(self, spectra: Mapping[Panel, Spectrum], laws: bool) -> Table:
         columns = [
@@ -274,13 +273,13 @@ class Spectra(Study):
             "place": place,
             "nodes": [
                 [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
-                for n in found.played(panel).played
+                for n in found.motions[panel].played
             ],
         }
 
     def _played(self, panel: Panel, found: _Found) -> dict[str, Any]:
         """The motions of a panel's nodes, for the page."""
-        block, motions = panel.scene.block, found.played(panel)
+        block, motions = panel.scene.block, found.motions[panel]
         return {
             "block": [block.half_width, block.half_height],
             "alpha": block.alpha,
@@ -310,18 +309,6 @@ class Spectra(Study):
                 "versions": provenance.versions(),
             }
         )
-
-
-@dataclass
-class _Found:
-    spectra: dict[Panel, Spectrum] = field(default_factory=dict)
-    motions: dict[Panel, tiles.Played] = field(default_factory=dict)
-    paper: measures.Paper | None = None
-    agreement: agreement.Agreement | None = None
-
-    def played(self, panel: Panel) -> tiles.Played:
-        """A panel's motions; none where they are not known."""
-        return self.motions.get(panel, tiles.Played())
 
 
 def _spread(size: int) -> NDArray[np.int64]:

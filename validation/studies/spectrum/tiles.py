@@ -1,9 +1,9 @@
 """A spectrum's request, the tasks that play its nodes, and the spectra that are complete."""
 
 import base64
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ from rockcheck.ebm.spectrum import (
     SAFE,
     TOLERANCE,
     Floats,
+    Motion,
     Nodes as Outcomes,
     node_scene,
     play_motions,
@@ -41,6 +42,20 @@ LETTERS, UNDECIDED = "LSR", "U"
 #: Number of equal parts of a history; bound on its distance from straight lines between the rows
 #: that are kept: of alpha in rotation, of the half width in position.
 PARTS, COARSE = 400, 0.01
+
+
+@dataclass(frozen=True)
+class Played:
+    """A letter a node: its outcome, or whether it overturned after one floor impact (Y or N).
+
+    Of motions: the numbers of the nodes that could be played, in their order, and their rows t (s),
+    theta (rad), x, y (m) below each other as base64 of float32; `ends` says where each ends.
+    """
+
+    letters: str = ""
+    played: tuple[int, ...] = ()
+    ends: tuple[int, ...] = ()
+    rows: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,19 +85,23 @@ class Nodes(Task):
         nodes = zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
         return [node_scene(self.scene, *node) for node in nodes]
 
-
-@dataclass(frozen=True)
-class Played:
-    """A letter a node: its outcome, or whether it overturned after one floor impact (Y or N).
-
-    Of motions: the numbers of the nodes that could be played, in their order, and their rows t (s),
-    theta (rad), x, y (m) below each other as base64 of float32; `ends` says where each ends.
-    """
-
-    letters: str = ""
-    played: tuple[int, ...] = ()
-    ends: tuple[int, ...] = ()
-    rows: str = ""
+    def play(self) -> Played:
+        """Outcomes or motions of the nodes, or whether they overturn after one impact."""
+        player: Any = build(self.model, self.settings)
+        where = self.scene, self.amplitudes, self.frequencies
+        if self.what == "motions":
+            motions = play_motions(*where, model=player, parts=PARTS, jobs=cores())
+            return _motions(motions)
+        if self.what == "one impact":
+            scenes = (one.replace(output_step=one.duration) for one in self.scenes())
+            kinds = [[event.kind for event in player.simulate(one).event_list] for one in scenes]
+            return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
+        if compiled(player):
+            sides, failed = play_nodes(*where, model=player, jobs=cores())
+        else:
+            runs = population.play(self.scenes(), player)
+            sides, failed = np.array(runs.side), np.array(runs.failed)
+        return Played("".join(letters_of(sides, np.argwhere(failed))))
 
 
 def nodes_of(
@@ -107,47 +126,20 @@ def nodes_of(
             np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)
         )
         key = provenance.digest(base + a.tobytes().hex() + f.tobytes().hex())
-        nodes = Nodes(key, what, scene, a, f, model, settings, expected=one * len(a), where=where)
-        found.append(nodes)
+        found.append(
+            Nodes(key, what, scene, a, f, model, settings, expected=one * len(a), where=where)
+        )
     return found
 
 
-def play(task: Nodes) -> Played:
-    """Plays outcomes or motions of the nodes, or whether they overturn after one impact."""
-    player = build(task.model, task.settings)
-    if task.what == "motions":
-        return _motions(task, player)
-    if task.what == "one impact":
-        scenes = (one.replace(output_step=one.duration) for one in task.scenes())
-        kinds = [[event.kind for event in player.simulate(one).event_list] for one in scenes]
-        return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
-    if compiled(player):
-        where = task.scene, task.amplitudes, task.frequencies
-        sides, failed = play_nodes(*where, model=player, jobs=cores())
-    else:
-        runs = population.play(task.scenes(), player)
-        sides, failed = np.array(runs.side), np.array(runs.failed)
-    letters = np.where(failed, UNDECIDED, np.array(list(LETTERS))[sides - LEFT])
-    return Played("".join(letters))
-
-
-def outcomes_of(letters: str) -> Outcomes:
-    """Sides (-1, 0, +1) and which runs failed, of letters."""
-    codes = np.frombuffer(letters.encode(), dtype=np.uint8)
-    left, right, failed = (codes == ord(one) for one in (LETTERS[0], LETTERS[2], UNDECIDED))
-    return np.select([left, right], [LEFT, RIGHT], SAFE).astype(np.int8), failed
-
-
 def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray[np.str_]:
-    """A letter a node of a grid of sides, and of the nodes (i, j) that are undecided."""
+    """A letter a node of an array of sides; `undecided` are indices of nodes, a row each."""
     letters = np.array(list(LETTERS))[sides - LEFT]
     letters[tuple(undecided.T)] = UNDECIDED
     return letters
 
 
-def _motions(task: Nodes, player: Any) -> Played:
-    where = task.scene, task.amplitudes, task.frequencies
-    found = play_motions(*where, model=player, parts=PARTS, jobs=cores())
+def _motions(found: Sequence[Motion | None]) -> Played:
     moved = [motion for motion in found if motion is not None]
     ends = np.cumsum([len(motion.rows) for motion in moved], dtype=int)
     kept, content = ends, b""
@@ -203,24 +195,12 @@ SETTINGS: dict[str, dict[str, Any]] = {
 MOST_SIZE = 5000
 
 
-def axis(low: float, high: float, size: int, key: str) -> Floats:
-    """`size` equally spaced ratios from `low` to `high`.
-
-    Raises `InputError` where they are not finite, positive and in order.
-    """
-    said = f"{low:g} to {high:g} is not allowed"
-    if not (np.isfinite(low) and np.isfinite(high) and low > 0.0):
-        raise InputError(f"{said}: give positive finite numbers", key)
-    if low >= high:
-        raise InputError(f"{said}: the lower end comes first", key)
-    return np.linspace(low, high, size)
-
-
 @dataclass(frozen=True)
 class Request:
     """Grid, model and settings with which spectra are played.
 
-    Raises `InputError` where the model cannot play them.
+    `frequencies` (omega_p/p) and `amplitudes` (a_p/(g tan alpha)) are those of the nodes. Raises
+    `InputError` where the model cannot play them.
     """
 
     size: int = 100
@@ -229,6 +209,8 @@ class Request:
     model: str = "ebm"
     settings: Mapping[str, Any] = field(default_factory=dict)
     refine: bool = False
+    frequencies: Floats = field(init=False, compare=False)
+    amplitudes: Floats = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         if not 2 <= self.size <= MOST_SIZE:
@@ -237,17 +219,14 @@ class Request:
         settings = {**SETTINGS.get(self.model, {}), **self.settings}
         object.__setattr__(self, "settings", settings)
         build(self.model, settings)
-        _ = self.frequencies, self.amplitudes
-
-    @cached_property
-    def frequencies(self) -> Floats:
-        """omega_p/p of the nodes."""
-        return axis(*self.frequency_range, self.size, "--frequencies")
-
-    @cached_property
-    def amplitudes(self) -> Floats:
-        """a_p/(g tan alpha) of the nodes."""
-        return axis(*self.amplitude_range, self.size, "--amplitudes")
+        ranges = {"frequencies": self.frequency_range, "amplitudes": self.amplitude_range}
+        for name, (low, high) in ranges.items():
+            said = f"{low:g} to {high:g} is not allowed"
+            if not (0.0 < low < math.inf and math.isfinite(high)):
+                raise InputError(f"{said}: give positive finite numbers", f"--{name}")
+            if low >= high:
+                raise InputError(f"{said}: the lower end comes first", f"--{name}")
+            object.__setattr__(self, name, np.linspace(low, high, self.size))
 
     def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
         """The settings with each other law of impacts on which outcomes may depend."""
@@ -285,9 +264,13 @@ class Book:
         ]
 
     def outcomes(self, *nodes: Any) -> Outcomes | None:
-        """Sides and failures of the nodes of `tiles.nodes_of`."""
+        """Sides (-1, 0, +1) and failures of the nodes of `nodes_of`."""
         found = self.ask(nodes_of(*nodes))
-        return None if found is None else outcomes_of("".join(one.letters for one in found))
+        if found is None:
+            return None
+        letters = np.array([*"".join(one.letters for one in found)])
+        sides = [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)]
+        return np.select(sides, [LEFT, RIGHT], SAFE).astype(np.int8), letters == UNDECIDED
 
     def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
         """A spectrum; None where nodes are still to be played.

@@ -40,6 +40,12 @@ class SceneFamily:
     member: Callable[[int], Scene]
 
 
+def pulse_of(scene: Scene, frequency_ratio: Any, amplitude_ratio: Any) -> tuple[Any, Any]:
+    """Amplitude (m/s^2) and period (s) of pulses of omega_p = ratio p, a_p = ratio g tan alpha."""
+    strength = amplitude_ratio * scene.gravity * math.tan(scene.block.alpha)
+    return strength, 2.0 * math.pi / (frequency_ratio * scene.frequency_parameter)
+
+
 def pulse(
     frequency_ratio: float,
     amplitude_ratio: float,
@@ -48,7 +54,7 @@ def pulse(
     walls: tuple[Wall, ...] = (),
     name: str = "pulse",
 ) -> Scene:
-    """A Ricker pulse of omega_p = ratio p and a_p = ratio g tan alpha, 3 s."""
+    """A scene of 3 s under a Ricker pulse, see `pulse_of`."""
     still = Scene(
         name=name,
         block=PAPER_BLOCK,
@@ -57,8 +63,7 @@ def pulse(
         excitation=Rest(),
         duration=3.0,
     )
-    amplitude = amplitude_ratio * still.gravity * math.tan(still.block.alpha)
-    period = 2.0 * math.pi / (frequency_ratio * still.frequency_parameter)
+    amplitude, period = pulse_of(still, frequency_ratio, amplitude_ratio)
     return still.replace(excitation=Ricker(amplitude=amplitude, period=period))
 
 
@@ -153,13 +158,12 @@ QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 
 @dataclass(frozen=True)
 class Prepared:
-    """A member cut at its horizon (s), and the reference of each kind of model.
+    """A member cut at its horizon, and the reference of each kind of model.
 
     `model_form` is how far the references are apart (RMS, alpha).
     """
 
     scene: Scene
-    horizon: float
     references: dict[str, History]
     model_form: float
 
@@ -168,8 +172,7 @@ class Prepared:
 def prepared(family: str, member: int) -> Prepared:
     """Cuts a member at its horizon and plays its references; they take milliseconds."""
     whole = (FAMILIES | WALLS)[family].member(member)
-    horizon = predictability_horizon(whole)
-    scene = whole.replace(duration=horizon)
+    scene = whole.replace(duration=predictability_horizon(whole))
     references = {
         model.name: model.simulate(scene)
         for model in (
@@ -180,7 +183,7 @@ def prepared(family: str, member: int) -> Prepared:
     model_form = compare(
         references["ebm"], references["ebm-unilateral"], scene=scene, measures=["theta_rms"]
     )["theta_rms"]
-    return Prepared(scene, horizon, references, model_form)
+    return Prepared(scene, references, model_form)
 
 
 REFERENCES = ("ebm-unilateral", "ebm")
@@ -214,10 +217,6 @@ class DiagramLine:
     #: The values of `--quick`, and those beside a wall, by which convergence is judged.
     quick: tuple[float, ...] = ()
     converge: tuple[float, ...] = ()
-
-    def settings(self, value: float) -> dict[str, Any]:
-        """The model's settings at one value."""
-        return {self.knob: value, **self.fixed}
 
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -320,17 +319,6 @@ LEFT_OUT = (
 
 
 @dataclass(frozen=True)
-class Play(Task):
-    """One run: a member of a family of scenes, played by a line of the diagrams at one value."""
-
-    family: str
-    member: int
-    line: str
-    value: float
-    repeats: int = REPEATS
-
-
-@dataclass(frozen=True)
 class BenchmarkRun:
     """One run: its scene and setting, its errors against its reference, and its cost.
 
@@ -358,46 +346,51 @@ class BenchmarkRun:
     failure: str = ""
 
 
-def play(task: Play) -> BenchmarkRun:
-    """Plays one member with one setting; short runs several times, for the median time."""
-    line, ready = LINES[task.line], prepared(task.family, task.member)
-    model = build(line.model, line.settings(task.value))
-    history = model.simulate(ready.scene)
-    costs = [history.cost]
-    while len(costs) < task.repeats and costs[0].wall_seconds < LONG_ENOUGH:
-        costs.append(model.simulate(ready.scene).cost)
-    reference = ready.references[line.reference]
-    errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
-    paper = compare(ready.references["ebm"], history, measures=["theta_rms"])["theta_rms"]
-    first = [
-        min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
-        for h in (reference, history)
-    ]
-    return BenchmarkRun(
-        task.family,
-        task.member,
-        task.line,
-        task.value,
-        ready.horizon,
-        rms=errors["theta_rms"],
-        largest=errors["theta_peak"],
-        peak=abs(history.peak_rotation - reference.peak_rotation) / (reference.alpha or 1.0),
-        first_impact=abs(first[1] - first[0]),
-        against_ebm=paper,
-        step=float(history.settings.get("time_step", math.nan))
-        if line.knob != "largest_step"
-        else task.value,
-        cpu=median(cost.cpu_seconds for cost in costs),
-        wall=median(cost.wall_seconds for cost in costs),
-        set_up=median(cost.set_up for cost in costs),
-        steps=costs[0].steps,
-    )
+@dataclass(frozen=True)
+class Play(Task):
+    """One run: a member of a family of scenes, played by a line of the diagrams at one value."""
 
+    family: str
+    member: int
+    line: str
+    value: float
+    repeats: int = REPEATS
 
-def lost(task: Play, reason: str) -> BenchmarkRun:
-    """The record of a run that failed."""
-    horizon = prepared(task.family, task.member).horizon
-    return BenchmarkRun(task.family, task.member, task.line, task.value, horizon, failure=reason)
+    def record(self, **found: Any) -> BenchmarkRun:
+        """The row of the run, with what was found."""
+        horizon = prepared(self.family, self.member).scene.duration
+        return BenchmarkRun(self.family, self.member, self.line, self.value, horizon, **found)
+
+    def play(self) -> list[BenchmarkRun]:
+        """Plays the member with the setting; short runs several times, for the median time."""
+        line, ready = LINES[self.line], prepared(self.family, self.member)
+        model = build(line.model, {line.knob: self.value, **line.fixed})
+        history = model.simulate(ready.scene)
+        costs = [history.cost]
+        while len(costs) < self.repeats and costs[0].wall_seconds < LONG_ENOUGH:
+            costs.append(model.simulate(ready.scene).cost)
+        reference = ready.references[line.reference]
+        errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
+        paper = compare(ready.references["ebm"], history, measures=["theta_rms"])["theta_rms"]
+        first = [
+            min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
+            for h in (reference, history)
+        ]
+        found = self.record(
+            rms=errors["theta_rms"],
+            largest=errors["theta_peak"],
+            peak=abs(history.peak_rotation - reference.peak_rotation) / (reference.alpha or 1.0),
+            first_impact=abs(first[1] - first[0]),
+            against_ebm=paper,
+            step=float(history.settings.get("time_step", math.nan))
+            if line.knob != "largest_step"
+            else self.value,
+            cpu=median(cost.cpu_seconds for cost in costs),
+            wall=median(cost.wall_seconds for cost in costs),
+            set_up=median(cost.set_up for cost in costs),
+            steps=costs[0].steps,
+        )
+        return [found]
 
 
 def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:
@@ -428,6 +421,7 @@ def grouped(frame: pd.DataFrame, *names: str) -> list[tuple[Any, pd.DataFrame]]:
 SHARES = {"rms": 0.5, "rms_10": 0.1, "rms_90": 0.9}
 MEDIANS = ("largest", "peak", "first_impact", "cpu", "wall", "set_up", "steps")
 RATES = ("cpu", "wall", "steps")
+TINY = 1e-9
 
 
 def points_of(frame: pd.DataFrame) -> pd.DataFrame:
@@ -446,7 +440,9 @@ def _point(samples: pd.DataFrame) -> tuple[float, ...]:
     rates = good[[*RATES]].div(good.horizon, axis=0)
     medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
     errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
-    shares = [quantile(errors, share) for share in SHARES.values()]
+    # halfway between two values where a share lies between them; infinite ones are not averaged
+    sides = np.add.outer([-TINY, TINY], [*SHARES.values()])
+    shares = np.quantile(errors, sides, method="inverted_cdf").mean(axis=0).tolist()
     return len(samples), failed, *shares, *medians, math.inf if failed else good.rms.max()
 
 
@@ -460,7 +456,12 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
     lines = dict(grouped(points, "family", "line"))
     costs = {at: cost_at(line) for at, line in lines.items()}
     rows = [
-        (*at, order_of(line), *costs[at], costs[at][0] / costs.get((at[0], "ebm"), NOTHING)[0])
+        (
+            *at,
+            slope(line.value, line.rms, FITTED),
+            *costs[at],
+            costs[at][0] / costs.get((at[0], "ebm"), NOTHING)[0],
+        )
         for at, line in lines.items()
     ]
     return pd.DataFrame(rows, columns=["family", "line", "order", "cpu", "at_coarsest", "ratio"])
@@ -476,17 +477,16 @@ def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) ->
     return points_of(pd.concat(parts))
 
 
-def at_the_cost(point: Any, points: pd.DataFrame) -> float:
-    """The error of the engine's adaptive line at a point's CPU time; NaN outside its range.
+def at_the_cost(points: pd.DataFrame) -> list[float]:
+    """By point, the error of the engine's adaptive line at that CPU time; NaN outside its range.
 
     Interpolated as by `error_at`.
     """
-    adaptive = f"{LINES[point.line].model} adaptive"
-    return error_at(_of(points, family=point.family, line=adaptive), point.cpu)
-
-
-def _of(frame: pd.DataFrame, **values: Any) -> pd.DataFrame:
-    return frame[np.all([frame[name] == value for name, value in values.items()], axis=0)]
+    lines = dict(grouped(points, "family", "line"))
+    return [
+        error_at(lines.get((one.family, f"{LINES[one.line].model} adaptive"), points[:0]), one.cpu)
+        for one in points.itertuples()
+    ]
 
 
 def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
@@ -498,7 +498,7 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     least error at any setting that was played, and its cost; NaN where the line does not reach it.
     """
     rows = []
-    for (label,), mine in grouped(_of(found, family=next(iter(KINDS))), "line"):
+    for (label,), mine in grouped(found[found.family == next(iter(KINDS))], "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
             best = good.loc[good.rms.idxmin()]
             least = float(best.rms), float(best.cpu)
@@ -533,26 +533,6 @@ def error_at(line: pd.DataFrame, cpu: float) -> float:
     return math.nan
 
 
-def quantile(values: Sequence[float], share: float) -> float:
-    """The value below which `share` of the sample lies; values may be infinite.
-
-    Halfway between two values where it lies between them.
-    """
-    ordered, place = sorted(values), share * len(values)
-    below = ordered[max(math.ceil(place - 1e-9) - 1, 0)]
-    above = ordered[min(math.floor(place + 1e-9), len(values) - 1)]
-    return 0.5 * (below + above)
-
-
-def order_of(line: pd.DataFrame) -> float:
-    """Slope of log median error over log of the swept setting; NaN with fewer than two points.
-
-    By least squares over the errors between the limits of `FITTED`.
-    """
-    fitted = line[(line.rms > FITTED[0]) & (line.rms < FITTED[1])]
-    return slope(fitted.value, fitted.rms)
-
-
 def cost_at(line: pd.DataFrame, level: float = LEVEL) -> tuple[float, bool]:
     """CPU s a simulated second at a median error of `level`.
 
@@ -568,12 +548,17 @@ def cost_at(line: pd.DataFrame, level: float = LEVEL) -> tuple[float, bool]:
     return min(costs, default=NOTHING)
 
 
-def slope(steps: Iterable[float], errors: Iterable[float]) -> float:
-    """Slope of log error over log step by least squares; NaN with fewer than two usable steps."""
+def slope(
+    steps: Iterable[float], errors: Iterable[float], fitted: tuple[float, float] = (0.0, math.inf)
+) -> float:
+    """Slope of log error over log step by least squares; NaN with fewer than two usable steps.
+
+    Usable are those whose error lies between the two of `fitted`.
+    """
     usable = [
         (math.log(step), math.log(error))
         for step, error in zip(steps, errors, strict=True)
-        if math.isfinite(step) and 0.0 < error < math.inf
+        if math.isfinite(step) and fitted[0] < error < fitted[1]
     ]
     if len({step for step, _ in usable}) < 2:
         return math.nan
@@ -616,8 +601,9 @@ def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
     They are given for the median error (`scene` is empty), and scene by scene.
     """
     lines, rows = dict(grouped(frame.sort_index(), "line", "family")), []
+    settings = dict(grouped(levels, "model", "reference"))
     for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):
-        mine = _of(levels, model=model, reference=reference)
+        mine = settings[model, reference]
         rows.append((model, reference, slope(mine.step, mine["median"]), ""))
         rows += [
             (model, reference, slope(one.step, one[reference]), scene)
@@ -630,7 +616,7 @@ def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
 def exceptions_of(frame: pd.DataFrame, orders: pd.DataFrame) -> Iterable[str]:
     """The wall scenes in which a model does not converge to the unilateral one, a line each."""
     lines = dict(grouped(frame, "line", "family"))
-    for one in _of(orders, reference=REFERENCES[0]).itertuples():
+    for one in orders[orders.reference == REFERENCES[0]].itertuples():
         errors = lines[one.model, one.scene][REFERENCES[0]].tolist() if one.scene else [math.inf]
         slow = errors[-1] > ROUNDED and not one.order >= LEAST_ORDER
         if math.isfinite(errors[-1]) and (errors[-1] > LEVEL or slow):

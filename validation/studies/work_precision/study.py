@@ -21,6 +21,7 @@ from rockcheck.validation.finding import (
     Panel,
     Plot,
     Series,
+    Style,
     Table,
     Text,
     table_of,
@@ -55,6 +56,8 @@ SHEETS = {
 }
 #: Fresh processes whose start is timed, of which the median counts.
 COLD_STARTS = 3
+#: How a line of the diagrams is drawn, by the end of its name.
+LOOKS: Mapping[str, Style] = {"default": "dots", "adaptive": "marked"}
 #: Below are rounding errors.
 FLOOR = 1e-13
 
@@ -66,6 +69,10 @@ class Measure(Task):
     kind: Literal["batch", "size", "cold start", "saving"]
     name: str
     size: int = 0
+
+    def play(self) -> Sequence[Any]:
+        """The rows of the timing."""
+        return TIMED[self.kind](self.name, self.size)
 
 
 #: Timings by kind: a name and a size give rows.
@@ -151,30 +158,19 @@ class WorkPrecision(Study):
     def _convergence(self) -> Iterator[Task]:
         lines = [line for line in LINES.values() if line.converge and not not_installed(line.model)]
         for place, line, name in itertools.product(
-            (2, 1, 0), lines, QUICK_WALLS if self.quick else tuple(WALLS)
+            (1, 0) if self.quick else (2, 1, 0), lines, QUICK_WALLS if self.quick else WALLS
         ):
             bounces = WALLS[name].member(0).walls[0].restitution > 0.0
-            if (
-                place < len(line.converge)
-                and not (place == 2 and self.quick)
-                and not (line.model == "drake" and bounces)
-            ):
+            if place < len(line.converge) and not (line.model == "drake" and bounces):
                 value = line.converge[place]
                 yield Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
-
-    @staticmethod
-    def play(task: Any) -> Sequence[Row]:
-        """The rows of a task."""
-        if isinstance(task, Play):
-            return [runs.play(task)]
-        return TIMED[task.kind](task.name, task.size)
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
         played = (one for one in done.values() if not isinstance(one, Failure))
         rows = list(itertools.chain.from_iterable(played))
         rows += [
-            runs.lost(task, one.reason)
+            task.record(failure=one.reason)
             for task, one in done.items()
             if isinstance(task, Play) and isinstance(one, Failure)
         ]
@@ -312,7 +308,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         folded=True,
     )
     kept = ["family", "line", "value", "runs", "failed", "cpu", "rms", "rms_worst"]
-    costs = [runs.at_the_cost(one, pooled) for one in pooled.itertuples()]
+    costs = runs.at_the_cost(pooled)
     engines = pooled[kept].assign(at_the_cost=costs).rename(columns={"family": "kind"})
     how: Any = {"on": "page", "folded": True}
     yield _table("engines", engines, title="Engines over whole kinds of scenes", **how)
@@ -325,7 +321,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
 
 def _about(family: str) -> tuple[float, float]:
     members = [prepared(family, k) for k in range(MEMBERS)]
-    return median(one.horizon for one in members), median(one.model_form for one in members)
+    return median(one.scene.duration for one in members), median(one.model_form for one in members)
 
 
 def _table(name: str, frame: pd.DataFrame, **more: Any) -> Table:
@@ -337,35 +333,38 @@ def _spread(label: str, trends: pd.DataFrame) -> list[Any]:
     orders, ratios = (
         sorted(trends[name][np.isfinite(trends[name])]) for name in ("order", "ratio")
     )
-    spread = f"{ratios[0]:.3g} to {ratios[-1]:.3g}" if ratios else "-"
     return [
         label,
         orders[len(orders) // 2] if orders else None,
-        spread,
+        f"{ratios[0]:.3g} to {ratios[-1]:.3g}" if ratios else "-",
         f"{len(ratios)} of {len(trends)} scenes",
     ]
+
+
+def _form_of(form: float) -> Series:
+    """The level that no error against the other reference can fall below."""
+    return Series("model form: EBM against unilateral", y=[form], style="level")
 
 
 def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
     """Median error with its 10-90 % band over CPU time: a panel a family, a line a model."""
     panels = []
     for family in families:
-        series = []
         shown = points[(points.family == family) & (points.rms > 0.0)]
         shown = shown[np.isfinite(shown.rms) & np.isfinite(shown.cpu)]
-        for (label,), mine in runs.grouped(shown, "line"):
-            style: Any = {"default": "dots", "adaptive": "marked"}.get(label.split()[-1], "line")
-            band = mine.rms_10.clip(lower=FLOOR).tolist(), mine.rms_90.clip(upper=3.0).tolist()
-            lines = mine.cpu.tolist(), mine.rms.tolist(), *band
-            series.append(Series(label, *lines, LINES[label].model, style))
-        series.append(
+        series = [
             Series(
-                "model form: EBM against unilateral",
-                y=[max(_about(family)[1], FLOOR)],
-                style="level",
+                label,
+                mine.cpu.tolist(),
+                mine.rms.tolist(),
+                mine.rms_10.clip(lower=FLOOR).tolist(),
+                mine.rms_90.clip(upper=3.0).tolist(),
+                LINES[label].model,
+                LOOKS.get(label.split()[-1], "line"),
             )
-        )
-        panels.append(Panel(family, series))
+            for (label,), mine in runs.grouped(shown, "line")
+        ]
+        panels.append(Panel(family, [*series, _form_of(max(_about(family)[1], FLOOR))]))
     return Plot(
         title.lower().replace(" ", "-"),
         f"Work and precision: {title.lower()}",
@@ -388,16 +387,16 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         Column("model", kind="model"),
         Column("value", "setting", brief=False),
         Column("step", "step", "s", digits=2),
+        *itertools.chain.from_iterable(
+            (
+                Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
+                Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
+                text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
+                Column(f"order_{reference}", "order", digits=3),
+            )
+            for reference in REFERENCES
+        ),
     ]
-    for reference in REFERENCES:
-        columns += [
-            Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
-            Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
-        ]
-        columns += [
-            text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
-            Column(f"order_{reference}", "order", digits=3),
-        ]
     rows = []
     for (model, value), both in runs.grouped(levels, "model", "value"):
         cells = [
@@ -422,18 +421,18 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
 def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
     panels = []
     for reference in REFERENCES:
-        series = []
         good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
+        series = []
         for (model,), mine in runs.grouped(levels[levels.reference == reference], "model"):
-            for name in WALLS:
-                line = good.get((model, name), frame[:0])
-                points = line.step.tolist(), line[reference].tolist()
-                series.append(Series(model, *points, look=model, style="thin"))
+            lines = [good.get((model, name), frame[:0]) for name in WALLS]
+            series += [
+                Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
+                for one in lines
+            ]
             medians = mine["median"].clip(upper=3.0).tolist()
             series.append(Series(model, mine.step.tolist(), medians, look=model))
-        if reference == "ebm":
-            series.append(Series("model form: EBM against unilateral", y=[form], style="level"))
-        panels.append(Panel(f"against {reference}", series))
+        form_of = [_form_of(form)] if reference == "ebm" else []
+        panels.append(Panel(f"against {reference}", [*series, *form_of]))
     return Plot(
         "error-over-step",
         panels=panels,

@@ -7,11 +7,11 @@ without it.
 
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
-import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -29,7 +29,7 @@ from rockcheck.scenes import Floor, ModelFailure, Record, Scene, Wall, load_scen
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Model, build, not_installed
-from rockcheck.validation.studies.work_precision.runs import pulse
+from rockcheck.validation.studies.work_precision.runs import pulse, pulse_of
 
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
@@ -43,13 +43,15 @@ SIZES, QUICK_SIZES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000), (1, 100, 10
 
 @dataclass(frozen=True)
 class BatchCase:
-    """A batch: what it is, the model's settings, and how its runs are packed."""
+    """A batch: what it is, and the model's settings.
+
+    `scene` is played under a grid of pulses; None: El Centro at several scales, to the end.
+    """
 
     name: str
     words: str
     settings: dict[str, Any]
-    packed: Callable[[EventBasedModel, int], Packed]
-    until_decided: bool = True
+    scene: Scene | None = None
 
 
 @dataclass(frozen=True)
@@ -114,57 +116,35 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
     frequency, amplitude = np.meshgrid(
         np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes)
     )
-    return _pulse(scene, frequency.ravel(), amplitude.ravel())
-
-
-def _pulse(scene: Scene, frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
-    """Amplitudes (m/s^2) and periods (s) of pulses.
-
-    `frequency` is over p, `amplitude` over g tan(alpha).
-    """
-    strength = amplitude * scene.gravity * math.tan(scene.block.alpha)
-    return strength, 2.0 * math.pi / (frequency * scene.frequency_parameter)
-
-
-def _pulses(scene: Scene) -> Callable[[EventBasedModel, int], Packed]:
-    return lambda model, nodes: pack_pulses(scene, model, *grid(scene, nodes))
-
-
-def _records(model: EventBasedModel, nodes: int) -> Packed:
-    scene = load_scene("fig4a")
-    louder = (
-        scene.excitation.scaled(scale / 1.6) for scale in np.linspace(1.4, 1.8, nodes).tolist()
-    )
-    return pack(
-        [
-            scene.replace(excitation=record, duration=scene.excitation.quiet_after)
-            for record in louder
-        ],
-        model,
-    )
+    return pulse_of(scene, frequency.ravel(), amplitude.ravel())
 
 
 BESIDE = PLAIN.replace(walls=(Wall(side="left", gap=0.053),))
 CASES = (
-    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, _pulses(PLAIN)),
-    BatchCase("friction", "μ 0.3, no wall", {}, _pulses(PLAIN)),
-    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, _pulses(BESIDE)),
-    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, _pulses(BESIDE)),
-    BatchCase(
-        "El Centro",
-        "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end",
-        {},
-        _records,
-        until_decided=False,
-    ),
+    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, PLAIN),
+    BatchCase("friction", "μ 0.3, no wall", {}, PLAIN),
+    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, BESIDE),
+    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, BESIDE),
+    BatchCase("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}),
 )
+
+
+def packed_of(case: BatchCase, model: EventBasedModel, nodes: int) -> Packed:
+    """The runs of a batch: `nodes` pulses along each axis of the grid, or `nodes` scales."""
+    if case.scene is not None:
+        return pack_pulses(case.scene, model, *grid(case.scene, nodes))
+    scene = load_scene("fig4a")
+    motion, scales = scene.excitation, np.linspace(1.4, 1.8, nodes).tolist()
+    louder = [motion.scaled(scale / 1.6) for scale in scales]
+    scenes = [scene.replace(excitation=one, duration=motion.quiet_after) for one in louder]
+    return pack(scenes, model)
 
 
 def batch_size(runs: int, threads: int) -> BatchSize:
     """Times a batch of `runs` random pulses on `threads` threads."""
     scene, model = PLAIN, EventBasedModel(tolerance=LEVEL)
     random = np.random.default_rng(1)
-    pulses = _pulse(
+    pulses = pulse_of(
         scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs)
     )
     cost = _timed(
@@ -182,8 +162,9 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     """
     case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
-    packed = case.packed(reference_model, nodes)
-    play = partial(run_batch, packed, until_decided=case.until_decided, strict=False, jobs=1)
+    packed = packed_of(case, reference_model, nodes)
+    decided = case.scene is not None
+    play = partial(run_batch, packed, until_decided=decided, strict=False, jobs=1)
     reference = play(reference_model)
     costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
     found, ones, rows = {}, [], []
@@ -497,62 +478,81 @@ def _mujoco_steps() -> Iterator[Pair]:
         path = Path(folder) / "world.xml"
         mujoco.mj_saveLastXML(str(path), world.model)
         text = path.read_text(encoding="utf-8")
-    whole, lean = _loaded(text), _loaded(text, _unpaired)
+    models = {thing: _loaded(text, thing) for thing in ("", *CHANGES)}
+    bare = models["contact pairs"]
 
-    def one_by_one(model: Any) -> Play:
-        def steps(data: Any) -> None:
-            for _ in range(_STEPS):
-                mujoco.mj_step(model, data)
-
-        return _timed(steps, _STEPS, lambda: _started(model))
+    def steps(model: Any, data: Any) -> None:
+        for _ in range(_STEPS):
+            mujoco.mj_step(model, data)
 
     def native(data: Any) -> None:
-        start = np.empty(mujoco.mj_stateSize(lean, mujoco.mjtState.mjSTATE_FULLPHYSICS))
-        mujoco.mj_getState(lean, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        rollout.rollout(lean, data, start, nstep=_STEPS)
+        start = np.empty(mujoco.mj_stateSize(bare, mujoco.mjtState.mjSTATE_FULLPHYSICS))
+        mujoco.mj_getState(bare, data, start, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+        rollout.rollout(bare, data, start, nstep=_STEPS)
 
+    played = {
+        thing: _timed(partial(steps, model), _STEPS, partial(_started, model))
+        for thing, model in models.items()
+    }
+    whole, lean = played[""], played["contact pairs"]
+    swift = _timed(native, _STEPS, partial(_started, bare))
     for thing, dear, cheap, remark in (
-        (
-            "contact pairs",
-            one_by_one(whole),
-            one_by_one(lean),
-            "wall pairs out of reach against none",
-        ),
+        ("contact pairs", whole, lean, "wall pairs out of reach against none"),
         (
             "collision search",
-            one_by_one(_loaded(text, _all_collide)),
-            one_by_one(whole),
+            played["collision search"],
+            whole,
             "search among all geoms against listed pairs",
         ),
         (
             "out-of-plane motion",
-            one_by_one(_loaded(text, _solid)),
-            one_by_one(whole),
+            played["out-of-plane motion"],
+            whole,
             "a free joint against two slides and a hinge",
         ),
         (
             "unused features",
-            one_by_one(_loaded(text, _flagged)),
-            one_by_one(whole),
+            played["unused features"],
+            whole,
             "energies, accelerometer and gyro that nobody reads",
         ),
-        (
-            "Python between steps",
-            one_by_one(lean),
-            _timed(native, _STEPS, lambda: _started(lean)),
-            "against mujoco.rollout",
-        ),
+        ("Python between steps", lean, swift, "against mujoco.rollout"),
     ):
         yield "mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark
 
 
-def _loaded(text: str, change: Callable[[ET.Element], None] = lambda root: None) -> Any:
-    """MuJoCo's model of a description that is changed before."""
+#: Changes of MuJoCo's description of the scene, by what is not needed: patterns and what takes
+#: their place. "contact pairs": no corner meets the wall that is out of reach. "collision search":
+#: every corner meets every surface, found by the engine's broad phase in place of the pairs.
+#: "unused features": energies and two sensors that nobody reads.
+CHANGES = {
+    "contact pairs": [(r'<pair geom1="left".*?/>', "")],
+    "collision search": [
+        (r"(?s)<contact>.*?</contact>", ""),
+        (
+            'contype="0" conaffinity="0"',
+            'contype="1" conaffinity="1" condim="3" friction="1 0 0"',
+        ),
+    ],
+    "out-of-plane motion": [(r"(?s)<joint.*<joint .*?/>", "<freejoint/>")],
+    "unused features": [
+        ("<flag ", '<flag energy="enable" '),
+        ("</body>", '<site name="centre"/></body>'),
+        (
+            "</mujoco>",
+            '<sensor><accelerometer site="centre"/><gyro site="centre"/></sensor></mujoco>',
+        ),
+    ],
+}
+
+
+def _loaded(text: str, change: str = "") -> Any:
+    """MuJoCo's model of a description, with one of `CHANGES`."""
     import mujoco
 
-    root = ET.fromstring(text)
-    change(root)
-    model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
+    for pattern, new in CHANGES.get(change, ()):
+        text = re.sub(pattern, new, text)
+    model = mujoco.MjModel.from_xml_string(text)
     model.opt.gravity[:] = 0.0, 0.0, -9.81
     model.opt.timestep = 1e-3
     # The one-step contact that the engine's march sets, for pairs and for geoms alike.
@@ -572,40 +572,6 @@ def _started(model: Any) -> Any:
     else:
         data.qpos[:] = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
     return data
-
-
-def _solid(root: ET.Element) -> None:
-    body = next(root.iter("body"))
-    for joint in body.findall("joint"):
-        body.remove(joint)
-    body.insert(0, ET.Element("freejoint"))
-
-
-def _flagged(root: ET.Element) -> None:
-    """Energies, two sensors, and a touch of actuation that nobody reads."""
-    option = next(root.iter("option"))
-    flags = option.find("flag")
-    (ET.SubElement(option, "flag") if flags is None else flags).set("energy", "enable")
-    ET.SubElement(next(root.iter("body")), "site", {"name": "centre"})
-    sensors = ET.SubElement(root, "sensor")
-    ET.SubElement(sensors, "accelerometer", {"site": "centre"})
-    ET.SubElement(sensors, "gyro", {"site": "centre"})
-
-
-def _unpaired(root: ET.Element) -> None:
-    """No contact with the wall that is out of reach."""
-    contact = next(root.iter("contact"))
-    for pair in contact.findall("pair"):
-        if "floor" not in (pair.get("geom1"), pair.get("geom2")):
-            contact.remove(pair)
-
-
-def _all_collide(root: ET.Element) -> None:
-    """Every corner with every surface, found by the engine's broad phase in place of the pairs."""
-    root.remove(next(root.iter("contact")))
-    collides = {"contype": "1", "conaffinity": "1", "condim": "3", "friction": "1 0 0"}
-    for geom in root.iter("geom"):
-        geom.attrib.update(collides)
 
 
 def _pybullet_steps() -> Iterator[Pair]:
