@@ -248,9 +248,8 @@ class ContinuousModel(Frozen):
         energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
         gross = energy + 0.01 * scene.gravity * scene.block.half_width
         placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
-        if (
-            sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0
-        ):  # the corner nearer to the mass's centre carries more
+        # The corner nearer to the mass's centre carries more.
+        if sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0:
             left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
             placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
             sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2

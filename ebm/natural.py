@@ -66,22 +66,16 @@ def side_of(block: Block, side: Literal["left", "right"]) -> np.record:
         turns = {"tip_sin": sine, "tip_cos": cosine, "far_sin": sine, "far_cos": cosine}
         corners = {"alpha": alpha, "radius": 1.0, "top_alpha": alpha, "top_radius": 1.0}
         return filled(SIDE, **corners, **turns, arm=arm, share=0.75)
-    pivot, other, unit = (
-        block.pivot(side),
-        block.pivot("right" if side == "left" else "left"),
-        block.radius,
-    )
-    top, square, radius = (
-        2.0 * block.half_height - pivot.height,
-        pivot.radius**2,
-        pivot.radius / unit,
-    )
+    pivot, other = block.pivot(side), block.pivot("right" if side == "left" else "left")
+    unit = block.radius
+    top, radius = 2.0 * block.half_height - pivot.height, pivot.radius / unit
+    square = pivot.radius**2
     return filled(
         SIDE,
         alpha=pivot.alpha,
         radius=radius,
-        arm=radius
-        * math.sin(pivot.alpha),  # as gaps have it: flush with a wall they are 0 to the bit
+        # As gaps have it: flush with a wall they are 0 to the bit.
+        arm=radius * math.sin(pivot.alpha),
         top_alpha=math.atan2(pivot.arm, top),
         top_radius=math.hypot(pivot.arm, top) / unit,
         tip_sin=pivot.arm * (pivot.height + top) / square,

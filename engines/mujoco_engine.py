@@ -102,10 +102,8 @@ def stock_model(scene: Scene, settings: str = "") -> str:
         )
         for surface in surfaces_of(scene)
     )
-    (dx, dz), size = (
-        block.offset,
-        f"{block.half_width!r} {block.half_width!r} {block.half_height!r}",
-    )
+    dx, dz = block.offset
+    size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
     place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
     box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
     return model_of(scene, planes, box, settings)
@@ -182,9 +180,8 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             self.slowing[:] = self.stopping * (IMPEDANCE / dt)
             self.tuned = dt, bouncing
         self.mujoco.mj_step1(model, data)
-        data.efc_D.fill(
-            RIGID
-        )  # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up
+        # MuJoCo caps the impedance, and with it the share of an impact that its contacts take up.
+        data.efc_D.fill(RIGID)
         self.mujoco.mj_fwdAcceleration(model, data)
         self.mujoco.mj_fwdConstraint(model, data)
         if self.friction > 0.0 and (rows := self._slipping_rows()):
@@ -211,10 +208,8 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         the slip rate before the step.
         """
         model, data, count = self.model, self.data, len(rows)
-        original, tangents = (
-            data.efc_aref.copy(),
-            data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]],
-        )
+        original = data.efc_aref.copy()
+        tangents = data.efc_J.reshape(-1, 3)[[row + 2 for row in rows]]
         guess: list[float] = np.abs(tangents @ self.qvel).tolist()
         slope = [-1.0] * count  # of the excess over the guess
         last: list[tuple[float, float]] = []

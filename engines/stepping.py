@@ -256,10 +256,8 @@ def drift(run: March, corners: Floats, dt: float) -> None:
         for i in range(first, end):
             if run.closed[i]:
                 bx, bz, nx, nz, distance = corners[i]
-                highest, last = (
-                    max(highest, _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))),
-                    i,
-                )
+                gap = _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))
+                highest, last = max(highest, gap), i
         if last >= 0:
             bx, bz, nx, nz, _ = corners[last]
             px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)

@@ -22,9 +22,8 @@ from rockcheck.engines.world import FloatArray, Vector, World
 from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
-Marched = tuple[
-    FloatArray, FloatArray, FloatArray
-]  # times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2)
+#: Times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2).
+Marched = tuple[FloatArray, FloatArray, FloatArray]
 STEPS_AT_ONCE = 2048
 #: Where a block lies on its side: contacts stop it a hair before a quarter turn, or after it.
 LYING = math.pi / 2 - 1e-6

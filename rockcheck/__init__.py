@@ -10,9 +10,8 @@ import os
 
 import lazy_loader
 
-if os.path.isfile(
-    os.path.join(os.path.dirname(__file__), "scenes")
-):  # git writes a file where it may make no link
+# Git writes a file where it may make no link.
+if os.path.isfile(os.path.join(os.path.dirname(__file__), "scenes")):
     raise ImportError(
         "rockcheck/scenes is no link to scenes/: git config core.symlinks true, then check out"
         " again"

@@ -115,10 +115,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{printable(path)}: a key of more than 50 parts")
     try:
         return tomllib.loads(text)
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # such as an integer of more digits than Python reads
+    except (ValueError, RecursionError) as error:  # an integer may have too many digits to read
         raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
 
 

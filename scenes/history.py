@@ -255,9 +255,8 @@ class History(Shown):
         frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()
-        if len(frame) and not isinstance(
-            frame.index, pd.RangeIndex
-        ):  # pandas would take the first column for names of rows
+        # pandas would take the first column for names of rows.
+        if len(frame) and not isinstance(frame.index, pd.RangeIndex):
             raise InputError(f"{shown}: rows have more values than the heading has columns")
         about, block = _about_of(frame, shown)
         channels = _checked_channels(frame, shown)

@@ -185,11 +185,7 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
         raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
     except InputError:
         raise
-    except (
-        ValueError,
-        OverflowError,
-        RecursionError,
-    ) as error:  # pandas' own parser errors are ValueErrors
+    except (ValueError, OverflowError, RecursionError) as error:  # of pandas' parser, too
         raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
 
 

@@ -112,9 +112,8 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
             linewidth=0.9,
             label=history.model,
         )
-    if known and any(
-        history.overturned_at is not None for history in histories
-    ):  # beyond the balance point the motion is only the fall
+    # Beyond the balance point the motion is only the fall.
+    if known and any(history.overturned_at is not None for history in histories):
         low, high = axes.get_ylim()
         axes.set_ylim(max(low, -FALLEN), min(high, FALLEN))
     axes.set_ylabel("θ / α" if known else "θ, rad")

@@ -257,9 +257,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
             return _told(str(error), 3)
         except (KeyboardInterrupt, typer.Abort):
             code = INTERRUPTED
-        except (
-            OSError
-        ) as error:  # a disk that is full, a folder that has gone: what was written before is whole
+        except OSError as error:  # a full disk: what was written before is whole
             return _told(
                 f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used:"
                 f" {error.strerror or error}",

@@ -150,9 +150,8 @@ class Store:
                 else path.with_name(re.sub(r"(\.events)?\.csv(\.gz)?$", ".json", path.name))
             )
             used = record if record.is_file() else path
-            with contextlib.suppress(
-                OSError
-            ):  # another run was quicker, or it is a folder, which is not ours
+            # Another run was quicker, or it is a folder, which is not ours.
+            with contextlib.suppress(OSError):
                 if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
                     path.unlink()
 

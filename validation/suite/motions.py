@@ -192,11 +192,8 @@ class Pulse(Frozen):
 
     def draw(self, chance: np.random.Generator) -> Record:
         """One pulse, sampled."""
-        phase, period, amplitude = (
-            chance.uniform(0.0, 2.0 * math.pi),
-            self.period.draw(chance),
-            self.amplitude.draw(chance),
-        )
+        phase = chance.uniform(0.0, 2.0 * math.pi)
+        period, amplitude = self.period.draw(chance), self.amplitude.draw(chance)
         t = np.arange(0.0, 4.0 * period, RECORD_STEP)
         even, odd = (
             Ricker(amplitude=1.0, period=period, symmetric=symmetric).acceleration(t)

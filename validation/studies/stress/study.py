@@ -166,9 +166,8 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     "blows up", "sinks", "gains energy", or why the model refuses the scene.
     """
     unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
-    scene = scene.replace(
-        output_step=max(scene.output_step, step * unit)
-    )  # the CM ends a step at each row
+    # The CM ends a step at each row.
+    scene = scene.replace(output_step=max(scene.output_step, step * unit))
     # The CM's contact is as stiff as the block's size asks for.
     stiff = {"penetration": 1e-7 * radius} if line.family == "cm" else {}
     try:
@@ -183,9 +182,8 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
         return "blows up"
     motion = Motion(scene, history)
     speed = float(np.max(np.hypot(motion.channels["x_dot"], motion.channels["y_dot"])))
-    if (
-        motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius
-    ):  # the depth of one step is no fault
+    # The depth of one step is no fault.
+    if motion.deepest > DEEPEST + 2.0 * step * speed * unit / radius:
         return "sinks"
     return "gains energy" if energy_without_source(motion) > MOST_ENERGY else ""
 
