@@ -9,8 +9,16 @@ from collections.abc import Sequence
 
 #: Start of the program, by `time.perf_counter`.
 BEGAN = time.perf_counter()
-# The memory goes back to the system as a whole: a last search for garbage would take 0.3 s.
-atexit.register(gc.freeze)
+
+
+@atexit.register
+def _leave_garbage() -> None:
+    """Gives the memory back as a whole: a last search for garbage would take 0.3 s.
+
+    Box2D's binding needs it: it would list on stderr all that it still holds.
+    """
+    if "pyb2d3" not in sys.modules:
+        gc.freeze()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

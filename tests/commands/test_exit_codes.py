@@ -102,6 +102,15 @@ def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, read
     assert len(done.stderr.splitlines()) == (expected != 0)
 
 
+@pytest.mark.needs("box2d")
+def test_no_binding_tells_what_it_still_holds_at_the_end(tmp_path):
+    words = ["simulate", "fig5a", "--model", "box2d", "--quiet"]
+    done = subprocess.run(
+        [*ROCKCHECK, *words], capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
 def a_run() -> Run:
     return Run(
         suite="s",

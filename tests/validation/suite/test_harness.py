@@ -112,7 +112,7 @@ FAULTS = [
         "(vx, vy, w), 1.001 * dt,",
         15,
     ),
-    ("a lost impact", "engines/events.py", r"strikes = _rises\(closed\)", "strikes = _rises(closed)[1:]", 15),
+    ("a lost impact", "engines/events.py", r"= _rises\(closed\)", "= _rises(closed)[1:]", 15),
     (
         "friction 5 % low",
         "ebm/natural.py",
