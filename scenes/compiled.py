@@ -284,6 +284,8 @@ class _Cache(FunctionCache):
     def load(self, key: object) -> Any:
         """The data that `save` wrote; None if there are none, or if they are damaged."""
         path = self._path(key)
+        if not os.path.lexists(path):  # nothing to remove: another process may be about to write it
+            return None
         with contextlib.suppress(OSError, InputError), open_regular(path, MOST_BYTES) as stream:
             content = stream.read()
             if hashlib.sha256(content[32:]).digest() == content[:32]:
