@@ -8,7 +8,6 @@ which `History.expected` and the report read, and the tables of docs/theory.md.
 from __future__ import annotations
 
 import sys
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -49,13 +48,15 @@ def experience_of(runs: Sequence[Run]) -> Experience:
 
 
 def _settings_of(model: str, runs: Iterable[Run]) -> dict[str, tuple[Any, ...]]:
-    """The values of each setting that a model had, but for those that change no motion."""
-    values: defaultdict[str, dict[Any, None]] = defaultdict(dict)
-    for given in [cell.settings for run in runs for cell in run.cells if cell.model == model]:
-        had: Any = build(model, given)
-        for name, value in had.model_dump(exclude=LIMITS, exclude_none=True).items():
-            values[name][value] = None
-    return {name: tuple(found) for name, found in values.items()}
+    """The values of each setting that a model had, but for those that change no motion.
+
+    Those that it has by default: what follows from others, as the stiffness, is left out.
+    """
+    default: Any = build(model)
+    names = default.model_dump(exclude=LIMITS, exclude_none=True)
+    had = [cell.settings for run in runs for cell in run.cells if cell.model == model]
+    given = [settings for settings in had if settings]
+    return {name: tuple(dict.fromkeys(one[name] for one in given)) for name in names}
 
 
 def tables(found: Experience) -> str:

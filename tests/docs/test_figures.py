@@ -15,6 +15,7 @@ from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
 from rockcheck.validation.paper import KEPT, kept_spectra
+from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
 ROOT = Path(__file__).parents[2]
@@ -215,3 +216,24 @@ def test_counts_that_are_stated(monkeypatch):
         for name in ("ebm", "unilateral")
     ]
     assert sum(map(len, rows)) == 960
+
+
+def test_experience_is_learnt_from_a_run(tmp_path):
+    """It keeps the settings that a model can be given, not what follows from them."""
+    import experience
+
+    block = "{ half_width = 0.4, half_height = 1.5 }, floor = { friction = 0.9 }"
+    scenes = ", ".join(
+        f'{{ name = "at {tilt}", duration = 1.0, initial_rotation = {tilt}, block = {block} }}'
+        for tilt in (0.06, 0.08, 0.1, 0.12, 0.15)
+    )
+    suite = tmp_path / "five.toml"
+    suite.write_text(
+        f'reference = "ebm-unilateral"\nscene = [{scenes}]\n'
+        "[models.ebm-unilateral]\n[models.ebm]\n[models.cm]\n"
+    )
+    found = experience.experience_of([run_suite(load_suite(str(suite)), tmp_path / "run")])
+    counts = {model: one["peak_rotation"].count for model, one in found.trust.items()}
+    assert counts == {"cm": 5, "ebm": 5}
+    assert found.settings["cm"] == {"penetration": (1e-8,), "damping_rule": ("calibrated",)}
+    assert found.settings["ebm"]["pivot"] == ("bilateral",)
