@@ -31,6 +31,7 @@ def published(folder: Path) -> None:
 
 
 @pytest.mark.needs("POSIX")
+@pytest.mark.long
 def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> None:
     """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
     pipe."""
@@ -141,10 +142,10 @@ def test_a_run_that_names_what_it_has_not_is_bad_input(
     assert said in told
 
 
-@pytest.mark.parametrize("sign", ["\u202e", "\u2067", "\ud800", "\x9b"])
-def test_text_that_turns_around_reaches_no_page(received: Path, sign: str) -> None:
+@pytest.mark.parametrize("signs", ["\u202e\u2067\x9b", "\ud800"])
+def test_text_that_turns_around_reaches_no_page(received: Path, signs: str) -> None:
     """Also as JavaScript and JSON escape it; half of a pair of UTF-16 is no text at all."""
-    evil = f"gnp{sign}.exe"
+    evil = f"gnp{signs}.exe"
     run = Run.load(received)
     scenes = {name: {**scene, "description": evil} for name, scene in run.scenes.items()}
     cells = [
@@ -168,13 +169,12 @@ def test_text_that_turns_around_reaches_no_page(received: Path, sign: str) -> No
         versions={evil: evil},
     )
     published(received)
-    code = f"{ord(sign):04x}"
+    forms = [form for sign in signs for form in (sign, f"\\u{ord(sign):04x}")]
     for path in received.rglob("*"):
         if (
             path.suffix in (".html", ".js", ".csv", ".md", ".xml", ".svg", ".toml", ".json")
             and path.parent.name != "assets"
         ):
             text = path.read_text(encoding="utf-8").lower()
-            assert sign not in text, path
-            assert f"\\u{code}" not in text, path
-    assert "gnp?.exe" in (received / "index.html").read_text(encoding="utf-8")
+            assert [form for form in forms if form in text] == [], path
+    assert f"gnp{'?' * len(signs)}.exe" in (received / "index.html").read_text(encoding="utf-8")

@@ -227,6 +227,7 @@ def test_only_what_would_show_something_else_is_written_again(
     assert all(again[name] == first[name] for name in first if "beside-a-wall" in name)
 
 
+@pytest.mark.long
 def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_are_wanted(
     tmp_path: Path, finished: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -262,6 +263,7 @@ def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) 
     assert not (tmp_path / PAGES / "nobody-s.html").exists()
 
 
+@pytest.mark.long
 def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     tmp_path: Path, finished: Run, refused
 ) -> None:
