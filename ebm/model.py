@@ -1,6 +1,7 @@
 """The event-based models: `ebm`, `ebm-unilateral` and `ebm-bouc-wen`."""
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal, Self
@@ -135,21 +136,26 @@ class EventBasedModel(Frozen):
         )
         states, work = packed.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
-        # Compiled or loaded here, so that no run's time holds it.
-        loop = packed.loop_of(self, given.rows, states, work, records, kept)
+        runs = given.rows, states, work, records, kept
 
-        def play(most_steps: int) -> int:
+        def play(loop: Callable[..., None], most_steps: int) -> int:
             states["control"]["most_steps"] = most_steps
-            loop(given.rows, states, work, records, kept)
+            loop(*runs)
             return int(kept["ending"][0])
 
-        ready, cpu = time.perf_counter(), time.process_time()
         # A run of few steps is played here: to hand it over takes longer. Each sample of a record
-        # is a step.
-        few = min(self.most_steps, _AT_ONCE if len(given.rows.samples) < _AT_ONCE else 0)
-        ending = play(few) if few else names.Ending.TOO_MANY_STEPS
+        # is a step. What is compiled or loaded is so before the clock starts.
+        slow = packed.interpreted_loop(self, *runs)
+        at_once = _INTERPRETED if slow else _AT_ONCE
+        few = min(self.most_steps, at_once if len(given.rows.samples) < at_once else 0)
+        loop = slow if slow and few else packed.loop_of(self, *runs)
+        ready, cpu = time.perf_counter(), time.process_time()
+        ending = play(loop, few) if few else names.Ending.TOO_MANY_STEPS
         if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
-            ending = interruptible(partial(play, self.most_steps))
+            if loop is slow:
+                loop = packed.loop_of(self, *runs)
+                ready, cpu = time.perf_counter(), time.process_time()
+            ending = interruptible(partial(play, loop, self.most_steps))
         seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
         last: Any = kept[0].tolist()
         motion, t, _, _, steps, written, at_rest = last
@@ -205,3 +211,5 @@ class EventBasedModel(Frozen):
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.
 _AT_ONCE = 500
+#: Steps that the interpreter takes faster than the compiler compiles: one in about a millisecond.
+_INTERPRETED = 2500

@@ -17,7 +17,8 @@ from rockcheck.ebm import natural
 from rockcheck.ebm.core import block, march, names
 from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
-from rockcheck.scenes.compiled import for_types_of
+from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
+from rockcheck.scenes.progress import announce, is_one_run
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -148,3 +149,18 @@ def loop_of(model: Any, *given: Any) -> Callable[..., None]:
     if model.friction not in _READY:
         _READY[model.friction] = for_types_of(march.LOOPS[model.friction], *given)
     return _READY[model.friction]
+
+
+def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
+    """The event loop for a single run that need not wait for the compiler; None where it must.
+
+    It need not if the loop is not compiled yet, and steps are long: Bouc-Wen friction is stiff.
+    """
+    loop = march.LOOPS[model.friction]
+    if not is_one_run() or model.friction == "bouc-wen" or is_ready(loop, *given):
+        return None
+    announce(
+        f"{model.name} is not compiled for this machine yet, and a short run is interpreted: the"
+        " same figures, later (`rockcheck warm` compiles)"
+    )
+    return interpreted(loop)

@@ -293,6 +293,10 @@ class _Cache(FunctionCache):
         self._drop(path)
         return None
 
+    def holds(self, signature: Any, codegen: Any) -> bool:
+        """Whether there is a file for a signature, whole or not."""
+        return self._path(self._index_key(signature, codegen)).exists()
+
     def save(self, key: object, data: object) -> None:
         """Write numba's data of a compiled function, whole or not at all."""
         path = self._path(key)
@@ -342,6 +346,25 @@ def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
         Callable[..., Any],
         compiled.compile(tuple(compiled.typeof_pyval(argument) for argument in args)),
     )
+
+
+def is_ready(compiled: Any, *args: Any) -> bool:
+    """Whether a kernel runs at once for the types of these arguments: nothing is to be compiled."""
+    if config.DISABLE_JIT:
+        return True
+    signature = tuple(compiled.typeof_pyval(argument) for argument in args)
+    cache, codegen = compiled._cache, compiled.targetctx.codegen()
+    return signature in compiled.overloads or (
+        isinstance(cache, _Cache) and cache.holds(signature, codegen)
+    )
+
+
+def interpreted(compiled: Any) -> Callable[..., Any]:
+    """The function of a kernel, for Python: the same figures, to the bit, a thousand times slower.
+
+    The kernels that it calls must be inner ones.
+    """
+    return np.errstate(all="ignore")(compiled.py_func)
 
 
 class _Inner(CPUDispatcher):

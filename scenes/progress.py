@@ -88,6 +88,24 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
         announce_by(before)
 
 
+_one_run: ContextVar[bool] = ContextVar("one_run", default=False)
+
+
+@contextmanager
+def one_run() -> Iterator[None]:
+    """Within this block a short run does not wait for the compiler: nothing else will be played."""
+    token = _one_run.set(True)
+    try:
+        yield
+    finally:
+        _one_run.reset(token)
+
+
+def is_one_run() -> bool:
+    """Whether this thread is in a block of `one_run`."""
+    return _one_run.get()
+
+
 class _Runner:
     """A thread that runs the main thread's kernels, one after another."""
 

@@ -24,7 +24,7 @@ from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import check_format
-from rockcheck.scenes.progress import listening
+from rockcheck.scenes.progress import listening, one_run
 from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.execute import workers
 from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, is_own
@@ -76,7 +76,7 @@ def run(
     for path in files:
         check_file(path, "--output", checks.get(path, kind_of))
     title = f"{what.name}, {model}"
-    with playing(title, [(model, given)]) as on_progress, listening(on_progress):
+    with playing(title, [(model, given)]) as on_progress, listening(on_progress), one_run():
         history = simulate(what)
     try:
         for path in histories:

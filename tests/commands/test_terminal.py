@@ -77,6 +77,14 @@ def on_a_terminal(*words, columns=80):
     return said.decode()
 
 
+def test_a_first_simulation_does_not_wait_for_the_compiler(tmp_path):
+    done = rockcheck("simulate", "fig5a", "-o", "a.csv", NUMBA_CACHE_DIR=str(tmp_path / "empty"))
+    assert done.returncode == 0, done.stderr
+    assert "a short run is interpreted" in done.stderr
+    assert "compiling" not in done.stderr
+
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_help_has_an_example_that_the_command_understands(name, typed):
     text = " ".join(typed(name, "--help")[0].split())

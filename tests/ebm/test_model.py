@@ -1,12 +1,14 @@
 """What the event-based models accept, refuse and report."""
 
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, InputError, Record, Rest, Scene, Wall, load_scene
+from rockcheck.ebm import EventBasedModel, packed
+from rockcheck.scenes import Floor, InputError, Record, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes.progress import one_run
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 
@@ -126,6 +128,39 @@ def test_history_of_a_paper_scene():
         "the horizontal record ends at 31.18 s, before the scene's 36 s; the base is at rest after"
         " it",
     )
+
+
+@pytest.mark.parametrize(
+    ("settings", "steps"),
+    [
+        ({}, 2500),
+        ({"pivot": "unilateral"}, 2500),
+        ({"friction": "no-slip"}, 2500),
+        ({"pivot": "unilateral"}, 200),
+        ({"friction": "bouc-wen"}, 2500),
+    ],
+    ids=str,
+)
+def test_a_single_short_run_does_not_wait_for_the_compiler(monkeypatch, settings, steps):
+    """It is interpreted, the same to the bit; compiled if that takes many steps, or if friction is
+    stiff."""
+    model, scene = EventBasedModel(**settings), load_scene("fig5a").replace(duration=3.0)
+    scene = scene.replace(excitation=Ricker(amplitude=4.0, period=1.2, symmetric=True))
+    expected = model.simulate(scene)
+    interpreted, compiled = (Mock(wraps=one) for one in (packed.interpreted, packed.loop_of))
+    monkeypatch.setattr(packed, "interpreted", interpreted)
+    monkeypatch.setattr(packed, "loop_of", compiled)
+    monkeypatch.setattr(packed, "is_ready", lambda *given: False)
+    monkeypatch.setattr("rockcheck.ebm.model._INTERPRETED", steps)
+    with one_run():
+        found = model.simulate(scene)
+    stiff = model.friction == "bouc-wen"
+    assert interpreted.called != stiff
+    assert compiled.called == (stiff or steps < found.cost.steps)
+    assert found.event_list == expected.event_list
+    assert (found.outcome, found.cost.steps) == (expected.outcome, expected.cost.steps)
+    for name, channel in expected.channels.items():
+        np.testing.assert_array_equal(found.channels[name], channel)
 
 
 def test_note_where_a_record_is_short():

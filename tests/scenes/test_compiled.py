@@ -124,6 +124,18 @@ def test_an_inner_kernel_is_linked_and_no_machine_code_is_made_of_it_alone(monke
     assert lowest(1, 2) == 1  # for Python it stays the function that it is
 
 
+def test_a_kernel_is_ready_once_it_is_compiled_or_kept(tiny, play):
+    """Before, the interpreter plays it; it says the same."""
+    begins = 'if __name__ == "__main__":\n'
+    asked = "    print(is_ready(doubled, np.ones(1)), interpreted(doubled)(np.array([1.0, 2.0])))\n"
+    source = _TINY.replace(begins, begins + asked)
+    tiny.write_text(
+        source.replace("import inner_kernel", "import inner_kernel, interpreted, is_ready")
+    )
+    assert play("False 6.0\n0 read, 2 compiled") == ""
+    assert play("True 6.0\n2 read, 0 compiled") == ""
+
+
 def test_the_machine_code_for_some_types_is_the_kernel_that_is_kept(tmp_path, play):
     """A loop in Python takes it once: found for the types of tuples and arrays, and read back by
     the next process."""
