@@ -1,7 +1,6 @@
 """The event-based models: `ebm`, `ebm-unilateral` and `ebm-bouc-wen`."""
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any, Literal, Self
@@ -125,7 +124,6 @@ class EventBasedModel(Frozen):
         began = time.perf_counter()
         from rockcheck.ebm import natural, packed
         from rockcheck.ebm.core import names, state
-        from rockcheck.scenes.progress import interruptible
 
         given, unit = packed.pack([scene], self), natural.time_unit(scene)
         shape = 1, len(scene.output_times)
@@ -136,27 +134,7 @@ class EventBasedModel(Frozen):
         )
         states, work = packed.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
-        runs = given.rows, states, work, records, kept
-
-        def play(loop: Callable[..., None], most_steps: int) -> int:
-            states["control"]["most_steps"] = most_steps
-            loop(*runs)
-            return int(kept["ending"][0])
-
-        # A run of few steps is played here: to hand it over takes longer. Each sample of a record
-        # is a step. What is compiled or loaded is so before the clock starts.
-        slow = packed.interpreted_loop(self, *runs)
-        at_once = _INTERPRETED if slow else _AT_ONCE
-        few = min(self.most_steps, at_once if len(given.rows.samples) < at_once else 0)
-        loop = slow if slow and few else packed.loop_of(self, *runs)
-        ready, cpu = time.perf_counter(), time.process_time()
-        ending = play(loop, few) if few else names.Ending.TOO_MANY_STEPS
-        if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
-            if loop is slow:
-                loop = packed.loop_of(self, *runs)
-                ready, cpu = time.perf_counter(), time.process_time()
-            ending = interruptible(partial(play, loop, self.most_steps))
-        seconds, cpu = time.perf_counter() - ready, time.process_time() - cpu
+        ending, ready, seconds, cpu = self._played(given.rows, states, work, records, kept)
         last: Any = kept[0].tolist()
         motion, t, _, _, steps, written, at_rest = last
         if ending in names.FAILURES:
@@ -207,6 +185,34 @@ class EventBasedModel(Frozen):
         fine, coarse = (theta[: min(map(len, thetas))] for theta in thetas)
         change = np.max(np.abs(fine - coarse)) / scene.block.alpha
         return replace(history, cost=replace(cost, error_estimate=float(change)))
+
+    def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
+        """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
+        from rockcheck.ebm import packed
+        from rockcheck.ebm.core.names import Ending
+        from rockcheck.scenes.progress import interruptible
+
+        runs = rows, states, *work
+        # What is compiled or loaded is so before the clock starts. A run of few steps is played
+        # here: to hand it over takes longer. Each sample of a record is a step.
+        slow = packed.interpreted_loop(self, *runs)
+        at_once = _INTERPRETED if slow else _AT_ONCE
+        few = min(self.most_steps, at_once if len(rows.samples) < at_once else 0)
+        loop = slow if slow and few else packed.loop_of(self, *runs)
+
+        def play(most_steps: int) -> int:
+            states["control"]["most_steps"] = most_steps
+            loop(*runs)
+            return int(work[-1]["ending"][0])
+
+        ready, cpu = time.perf_counter(), time.process_time()
+        ending = play(few) if few else Ending.TOO_MANY_STEPS
+        if ending == Ending.TOO_MANY_STEPS and few < self.most_steps:
+            if loop is slow:
+                loop = packed.loop_of(self, *runs)
+                ready, cpu = time.perf_counter(), time.process_time()
+            ending = interruptible(partial(play, self.most_steps))
+        return ending, ready, time.perf_counter() - ready, time.process_time() - cpu
 
 
 #: Steps that take about as long as to hand a run over to the thread that Ctrl-C need not wait for.

@@ -84,7 +84,6 @@ def test_a_first_simulation_does_not_wait_for_the_compiler(tmp_path):
     assert "compiling" not in done.stderr
 
 
-
 @pytest.mark.parametrize("name", NAMES)
 def test_help_has_an_example_that_the_command_understands(name, typed):
     text = " ".join(typed(name, "--help")[0].split())
