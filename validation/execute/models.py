@@ -32,8 +32,8 @@ class Family:
     libraries: tuple[str, ...] = ()
     #: Whether the block can leave the floor; a model that cannot differs in form from one that can.
     flies: bool = True
-    #: Whether its loop is compiled: a run takes milliseconds.
-    compiled: bool = False
+    #: The loop that is compiled for it, perhaps for others too: a run takes milliseconds.
+    compiled: str = ""
 
 
 ENGINES = "rockcheck.engines"
@@ -50,7 +50,7 @@ FAMILIES: dict[str, Family] = {
         {"pivot": "bilateral", "friction": "coulomb"},
         COMPILED,
         flies=False,
-        compiled=True,
+        compiled="event loop",
     ),
     "ebm-unilateral": Family(
         "rockcheck.ebm",
@@ -58,7 +58,7 @@ FAMILIES: dict[str, Family] = {
         "event-based model whose floor can only push: the block may hop",
         {"pivot": "unilateral", "friction": "coulomb"},
         COMPILED,
-        compiled=True,
+        compiled="event loop",
     ),
     "ebm-bouc-wen": Family(
         "rockcheck.ebm",
@@ -67,7 +67,7 @@ FAMILIES: dict[str, Family] = {
         {"pivot": "bilateral", "friction": "bouc-wen"},
         COMPILED,
         flies=False,
-        compiled=True,
+        compiled="event loop, Bouc-Wen",
     ),
     "cm": Family(
         "rockcheck.cm",
@@ -75,7 +75,7 @@ FAMILIES: dict[str, Family] = {
         "the paper's penalty-based continuous model",
         {},
         COMPILED,
-        compiled=True,
+        compiled="continuous model",
     ),
     "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *STEPPED)),
     "pybullet": Family(
@@ -143,11 +143,11 @@ def has_wheel(name: str) -> bool:
 def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
     """Name of the code that a model's first run on a machine has to compile; empty for none.
 
-    Compiling takes up to a minute, and does not count for the run's time limit: see
-    `execute.pool.Call`. Engines share the code of their adaptive steps.
+    Models share code, as engines share that of their adaptive steps. Compiling takes up to a
+    minute, and does not count for the run's time limit: see `execute.pool.Call`.
     """
     if family(name).module != ENGINES:
-        return name if family(name).compiled else ""
+        return family(name).compiled
     return ADAPTIVE if getattr(build(name, settings), "time_step", None) == ADAPTIVE else ""
 
 

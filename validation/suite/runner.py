@@ -478,7 +478,7 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
         items,
         key=lambda item: (
             not item.compiles or first[item.compiles] is not item,
-            family(item.variant.family).compiled,
+            family(item.variant.family).compiled != "",
             -item.scene.duration * (1 + len(item.scene.walls)),
         ),
     )

@@ -317,7 +317,8 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
 @pytest.mark.parametrize(
     ("model", "settings", "compiled"),
     [
-        ("ebm", "", "ebm"),
+        ("ebm", "", "event loop"),
+        ("ebm-unilateral", "", "event loop"),
         ("mujoco", "", "adaptive"),
         ("pymunk", "largest_step = 1e-3", "adaptive"),
         ("mujoco", 'settings = "default"', ""),
@@ -339,9 +340,9 @@ def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     longer."""
     study = SuiteStudy(load_suite("paper"), tmp_path)
     begun = [(cell.variant.label, cell.place) for cell in in_order(study.items)]
-    first = ("mujoco", "ebm-unilateral", "ebm", "cm")
-    assert begun[:4] == [(model, "fig4a") for model in first]
-    engines = begun[4:11]
+    first = ("mujoco", "ebm-unilateral", "cm")
+    assert begun[:3] == [(model, "fig4a") for model in first]
+    engines = begun[3:10]
     assert {model for model, _ in engines} == {"mujoco", "pybullet"}
     assert [scene[:4] for _, scene in engines] == 4 * ["fig5"] + 3 * ["fig4"]
 

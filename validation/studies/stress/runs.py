@@ -21,7 +21,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute.models import build, compiles
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -534,7 +534,7 @@ def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
         count,
         seconds=PATIENCE + count * a_run,
         expected=count * a_run / AMPLE,
-        compiles=model,
+        compiles=compiles(model.split()[0]),
     )
 
 

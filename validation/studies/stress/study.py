@@ -347,10 +347,7 @@ class Stress(Study):
         share = min(ONE_FAILURE, 1.0 / max(1, len(small)))
         budget = share * (SHRINKING_QUICK if self.quick else SHRINKING)
         return work + [
-            Shrinking(
-                one, budget, seconds=budget + HANGING, expected=0.5 * budget, compiles=one.model
-            )
-            for one in small
+            Shrinking(one, budget, seconds=budget + HANGING, expected=0.5 * budget) for one in small
         ]
 
     def _chunks(self) -> Iterator[Chunk]:
