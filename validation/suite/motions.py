@@ -22,7 +22,7 @@ Rocking is chaotic, so single histories are not predictable, but distributions a
     seed = 1
     scene = { duration = 10.0, block = { ... }, floor = { friction = 0.5 } }
     # each optional: uniform, lognormal (median, sigma of the logarithm)
-    friction = { uniform = [0.2, 0.8] }
+    friction = { uniform = [0.2, 0.8] }                # kinetic; a static one keeps its ratio to it
     gap = { uniform = [0.01, 0.1] }                    # of every wall of the scene, m
     pulse = { period = {...}, amplitude = {...} }      # a Ricker pulse of random phase, m/s^2 and s
     noise = { amplitude = {...}, frequency = 2.5, damping = 0.6, strong = 8.0 }
@@ -45,7 +45,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from rockcheck.scenes import InputError, Record, Ricker, Scene, Wall
+from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.files import UncertainScene, uncertain_scene
@@ -225,6 +225,13 @@ class Noise(Frozen):
         return Record.from_samples(amplitude * shaped / np.max(np.abs(shaped)), RECORD_STEP)
 
 
+def _rubbing(floor: Floor, friction: float) -> Floor:
+    """The floor with this kinetic friction; static friction above it keeps its ratio to it."""
+    ratio = floor.mu_s / floor.friction if floor.friction > 0.0 else 1.0
+    static = None if floor.static_friction is None else max(ratio * friction, friction)
+    return floor.replace(friction=friction, static_friction=static)
+
+
 class Ensemble(Frozen):
     """One `[[ensemble]]` table of a suite; see the module."""
 
@@ -254,9 +261,7 @@ class Ensemble(Frozen):
         if motion is not None:
             change["excitation"] = motion.draw(chance)
         if self.friction is not None:
-            change["floor"] = base.floor.model_copy(
-                update={"friction": self.friction.draw(chance), "static_friction": None}
-            )
+            change["floor"] = _rubbing(base.floor, self.friction.draw(chance))
         if self.gap is not None:
             change["walls"] = tuple(
                 Wall(side=w.side, gap=self.gap.draw(chance), restitution=w.restitution)

@@ -432,7 +432,8 @@ def _safe_gap(gaps: Mapping[str, Any]) -> list[str]:
     if not gaps["monotonic"]:
         said.append("A larger gap is not always worse: see each.")
     if gaps["clearance"] is not None:
-        falls = f"; {gaps['free_overturned']} fall" if gaps["free_overturned"] else ""
+        fallen = gaps["free_overturned"]
+        falls = f"; {fallen} overturn{'s' if fallen == 1 else ''}" if fallen else ""
         said.append(f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}.")
     return said
 
@@ -521,10 +522,20 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         text("record", "its record", brief=several),
         Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
-    shown = {q.label: quantities[q.name] | {"unit": UNITS.get(q.unit, q.unit)} for q in QUANTITIES}
-    rows = [[label, *(one[c.name] for c in columns[1:])] for label, one in shown.items()]
-    meant = (f"{q.label}: {q.help}" for q in QUANTITIES)
-    return Table("quantities", columns, rows, note=f"{'; '.join(meant)}.")
+    shown = [q for q in QUANTITIES if quantities[q.name]["of"]]
+    units = {q.name: {"unit": UNITS.get(q.unit, q.unit)} for q in shown}
+    rows = [
+        [q.label, *((quantities[q.name] | units[q.name])[c.name] for c in columns[1:])]
+        for q in shown
+    ]
+    meant = (f"{q.label}: {q.help}" for q in shown)
+    return Table(
+        "quantities",
+        columns,
+        rows,
+        note=f"{'; '.join(meant)}.",
+        on="all" if rows else "file",
+    )
 
 
 def _strips(found: Found) -> list[Block]:
