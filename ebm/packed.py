@@ -160,7 +160,7 @@ def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
     if not is_one_run() or model.friction == "bouc-wen" or is_ready(loop, *given):
         return None
     announce(
-        f"{model.name} is not compiled for this machine yet, and a short run is interpreted: the"
-        " same figures, later (`rockcheck warm` compiles)"
+        f"{model.name} is not compiled for this machine yet: a short run is interpreted, with the"
+        " same figures (`rockcheck warm` compiles)"
     )
     return interpreted(loop)
