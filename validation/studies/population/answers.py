@@ -433,7 +433,7 @@ def _safe_gap(gaps: Mapping[str, Any]) -> list[str]:
         said.append("A larger gap is not always worse: see each.")
     if gaps["clearance"] is not None:
         fallen = gaps["free_overturned"]
-        falls = f"; {fallen} overturn{'s' if fallen == 1 else ''}" if fallen else ""
+        falls = f"; {fallen} run{'s overturn' if fallen > 1 else ' overturns'}" if fallen else ""
         said.append(f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}.")
     return said
 
