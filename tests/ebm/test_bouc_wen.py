@@ -231,3 +231,24 @@ def test_friction_at_the_blocks_slope_slides_at_its_limit(share):
     assert np.max(np.abs(exact.channels["x"])) > 0.01
     np.testing.assert_allclose(smooth.channels["x"], exact.channels["x"], rtol=0.0, atol=1e-10)
     assert smooth.cost.rules == {}
+
+
+@pytest.mark.parametrize("offset", [-0.375, 0.0, 0.2])
+def test_a_weightless_block_slides_off_its_wall_without_a_turn(offset):
+    """Nothing but the wall pushes it. Friction that a resting block has left would turn it, from an
+    instant that rounding chooses."""
+    scene = Scene(
+        name="weightless",
+        block=Block(half_width=0.5, half_height=1.0, centre_of_mass=(offset, 0.0)),
+        floor=Floor(friction=0.6),
+        walls=[Wall(side="left", gap=0.0)],
+        excitation=Ricker(amplitude=-0.5, period=0.5),
+        vertical=Record.from_samples(np.full(201, -1.0), 0.01),
+        duration=2.0,
+        gravity=1.0,
+    )
+    exact, smooth = EventBasedModel().simulate(scene), bouc_wen(scene)
+    assert exact.channels["x"][-1] > 0.03
+    np.testing.assert_allclose(smooth.channels["x"], exact.channels["x"], rtol=0.0, atol=1e-12)
+    assert np.max(np.abs(smooth.channels["theta"])) == 0.0
+    assert smooth.cost.rules == {}
