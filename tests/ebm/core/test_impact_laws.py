@@ -6,13 +6,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from pytest import approx
 from stepping import block_of, run_at, setting_of
 
 from rockcheck.ebm.core.laws import contact_impacts as ci, impacts
 from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Found, Landing
 from rockcheck.scenes import Block
 
+approx = pytest.approx
 lopsided_or_not = pytest.mark.parametrize("lopsided", [False, True], ids=["homogeneous", "loaded"])
 
 
