@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from situations import Core, _row, value
+from numpy.polynomial.polynomial import polyval
 from stepping import run_at
 
 from rockcheck.ebm.core import (
@@ -18,14 +18,32 @@ from rockcheck.ebm.core.state import workspace
 NOISES = series.NOISE.tolist()
 
 
+def row_of(coefficients) -> np.ndarray:
+    row = np.zeros((1, series.WIDTH))
+    row[0, : len(coefficients)] = coefficients
+    return row
+
+
+def first_root(coefficients, h: float, noise: float = NOISES[Kind.POSITION]) -> float | None:
+    """First time in [0, h] at which the polynomial (constant first) turns negative."""
+    row, stack = row_of(coefficients), np.full((48, series.WIDTH), np.nan)
+    found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
+    return None if found == series.NO_ROOT else found
+
+
+def leading(coefficients, noise: float = NOISES[Kind.POSITION]) -> int:
+    """Sign with which the polynomial leaves zero."""
+    return series.leading(row_of(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
+
+
 def assert_first_root(coefficients, h: float, found: float | None, noise: float = 1e-13) -> None:
     """By the definition: not negative before, negative just after."""
     before = np.linspace(0.0, h if found is None else found, 4001)
-    assert np.min(value(coefficients, before)) >= -noise
+    assert np.min(polyval(before, coefficients)) >= -noise
     if found is not None and found < h:
         assert found >= 0.0
         after = np.minimum(found + h * np.logspace(-9, -3, 25), h)
-        assert np.min(value(coefficients, after)) < 0.0
+        assert np.min(polyval(after, coefficients)) < 0.0
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -48,7 +66,7 @@ def test_first_root_of_random_polynomials(noise):
             # rounding.
             continue
         expected = min((r for r in near.real if 0.0 < r < h), default=None)
-        found = Core.first_root(c, h, noise)
+        found = first_root(c, h, noise)
         judged[found is None] += 1
         assert (found is None) == (expected is None), (c, h, found, expected)
         if found is not None:
@@ -67,9 +85,9 @@ def test_first_root_among_many():
             continue
         c = np.polynomial.polynomial.polyfromroots(roots)
         c *= math.copysign(1.0, c[0])
-        gradient = abs(value(np.polynomial.polynomial.polyder(c), roots[0]))
-        assert Core.first_root(c, 1.0) == pytest.approx(roots[0], abs=1e-12 + 1e-14 / gradient)
-        assert Core.first_root(c, 0.999 * roots[0]) is None
+        gradient = abs(polyval(roots[0], np.polynomial.polynomial.polyder(c)))
+        assert first_root(c, 1.0) == pytest.approx(roots[0], abs=1e-12 + 1e-14 / gradient)
+        assert first_root(c, 0.999 * roots[0]) is None
 
 
 def test_signs_of_all_short_patterns():
@@ -78,8 +96,8 @@ def test_signs_of_all_short_patterns():
     for pattern in itertools.product((-1.0, 0.0, 1.0), repeat=6):
         first = next((c for c in pattern if c), 0.0)
         for size in (1.0, 1e-3, 40.0):
-            assert Core.leading(size * np.array(pattern)) == first, pattern
-        found = Core.first_root(pattern, 1e-3)
+            assert leading(size * np.array(pattern)) == first, pattern
+        found = first_root(pattern, 1e-3)
         assert found == (0.0 if first < 0.0 else None), pattern
 
 
@@ -92,11 +110,11 @@ def test_a_zero_at_the_start_is_divided_out():
             root = rng.uniform(0.05, 0.9)
             c = np.concatenate([np.zeros(k), [root, -1.0], np.zeros(4)])
             c[:k] = rng.normal(0.0, 1e-15, k)  # what rounding leaves of the zeros
-            assert Core.leading(c) == 1
-            assert Core.first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
-            assert Core.first_root(c, 0.9 * root) is None
-            assert Core.leading(-c) == -1
-            assert Core.first_root(-c, 1.0) == 0.0
+            assert leading(c) == 1
+            assert first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
+            assert first_root(c, 0.9 * root) is None
+            assert leading(-c) == -1
+            assert first_root(-c, 1.0) == 0.0
 
 
 @pytest.mark.parametrize("start", [-0.9, -0.4, 0.0, 0.4, 0.9])
@@ -106,17 +124,17 @@ def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(
     falls = noise * np.array([start, -0.01, -1.0])  # noise throughout the time AHEAD
     end = -0.005 + math.sqrt(0.005**2 + 1.0 + start)
     for cut in (0.0, 0.3 * end, 0.7 * end):
-        moved = np.array([value(falls, cut), falls[1] + 2.0 * falls[2] * cut, falls[2]])
-        assert cut + Core.first_root(moved, 2.0, noise) == pytest.approx(end, rel=1e-12)
+        moved = np.array([polyval(cut, falls), falls[1] + 2.0 * falls[2] * cut, falls[2]])
+        assert cut + first_root(moved, 2.0, noise) == pytest.approx(end, rel=1e-12)
 
 
 def test_a_force_may_change_faster_than_what_it_moves():
     """Its step is the one at which its own last two terms are below the tolerance; a position's is
     shorter, for those of its rate to be."""
-    terms = _row([1.0, 1e3, 1e6, 1e9])
+    terms = row_of([1.0, 1e3, 1e6, 1e9])
     assert series.force_step(terms, 0, 3, 1e-9, 1.0) == pytest.approx(math.sqrt(1e-15))
     assert series.force_step(terms, 0, 3, 1e-9, 1e-8) == 1e-8
-    assert series.force_step(_row([1.0, 0.0, 0.0]), 0, 2, 1e-9, 1.0) == 1.0
+    assert series.force_step(row_of([1.0, 0.0, 0.0]), 0, 2, 1e-9, 1.0) == 1.0
     assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
 
 
@@ -127,7 +145,7 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
     terms = np.zeros(order + 1)
     powers = [1.0, -1.0 / 3.0, 2.0 / 15.0, -17.0 / 315.0]
     terms[2::4] = powers[: len(terms[2::4])]
-    step = series.force_step(_row(terms), 0, order, 1e-10, 10.0)
+    step = series.force_step(row_of(terms), 0, order, 1e-10, 10.0)
     assert 0.15 < step < 0.35
 
 
@@ -136,7 +154,7 @@ def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
     with np.errstate(invalid="ignore"):
         root = series.first_root(
-            _row([1.0, rate, np.inf, 0.0]),
+            row_of([1.0, rate, np.inf, 0.0]),
             0,
             3,
             1.0,
@@ -154,12 +172,12 @@ def test_touching_is_no_root_and_dipping_is_one(place):
     that. A triple one crosses."""
     touch = np.array([place * place, -2.0 * place, 1.0])
     lift = np.array([1e-12, 0.0, 0.0])
-    assert Core.first_root(touch + lift, 1.0) is None
-    assert Core.first_root(touch - lift, 1.0) == pytest.approx(place - 1e-6, abs=1e-9)
+    assert first_root(touch + lift, 1.0) is None
+    assert first_root(touch - lift, 1.0) == pytest.approx(place - 1e-6, abs=1e-9)
     falls = np.array([place**3, -3.0 * place**2, 3.0 * place, -1.0])
-    assert Core.first_root(falls, 1.0) == pytest.approx(place, abs=1e-4)
+    assert first_root(falls, 1.0) == pytest.approx(place, abs=1e-4)
     two = np.polynomial.polynomial.polymul(touch, [0.9, -1.0])  # touches, then crosses
-    assert Core.first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
+    assert first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
 
 
 @pytest.mark.parametrize("dip", [0.0, 1e-16, 1e-10, 4e-10, 1e-9, 1e-6])
@@ -199,16 +217,16 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
 def test_noise_is_no_sign(noise):
     """A value below the noise tells nothing: what follows it does."""
     for sign in (1.0, -1.0):
-        assert Core.leading([sign * 0.5 * noise], noise) == 0
-        assert Core.leading([sign * 2.0 * noise], noise) == sign
-        assert Core.leading([-sign * 0.5 * noise, sign], noise) == sign
-        assert Core.leading([0.0, -sign * 0.5 * noise / series.AHEAD, sign], noise) == sign
-    assert Core.first_root([0.5 * noise, 0.0, -1.0], 1.0, noise) == 0.0
-    assert Core.first_root([-0.5 * noise, 0.0, 1.0], 1.0, noise) is None
-    assert Core.first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None
+        assert leading([sign * 0.5 * noise], noise) == 0
+        assert leading([sign * 2.0 * noise], noise) == sign
+        assert leading([-sign * 0.5 * noise, sign], noise) == sign
+        assert leading([0.0, -sign * 0.5 * noise / series.AHEAD, sign], noise) == sign
+    assert first_root([0.5 * noise, 0.0, -1.0], 1.0, noise) == 0.0
+    assert first_root([-0.5 * noise, 0.0, 1.0], 1.0, noise) is None
+    assert first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None
     # Negative, but for less than an instant: an event's time is not known better than that.
-    assert Core.leading([-1e-10, 1.0]) == 1
-    assert Core.leading([-1e-8, 1.0]) == -1
+    assert leading([-1e-10, 1.0]) == 1
+    assert leading([-1e-8, 1.0]) == -1
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -216,13 +234,13 @@ def test_what_is_noise_at_first_may_grow(noise):
     """In a long step a guard that starts as noise and falls is met where it has become more than
     noise."""
     c = [0.0, 0.0, 0.0, 0.0, -noise]  # -noise tau^4
-    assert Core.leading(c, noise) == 0
-    assert Core.first_root(c, 0.9, noise) is None
-    found = Core.first_root(c, 10.0, noise)
+    assert leading(c, noise) == 0
+    assert first_root(c, 0.9, noise) is None
+    found = first_root(c, 10.0, noise)
     assert found is not None
     assert 0.9 < found < 1.2
     # Met where it has fallen by the noise: noise tau^4 / 16 is that at tau = 2.
-    assert Core.first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(
+    assert first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(
         2.0, rel=1e-9
     )
 
@@ -230,8 +248,8 @@ def test_what_is_noise_at_first_may_grow(noise):
 def test_terms_beyond_the_third_drown_no_earlier_one():
     """Where friction nearly jams the pivot they grow without bound: the noise that they bring is
     not that of a slope."""
-    assert Core.leading([0.0, -1e-7, 0.0, 1e12]) == -1
-    assert Core.leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
+    assert leading([0.0, -1e-7, 0.0, 1e12]) == -1
+    assert leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
 
 
 @pytest.mark.parametrize("ahead", [0.1, 10.0])
