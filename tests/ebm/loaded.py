@@ -1,5 +1,7 @@
 """Blocks that are not homogeneous, and scenes of them."""
 
+import math
+
 import numpy as np
 
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
@@ -26,6 +28,15 @@ def scene_of(block: Block = RACK, mu: float = 0.6, duration: float = 4.0, **more
         }
         | more
     )
+
+
+def places(block: Block, theta: float, sense: int, case: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pivot of a block that tips to `sense` (+1 left), and its corner toward the tip wall (case
+    1) or the far wall (-1): from the mass's centre, in the world."""
+    turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+    size = np.array([block.half_width, block.half_height])
+    pivot, corner = np.array([(-sense, -1), (-sense * case, case)]) * size - block.offset
+    return turn @ pivot, turn @ corner
 
 
 def random_scene(rng: np.random.Generator) -> Scene:

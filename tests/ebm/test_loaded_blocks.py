@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from loaded import RACK, G, random_scene, scene_of
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 from stepping import assert_mirror_images
 
 from rockcheck.ebm import EventBasedModel
@@ -135,37 +135,6 @@ def test_a_pulse_is_lagranges(sense):
     np.testing.assert_allclose(theta, rocking_by_lagrange(scene)(history.channels["t"]), atol=1e-8)
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
-def test_quarter_period_and_impact_ratio_of_each_pivot(side):
-    """Housner's quarter period with the pivot's own p and alpha, and the ratio that angular
-    momentum about the new pivot gives."""
-    old, new = Lagrangian(RACK, side), Lagrangian(RACK, "right" if side == "left" else "left")
-    tilt = 0.25 * math.atan2(abs(old.arm[0]), old.arm[1])
-    scene = scene_of(duration=3.0, output_step=2e-4, initial_rotation=old.sense * tilt)
-    history = EventBasedModel(tolerance=1e-13).simulate(scene)
-
-    def pace(root: float) -> float:
-        height = old.energy(old.sense * tilt, 0.0) - old.energy(
-            old.sense * (tilt - root * root), 0.0
-        )
-        return (
-            2.0 * root / math.sqrt(2.0 * height / (old.inertia + old.arm @ old.arm))
-            if root > 0.0
-            else 0.0
-        )
-
-    quarter = quad(pace, 1e-7, math.sqrt(tilt), epsabs=1e-12, epsrel=1e-12, limit=200)[0]
-    impacts = [event.t for event in history.event_list if event.kind == "floor impact"]
-    assert impacts[0] == pytest.approx(quarter, abs=2e-7)
-    c = history.channels
-    swing = c["theta"][(c["t"] > impacts[0]) & (c["t"] < impacts[1])]
-    top = swing[np.argmax(np.abs(swing))]
-    before = math.sqrt(2.0 * old.energy(old.sense * tilt, 0.0) / (old.inertia + old.arm @ old.arm))
-    after = math.sqrt(2.0 * new.energy(float(top), 0.0) / (new.inertia + new.arm @ new.arm))
-    ratio = old.momentum_about(old.arm - new.arm, 1.0) / (new.inertia + new.arm @ new.arm)
-    assert after / before == pytest.approx(ratio, abs=1e-5)  # the top lies between rows
-
-
 def test_pivots_of_a_block():
     """p, alpha and R of both pivots; the weaker one's are the block's, and those of a homogeneous
     block Housner's."""
@@ -239,27 +208,13 @@ def test_the_homogeneous_block_is_the_symmetric_instance():
 def test_what_is_decided_early_is_what_comes():
     """Outcomes and peaks of 60 loaded blocks by a batch that stops when all is certain, and by runs
     to the end."""
-    rng, model = np.random.default_rng(13), EventBasedModel(tolerance=1e-10)
+    rng, model = np.random.default_rng(13), EventBasedModel(tolerance=1e-11)
     scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
-    early = run_batch(pack(scenes, model), model, jobs=1)
-    late = run_batch(pack(scenes, model), model, jobs=1, until_decided=False)
+    early, late = (
+        run_batch(pack(scenes, model), model, jobs=1, until_decided=decided)
+        for decided in (True, False)
+    )
     np.testing.assert_array_equal(early.side, late.side)
     assert {-1, 0, 1} == set(early.side.tolist())
-    np.testing.assert_allclose(early.peak, late.peak, atol=1e-8)
+    np.testing.assert_allclose(early.peak, late.peak, rtol=0.0, atol=1e-11)
     assert np.sum(early.series) < np.sum(late.series)
-
-
-def test_unilateral_walls_conserve_momentum_about_the_right_corners():
-    """A block that leans against a wall at rest: its push is what the moment about the pivot asks
-    for, by the box's far-off corner."""
-    wall = [Wall(side="left", gap=0.05)]
-    scene = scene_of(
-        mu=0.6,
-        walls=wall,
-        duration=12.0,
-        excitation=Record.from_samples(np.full(13, 0.56 * G), 1.0),
-    )
-    history = EventBasedModel(pivot="unilateral").simulate(scene)
-    assert history.channels["mode"][-1] == "lean"
-    theta, x = float(history.channels["theta"][-1]), float(history.channels["x"][-1])
-    assert kinematics.wall_gap(scene, "left", x, theta) == pytest.approx(0.0, abs=1e-9)

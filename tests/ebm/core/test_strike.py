@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from loaded import random_scene
+from loaded import places, random_scene
 from stepping import ROCKS, run_at, setting_of, six
 
 from rockcheck.ebm import EventBasedModel, natural
@@ -152,12 +152,7 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
         sense, tilt, w = int(rng.choice([-1, 1])), rng.uniform(0.2, 0.9), rng.uniform(-1.0, 1.0)
         block, wall = scene.block, sense * case
         theta = sense * tilt * block.pivot("left" if sense > 0 else "right").alpha
-        turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
-        size = np.array([block.half_width, block.half_height])
-        pivot, corner = (
-            turn @ (size * signs - block.offset) / block.radius
-            for signs in ((-sense, -1), (-wall, case))
-        )
+        pivot, corner = np.array(places(block, theta, sense, case)) / block.radius
         vx = w * corner[1] - wall * rng.uniform(0.1, 1.0)  # it approaches
         start = [0.0, -pivot[1], theta, vx, -w * pivot[0], w]
         state = run_at(start, **ROCKS, sense=sense).state
