@@ -13,7 +13,6 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
     Block,
     Floor,
-    InputError,
     Record,
     Ricker,
     Scene,
@@ -22,7 +21,6 @@ from rockcheck.scenes import (
     kinematics,
     load_scene,
 )
-from rockcheck.scenes.errors import ModelFailure
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 G = 9.81
@@ -203,13 +201,6 @@ def test_beyond_painleve_the_sign_of_the_push_that_is_wrong_by_least_goes_on():
     history = bouc_wen(scene, yield_displacement=1.54969e-3)
     assert history.cost.rules["least contradiction"] > 0
     assert_contacts_hold(scene, history, 1e-9 * scene.block.radius)
-
-
-def test_what_it_cannot_do_is_refused():
-    with pytest.raises(InputError, match="bilateral"):
-        bouc_wen(pulse(), pivot="unilateral")
-    with pytest.raises(ModelFailure, match="cap on steps"):
-        bouc_wen(pulse(), most_steps=50)
 
 
 @pytest.mark.parametrize("share", [1.0, 1.0 + 2e-16, 1.0 + 1e-9])

@@ -141,7 +141,12 @@ def test_compiled_scratch_is_scratch(pulse_scene):
 
 
 @pytest.mark.parametrize(
-    ("cap", "said"), [({"most_steps": 3}, "steps"), ({"most_events": 3}, "events")]
+    ("cap", "said"),
+    [
+        ({"most_steps": 3}, "steps"),
+        ({"most_events": 3}, "events"),
+        ({"most_steps": 50, "friction": "bouc-wen"}, "steps"),
+    ],
 )
 def test_a_cap_ends_in_a_failure(cap, said, pulse_scene):
     with pytest.raises(ModelFailure, match=f"the cap on {said} was reached at t = "):

@@ -2,6 +2,7 @@
 records, and bad input."""
 
 from itertools import groupby
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -29,19 +30,12 @@ def scene(*walls, friction=0.3, excitation=None):
     )
 
 
-def reference_runs():
-    def setting(row):
-        return row["side"], row["gap"], row["e_w"], row["mu"]
-
-    return [
-        (key, list(group)) for key, group in groupby(sorted(BILATERAL, key=setting), key=setting)
-    ]
+setting_of = itemgetter("side", "gap", "e_w", "mu")
+RUNS = {key: list(rows) for key, rows in groupby(sorted(BILATERAL, key=setting_of), key=setting_of)}
 
 
 @pytest.mark.parametrize(
-    ("setting", "rows"),
-    reference_runs(),
-    ids=["-".join(filter(None, key)) for key, _ in reference_runs()],
+    ("setting", "rows"), RUNS.items(), ids=["-".join(filter(None, key)) for key in RUNS]
 )
 def test_outcomes_agree_with_reference_runs(setting, rows):
     side, gap, e, mu = setting
@@ -64,59 +58,44 @@ def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
     assert refined.evaluations < 0.35 * full.evaluations
 
 
-@pytest.mark.parametrize("shape", [(257, 257), (100, 130), (9, 8), (2, 2)])
-def test_refinement_of_a_disc(shape):
+def disc(a, f):
+    return np.hypot(a - 5.0, f - 5.0) < 3.0
+
+
+def tongue(a, f):
+    return (a < 2.0) | (np.abs(a - f) < 0.05)
+
+
+def hair(a, f):
+    """64 dots: of some 180 columns that it crosses."""
+    return (a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))
+
+
+@pytest.mark.parametrize(
+    ("shape", "grid", "share"),
+    [
+        (disc, (257, 257), 0.12),
+        (disc, (100, 130), 1.0),
+        (disc, (9, 8), 1.0),
+        (disc, (2, 2), 1.0),
+        (tongue, (257, 257), 0.15),
+        (hair, (257, 257), 0.999),
+    ],
+)
+def test_refinement_finds_all_of_a_shape(shape, grid, share):
+    """A thin tongue to its tip, and the dots of a hair, without a node played twice."""
+    amplitudes, frequencies = (np.linspace(1.0, 9.0, n) for n in grid)
     played = []
 
-    def disc(scene, a, f):
+    def play(scene, a, f):
         played.extend(zip(a.tolist(), f.tolist(), strict=True))
-        return (np.hypot(a - 5.0, f - 5.0) < 3.0).astype(np.int8), np.zeros(len(a), dtype=bool)
+        return shape(a, f).astype(np.int8), np.zeros(len(a), dtype=bool)
 
-    amplitudes, frequencies = np.linspace(1.0, 9.0, shape[0]), np.linspace(1.0, 9.0, shape[1])
-    spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=disc)
-    np.testing.assert_array_equal(
-        spectrum.outcomes, np.hypot(amplitudes[:, None] - 5.0, frequencies - 5.0) < 3.0
-    )
-    assert spectrum.evaluations == len(played) == len(set(played))
-    if shape[0] > 200:
-        assert spectrum.evaluations < 0.12 * spectrum.outcomes.size
-
-
-def tongue(scene, a, f):
-    return ((a < 2.0) | (np.abs(a - f) < 0.05)).astype(np.int8), np.zeros(len(a), dtype=bool)
-
-
-def hair(scene, a, f):
-    """64 dots: of some 180 columns that it crosses."""
-    crossed = (np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0)
-    return ((a < 2.0) | crossed).astype(np.int8), np.zeros(len(a), dtype=bool)
-
-
-@pytest.mark.parametrize(("shape", "dots", "share"), [(tongue, None, 0.15), (hair, 64, 1.0)])
-def test_refinement_follows_a_thin_tongue_to_its_tip_and_finds_the_dots_of_a_hair(
-    shape, dots, share
-):
-    axis = np.linspace(1.0, 9.0, 257)
-    spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=shape)
-    full = shape(None, *np.broadcast_arrays(axis[:, None], axis))[0]
-    assert dots is None or np.count_nonzero(full[axis >= 2.0]) == dots
+    spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=play)
+    full = shape(*np.broadcast_arrays(amplitudes[:, None], frequencies))
+    assert shape is not hair or np.count_nonzero(full[amplitudes >= 2.0]) == 64
     np.testing.assert_array_equal(spectrum.outcomes, full)
-    assert spectrum.evaluations < share * spectrum.outcomes.size
-
-
-def test_a_node_is_what_the_model_simulates():
-    wall = Wall(side="left", gap=0.053, restitution=0.5)
-    a, f = np.array([1.2, 2.0, 3.0, 6.0]), np.array([0.8, 2.5, 4.0, 5.0])
-    sides, failed = play_nodes(scene(wall), a, f, model=EventBasedModel())
-    assert not failed.any()
-    outcomes = [
-        EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome
-        for node in zip(a, f, strict=True)
-    ]
-    assert [
-        {"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes
-    ] == sides.tolist()
-    assert len(set(sides.tolist())) > 1
+    assert spectrum.evaluations == len(played) == len(set(played)) <= share * full.size
 
 
 def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
@@ -253,19 +232,6 @@ def test_motions_at_nodes_are_those_that_the_model_simulates():
 def test_a_motion_that_fails_is_none():
     model = EventBasedModel(tolerance=1e-8, most_steps=5)
     assert play_motions(scene(), np.array([4.0]), np.array([2.0]), model=model, parts=10) == [None]
-
-
-def test_the_mirror_image_and_the_number_of_threads():
-    wall = Wall(side="left", gap=0.053, restitution=1.0)
-    a, f = (
-        axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 12.0, 12), np.linspace(0.5, 8.0, 12))
-    )
-    model = EventBasedModel(tolerance=1e-8)
-    sides, _ = play_nodes(scene(wall), a, f, model=model, jobs=1)
-    again, _ = play_nodes(scene(wall), a, f, model=model, jobs=3)
-    np.testing.assert_array_equal(sides, again)
-    mirrored, _ = play_nodes(scene(wall).mirrored(), -a, f, model=model)
-    np.testing.assert_array_equal(mirrored, -sides)
 
 
 def test_least_overturning_amplitude_and_area():
