@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
+from rockcheck.scenes import Block, Floor, Ricker, Scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 DATA = Path(__file__).parents[1] / "data"
@@ -35,21 +35,32 @@ def ricker(frequency: float, amplitude: float, block: Block = PAPER_BLOCK) -> Ri
     )
 
 
+def pulse_scene(
+    frequency: float,
+    amplitude: float,
+    mu: float,
+    wall: tuple[str, float, float] | None = None,
+    **more: Any,
+) -> Scene:
+    """The paper's block under a Ricker pulse, perhaps beside a wall: its side, gap, restitution."""
+    walls = [dict(zip(("side", "gap", "restitution"), wall, strict=True))] if wall else []
+    fields = {
+        "name": "pulse",
+        "block": PAPER_BLOCK,
+        "floor": Floor(friction=mu),
+        "walls": walls,
+        "excitation": ricker(frequency, amplitude),
+        "duration": 5.0,
+    }
+    return Scene(**fields | more)
+
+
 def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
     """The scene of a run, up to a time after its pulse."""
-    pulse = ricker(float(row["wp_over_p"]), float(row["ap_ratio"]))
-    return Scene(
-        name="reference",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=float(row["mu"])),
-        walls=[
-            Wall(side=row["side"], gap=float(gap), restitution=float(row["e_w"]))
-            for gap in filter(None, [row["gap"]])
-        ],
-        excitation=pulse,
-        duration=4.0 * pulse.period + rest,
-        **more,
-    )
+    frequency, amplitude, mu = (float(row[name]) for name in ("wp_over_p", "ap_ratio", "mu"))
+    wall = (row["side"], float(row["gap"]), float(row["e_w"])) if row["gap"] else None
+    duration = 4.0 * ricker(frequency, amplitude).period + rest
+    return pulse_scene(frequency, amplitude, mu, wall, duration=duration, **more)
 
 
 def peak_errors(

@@ -4,13 +4,12 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 import pytest
-from cases import ricker
 from stepping import play
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.core.state import workspace
-from rockcheck.scenes import Block, Floor, Scene, Wall
+from rockcheck.scenes import Scene
 
 
 @pytest.fixture(scope="session")
@@ -33,31 +32,3 @@ def run_to_end() -> Callable[..., SimpleNamespace]:
         )
 
     return run
-
-
-@pytest.fixture(scope="session")
-def pulse_scene(block: Block) -> Callable[..., Scene]:
-    """Makes a scene of the paper's block under a Ricker pulse of omega_p = `frequency` p and a_p =
-    `amplitude` g tan(alpha)."""
-
-    def scene(
-        frequency: float,
-        amplitude: float,
-        mu: float,
-        wall: tuple[str, float, float] | None = None,
-        **more: object,
-    ) -> Scene:
-        walls = [Wall(side=wall[0], gap=wall[1], restitution=wall[2])] if wall else []
-        return Scene(
-            **{
-                "name": "pulse",
-                "block": block,
-                "floor": Floor(friction=mu),
-                "walls": walls,
-                "excitation": ricker(frequency, amplitude, block),
-                "duration": 5.0,
-            }
-            | more
-        )
-
-    return scene

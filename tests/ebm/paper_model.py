@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -296,8 +295,7 @@ class PaperModel:
                     return self
                 self.events.append((t, "uplift"))
                 continue
-            advance = self.lean_until if mode.name == "lean" else self.step
-            t, y, kind = advance(mode, t, y)
+            t, y, kind = self.step(mode, t, y)
             if kind == "end":
                 return self
             if kind != "sense":
@@ -336,40 +334,14 @@ class PaperModel:
         V = self.slip(y)
         return np.array([y[0], y[1], y[2] - V, y[3]]) if abs(V) < 1e-12 else y
 
-    def lean_until(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
-        def margin(which: str, t: float) -> float:
-            _, _, P, Q, N = self.motion(m, t, y)
-            return N if which == "release" else self.mu_s * P - abs(Q)
-
-        times = np.arange(t, self.scene.duration, 1e-3)
-        for a, b in pairwise(times):
-            for which in ("release", "slip"):
-                if margin(which, b) < 0.0:
-                    root = brentq(
-                        lambda s, which=which: margin(which, s), a, b, xtol=1e-15, rtol=1e-15
-                    )
-                    self.pieces.append((t, root, lambda _, y=y: y))
-                    return root, y, which
-        self.pieces.append((t, self.scene.duration, lambda _, y=y: y))
-        return self.scene.duration, y, "end"
-
     def step(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
         def rates(t: float, y: State) -> list[float]:
             x2, turn, _, _, _ = self.motion(m, t, y)
             return [y[2], y[3], x2, turn]
 
         named = self.guards(m)
-        events = []
         for function in named.values():
-
-            def falls(
-                t: float, y: State, function: Callable[[float, State], float] = function
-            ) -> float:
-                return function(t, y)
-
-            falls.terminal = True  # type: ignore[attr-defined]
-            falls.direction = -1.0  # type: ignore[attr-defined]
-            events.append(falls)
+            function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
         ends = [self.scene.duration]
         excitation = self.scene.excitation
         if isinstance(excitation, Record):  # stop at the samples, where the motion has kinks
@@ -387,7 +359,7 @@ class PaperModel:
                 rtol=1e-13,
                 atol=1e-15,
                 max_step=self.max_step,
-                events=events,
+                events=list(named.values()),
                 dense_output=True,
             )
             self.pieces.append((t, run.t[-1], run.sol))

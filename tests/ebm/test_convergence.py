@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import pulse_scene
 from stepping import play, run_at, six
 
 from rockcheck.ebm import EventBasedModel, natural
@@ -39,7 +40,7 @@ def distance(a: History, b: History) -> float:
     )
 
 
-def test_the_terms_that_are_left_out_are_half_of_the_tolerance(pulse_scene):
+def test_the_terms_that_are_left_out_are_half_of_the_tolerance():
     """A geometric series that falls from 1 to the tolerance within the order; and no impact has
     added energy before the first one."""
     scene = pulse_scene(2.0, 1.1, 1.0)
@@ -55,7 +56,7 @@ def test_the_terms_that_are_left_out_are_half_of_the_tolerance(pulse_scene):
 
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
-def test_error_falls_with_the_tolerance(pivot, case, pulse_scene):
+def test_error_falls_with_the_tolerance(pivot, case):
     """From 1e-6 to 1e-12, against a run at 1e-14: the error stays below 200 tolerances, and loses
     five decades."""
     scene = pulse_scene(*CASES[case], output_step=0.01)
@@ -90,7 +91,7 @@ def test_a_slender_block_is_as_exact_as_a_stout_one(alpha):
         assert distance(found, truth) <= 30.0 * tolerance * alpha
 
 
-def test_error_estimate_is_the_error(pulse_scene):
+def test_error_estimate_is_the_error():
     """`cost.error_estimate` (in alpha) is the distance to a tighter run, hence the error to within
     a factor of two."""
     scene = pulse_scene(4.5, 4.0, 0.3)
@@ -103,7 +104,7 @@ def test_error_estimate_is_the_error(pulse_scene):
     assert EventBasedModel(tolerance=1e-7).simulate(scene).cost.error_estimate is None
 
 
-def test_work_grows_with_accuracy(pulse_scene):
+def test_work_grows_with_accuracy():
     """Steps of a Taylor method grow with the number of digits, not with their power."""
     scene = pulse_scene(4.5, 4.0, 0.3)
     steps = [
@@ -114,7 +115,7 @@ def test_work_grows_with_accuracy(pulse_scene):
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
-def test_a_run_leaves_no_trace(pivot, pulse_scene):
+def test_a_run_leaves_no_trace(pivot):
     """The same scene gives the same bits before and after another one, and when its output grid is
     finer."""
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), output_step=0.01)
@@ -128,7 +129,7 @@ def test_a_run_leaves_no_trace(pivot, pulse_scene):
     assert first.event_list == again.event_list == finer.event_list
 
 
-def test_compiled_scratch_is_scratch(pulse_scene):
+def test_compiled_scratch_is_scratch():
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     model = EventBasedModel(pivot="unilateral")
     found = []
@@ -148,7 +149,7 @@ def test_compiled_scratch_is_scratch(pulse_scene):
         ({"most_steps": 50, "friction": "bouc-wen"}, "steps"),
     ],
 )
-def test_a_cap_ends_in_a_failure(cap, said, pulse_scene):
+def test_a_cap_ends_in_a_failure(cap, said):
     with pytest.raises(ModelFailure, match=f"the cap on {said} was reached at t = "):
         EventBasedModel(**cap).simulate(pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0)))
 
