@@ -44,18 +44,21 @@ def strikes(history, kind):
 # Settings
 
 
-@pytest.mark.parametrize("setting", ["penetration", "stiffness", "time_step"])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan, "stiff"])
-def test_settings_are_validated(setting, value):
-    with pytest.raises(InputError, match=setting):
-        ContinuousModel(**{setting: value})
+REFUSED = [
+    ({setting: value}, setting)
+    for setting in ("penetration", "stiffness", "time_step")
+    for value in (0.0, -1.0, math.inf, math.nan, "stiff")
+]
+REFUSED += [
+    ({"damping_rule": "guess"}, "damping_rule"),
+    ({"stiffness": 5e6, "penetration": 1e-6}, "stiffness"),
+]
 
 
-def test_settings_unknown_or_contradictory_are_refused():
-    with pytest.raises(InputError, match="damping_rule"):
-        ContinuousModel(damping_rule="guess")
-    with pytest.raises(InputError, match="stiffness"):
-        ContinuousModel(stiffness=5e6, penetration=1e-6)
+@pytest.mark.parametrize(("settings", "said"), REFUSED, ids=str)
+def test_settings_are_validated(settings, said):
+    with pytest.raises(InputError, match=said):
+        ContinuousModel(**settings)
 
 
 def test_stiffness_and_step_follow_from_the_penetration():
@@ -184,39 +187,6 @@ def test_energy_never_rises_without_excitation():
     assert np.max(e[1:] - np.minimum.accumulate(e)[:-1]) < 1e-5 * e[0]
 
 
-# Flight and walls
-
-
-@pytest.mark.parametrize("e", [0.5, 1.0])
-def test_dropped_block_bounces_to_its_height(e):
-    height = 0.01
-    history = ContinuousModel().simulate(
-        scene(floor=Floor(friction=0.3, restitution=e), initial_height=height, duration=0.2)
-    )
-    c = history.channels
-    fall = math.sqrt(2.0 * height / G)
-    first = strikes(history, "floor impact")[:2]
-    assert [event.t for event in first] == pytest.approx([fall, fall], abs=1e-6)  # both corners
-    assert sum(event.impulse for event in first) == pytest.approx((1.0 + e) * G * fall, rel=1e-3)
-    top = np.max(c["y"][c["t"] > fall]) - PAPER_BLOCK.half_height
-    assert top == pytest.approx(e * e * height, rel=3e-3)
-    assert np.max(np.abs(c["theta"])) < 1e-9
-
-
-def test_block_goes_to_and_fro_between_two_walls():
-    walls = [
-        Wall(side="left", gap=0.05, restitution=1.0),
-        Wall(side="right", gap=0.15, restitution=1.0),
-    ]
-    history = ContinuousModel().simulate(
-        scene(floor=Floor(friction=0.0), walls=walls, initial_velocity=0.5, duration=2.0)
-    )
-    times = [event.t for event in strikes(history, "wall impact")[::2]]
-    assert times == pytest.approx([0.3, 0.7, 1.1, 1.5, 1.9], abs=1e-3)
-    assert np.max(history.channels["x"]) == pytest.approx(0.15, abs=1e-4)
-    assert np.min(history.channels["x"]) == pytest.approx(-0.05, abs=1e-3)
-
-
 # Excitation
 
 
@@ -292,24 +262,17 @@ def test_short_block_and_rattling_walls_come_to_an_end():
     )
     history = ContinuousModel().simulate(small)
     assert len(history.channels["t"]) == len(small.output_times)
-    assert all(
-        np.all(np.isfinite(history.channels[c]))
-        for c in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
-    )
+    numbers = [channel for name, channel in history.channels.items() if name != "mode"]
+    assert np.all(np.isfinite(numbers))
 
 
 @pytest.mark.parametrize("name", ["fig4a", "fig5b"])
 def test_named_scene_runs(name):
-    shown = load_scene(name)
-    history = ContinuousModel().simulate(shown)
+    shown, model = load_scene(name), ContinuousModel()
+    history = model.simulate(shown)
     assert history.outcome == "at rest"
     assert np.array_equal(history.channels["t"], shown.output_times)
-    assert (
-        history.cost.evaluations
-        >= history.cost.steps
-        > 36.0 / ContinuousModel().time_step_in(shown)
-    )
+    assert history.cost.evaluations >= history.cost.steps > 36.0 / model.time_step_in(shown)
     assert bool(strikes(history, "wall impact")) == bool(shown.walls)
-    assert [event.t for event in history.event_list] == sorted(
-        event.t for event in history.event_list
-    )
+    times = [event.t for event in history.event_list]
+    assert times == sorted(times)
