@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from cases import random_scene
 from stepping import EVEN, ODD, assert_mirror_images
 
 from rockcheck.ebm import EventBasedModel
@@ -80,6 +81,8 @@ SCENES = {
         duration=0.08,
         output_step=1e-3,
     ),
+    # Of loaded blocks the mass is exchanged, too.
+    **{f"loaded {seed}": random_scene(np.random.default_rng(seed)) for seed in range(30)},
     "squat": scene_of(
         block=Block(half_width=2.0, half_height=1.0),
         floor=Floor(friction=1.2),
@@ -91,6 +94,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 @pytest.mark.parametrize("kind", [*PIVOTS, "bouc-wen"])
 def test_mirror_image_to_the_bit(kind, name):
+    """Left and right exchanged, with record, walls and mass."""
     settings = {"friction": kind} if kind == "bouc-wen" else {"pivot": kind}
     model, scene = EventBasedModel(**settings), SCENES[name]
     assert_mirror_images(model.simulate(scene), model.simulate(scene.mirrored()))

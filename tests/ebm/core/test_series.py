@@ -2,10 +2,11 @@
 
 import itertools
 import math
+from collections import Counter
 
 import numpy as np
 import pytest
-from numpy.polynomial.polynomial import polyval
+from numpy.polynomial.polynomial import polyder, polyfromroots, polyroots, polyval
 from stepping import run_at
 
 from rockcheck.ebm.core import (
@@ -36,31 +37,25 @@ def leading(coefficients, noise: float = NOISES[Kind.POSITION]) -> int:
     return series.leading(row_of(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
 
 
-def assert_first_root(coefficients, h: float, found: float | None, noise: float = 1e-13) -> None:
-    """By the definition: not negative before, negative just after."""
-    before = np.linspace(0.0, h if found is None else found, 4001)
-    assert np.min(polyval(before, coefficients)) >= -noise
-    if found is not None and found < h:
-        assert found >= 0.0
-        after = np.minimum(found + h * np.logspace(-9, -3, 25), h)
-        assert np.min(polyval(after, coefficients)) < 0.0
-
-
 @pytest.mark.parametrize("noise", NOISES)
 def test_first_root_of_random_polynomials(noise):
-    """Against all roots that numpy finds, of 3,000 polynomials of degree 1 to 14, positive at 0."""
+    """Against all roots that numpy finds, of 3,000 polynomials of degree 1 to 14, positive at 0;
+    the first one to 1e-12, wherever the others lie."""
     rng = np.random.default_rng(41)
-    judged = {True: 0, False: 0}
+    judged = Counter()
     for _ in range(1000):
         degree, h = int(rng.integers(1, 15)), float(rng.choice([0.03, 0.4, 1.0, 2.0]))
         c = rng.normal(0.0, 1.0, degree + 1) / h ** np.arange(degree + 1)
-        c[0] = abs(c[0]) + 0.01
-        roots = np.roots(c[::-1])
+        if rng.integers(0, 2):  # up to six roots inside
+            c = polyfromroots(h * rng.uniform(0.02, 1.0, int(rng.integers(1, 7))))
+        c *= math.copysign(1.0, c[0]) / np.abs(c * h ** np.arange(len(c))).max()
+        roots = polyroots(c)
         near = roots[np.abs(roots.imag) < 1e-4 * h]
         if (
             np.any(np.abs(near.imag) > 0.0)
             or np.any(np.abs(near.real - h) < 1e-6 * h)
-            or np.any(np.diff(np.sort(near.real)) < 1e-4 * h)
+            or np.any(np.abs(near.real) < 1e-3 * h)
+            or np.any(np.diff(np.sort(near.real)) < 0.02 * h)
         ):
             # About to touch, or two roots in one place: whether they are roots is a matter of
             # rounding.
@@ -70,24 +65,11 @@ def test_first_root_of_random_polynomials(noise):
         judged[found is None] += 1
         assert (found is None) == (expected is None), (c, h, found, expected)
         if found is not None:
-            assert found == pytest.approx(expected, abs=1e-9 * h)
-        assert_first_root(c, h, found)
+            gradient = polyval(expected, polyder(c))
+            expected -= polyval(expected, c) / gradient  # which numpy knows less well
+            assert found == pytest.approx(expected, abs=1e-12 * h + 1e-14 / abs(gradient))
+            assert first_root(c, 0.999 * found, noise) is None
     assert min(judged.values()) > 200
-
-
-def test_first_root_among_many():
-    """Of up to six roots inside the step the first is found, to 1e-12, wherever the others lie."""
-    rng = np.random.default_rng(42)
-    for _ in range(500):
-        count = int(rng.integers(1, 7))
-        roots = np.sort(rng.uniform(0.02, 1.0, count))
-        if count > 1 and np.min(np.diff(roots)) < 0.02:
-            continue
-        c = np.polynomial.polynomial.polyfromroots(roots)
-        c *= math.copysign(1.0, c[0])
-        gradient = abs(polyval(roots[0], np.polynomial.polynomial.polyder(c)))
-        assert first_root(c, 1.0) == pytest.approx(roots[0], abs=1e-12 + 1e-14 / gradient)
-        assert first_root(c, 0.999 * roots[0]) is None
 
 
 def test_signs_of_all_short_patterns():
@@ -126,16 +108,6 @@ def test_a_guard_that_begins_as_noise_ends_its_mode_where_it_is_more_than_noise(
     for cut in (0.0, 0.3 * end, 0.7 * end):
         moved = np.array([polyval(cut, falls), falls[1] + 2.0 * falls[2] * cut, falls[2]])
         assert cut + first_root(moved, 2.0, noise) == pytest.approx(end, rel=1e-12)
-
-
-def test_a_force_may_change_faster_than_what_it_moves():
-    """Its step is the one at which its own last two terms are below the tolerance; a position's is
-    shorter, for those of its rate to be."""
-    terms = row_of([1.0, 1e3, 1e6, 1e9])
-    assert series.force_step(terms, 0, 3, 1e-9, 1.0) == pytest.approx(math.sqrt(1e-15))
-    assert series.force_step(terms, 0, 3, 1e-9, 1e-8) == 1e-8
-    assert series.force_step(row_of([1.0, 0.0, 0.0]), 0, 2, 1e-9, 1.0) == 1.0
-    assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < 1e-8
 
 
 @pytest.mark.parametrize("order", [12, 13, 14, 15])

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from loaded import places, random_scene
+from cases import places, random_scene
 from stepping import ROCKS, run_at, setting_of, six
 
 from rockcheck.ebm import EventBasedModel, natural
