@@ -140,23 +140,6 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
         assert above.channels["x"][-1] == pytest.approx(-0.5 * 1e-7 * G * limit * 9.0, rel=1e-5)
 
 
-def test_what_cannot_slip_waits_for_the_slope():
-    """The base's acceleration grows evenly: Coulomb's block slips as it passes the friction,
-    Housner's stands up to the slope."""
-    floor = Floor(friction=0.5 * SLOPE)
-    growing = scene_of(
-        floor=floor,
-        excitation=Record.from_samples([0.0, 2.0 * SLOPE * G], time_step=1.0),
-        duration=0.6,
-    )
-    slips, tips = (
-        play(growing, **settings).event_list[0] for settings in ({}, {"friction": "no-slip"})
-    )
-    assert (slips.kind, tips.kind) == ("slip", "uplift")
-    assert abs(slips.t - 0.25) < 1e-9
-    assert abs(tips.t - 0.5) < 1e-9
-
-
 @pivots
 def test_balance_point(pivot):
     """At theta = alpha the block stands on its corner for ever; a little less and it comes back, a

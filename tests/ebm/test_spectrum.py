@@ -1,12 +1,12 @@
 """Overturning spectra: against reference runs at their nodes, refinement against the full grid,
 records, and bad input."""
 
-from itertools import groupby
+import itertools
 from operator import itemgetter
 
 import numpy as np
 import pytest
-from cases import BILATERAL
+from cases import BILATERAL, random_scene
 
 from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
@@ -31,7 +31,10 @@ def scene(*walls, friction=0.3, excitation=None):
 
 
 setting_of = itemgetter("side", "gap", "e_w", "mu")
-RUNS = {key: list(rows) for key, rows in groupby(sorted(BILATERAL, key=setting_of), key=setting_of)}
+RUNS = {
+    key: list(rows)
+    for key, rows in itertools.groupby(sorted(BILATERAL, key=setting_of), key=setting_of)
+}
 
 
 @pytest.mark.parametrize(
@@ -134,9 +137,10 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
         np.array([1.0 + 11.0 * i / 99 for i in (6, 7, 7)]),
         np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)]),
     )
-    sides, failed = play_nodes(scene(wall), a, f, model=model)
-    assert not failed.any()
-    assert not sides.any()
+    for beside, sign in ((scene(wall), 1.0), (scene(wall).mirrored(), -1.0)):
+        sides, failed = play_nodes(beside, sign * a, f, model=model)
+        assert not failed.any()
+        assert not sides.any()
     nodes = [node_scene(scene(wall), *node, settle=300.0) for node in zip(a, f, strict=True)]
     early = batch.run_batch(batch.pack(nodes, model), model)
     fine = EventBasedModel(tolerance=1e-13)
@@ -150,41 +154,50 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     assert (
         energy / (1.0 - np.cos(PAPER_BLOCK.alpha))
     ).max() > 0.9  # where impacts might add what is missing
-    mirrored, failed = play_nodes(scene(wall).mirrored(), -a, f, model=model)
-    assert not failed.any()
-    assert not mirrored.any()
 
 
-def decided_and_whole(wall, most):
-    """Scenes of a grid of pulses beside a wall, and their runs, decided early and to the end: sides
-    and peaks are the same."""
-    axes = np.meshgrid(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
-    nodes = [
-        node_scene(scene(wall), *node, settle=60.0)
-        for node in zip(*map(np.ravel, axes), strict=True)
-    ]
-    model = EventBasedModel(tolerance=1e-9)
+def decided_early(scenes, tolerance, **near):
+    """Runs of scenes, decided as soon as all is certain: sides and peaks are those of the whole
+    runs."""
+    model = EventBasedModel(tolerance=tolerance)
     early, whole = (
-        batch.run_batch(batch.pack(nodes, model), model, until_decided=decided)
+        batch.run_batch(batch.pack(scenes, model), model, until_decided=decided)
         for decided in (True, False)
     )
     np.testing.assert_array_equal(early.side, whole.side)
-    np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
-    return nodes, early
+    np.testing.assert_allclose(early.peak, whole.peak, **near)
+    assert np.sum(early.series) < np.sum(whole.series)
+    return early
+
+
+def grid_beside(wall, most):
+    """Scenes of a grid of pulses beside a wall."""
+    axes = np.meshgrid(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
+    nodes = zip(*map(np.ravel, axes), strict=True)
+    return [node_scene(scene(wall), *node, settle=60.0) for node in nodes]
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
 def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
     """Beside walls that return nearly all."""
-    decided_and_whole(Wall(side="right", gap=0.053, restitution=restitution), 9.0)
+    wall = Wall(side="right", gap=0.053, restitution=restitution)
+    decided_early(grid_beside(wall, 9.0), 1e-9, rtol=1e-6)
 
 
 def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     """What is left of the pulse bounds the energy that it can still bring."""
-    nodes, early = decided_and_whole(Wall(side="left", gap=0.003), 5.0)
+    nodes = grid_beside(Wall(side="left", gap=0.003), 5.0)
+    early = decided_early(nodes, 1e-9, rtol=1e-6)
     quiet = np.array([quiet_from(natural.base_of(node), 1e-9) for node in nodes])
     safe = (early.side == 0) & (early.peak > 0.0)
     assert np.count_nonzero(early.t_end[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
+
+
+def test_what_is_decided_early_of_loaded_blocks():
+    rng = np.random.default_rng(13)
+    scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
+    early = decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11)
+    assert {-1, 0, 1} == set(early.side.tolist())
 
 
 def test_a_record_is_scaled_and_the_block_resized():
@@ -198,14 +211,10 @@ def test_a_record_is_scaled_and_the_block_resized():
     np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
-    for i, scale in enumerate(scales):
-        for j, size in enumerate(sizes):
-            outcome = (
-                EventBasedModel(tolerance=1e-9)
-                .simulate(node_scene(start, scale, size, settle=20.0))
-                .outcome
-            )
-            assert outcome.startswith("overturned") == bool(spectrum.outcomes[i, j])
+    model, nodes = EventBasedModel(tolerance=1e-9), itertools.product(scales, sizes)
+    for node, overturned in zip(nodes, spectrum.outcomes.ravel(), strict=True):
+        outcome = model.simulate(node_scene(start, *node, settle=20.0)).outcome
+        assert outcome.startswith("overturned") == bool(overturned)
     assert 0 < np.count_nonzero(spectrum.outcomes) < spectrum.outcomes.size
 
 
