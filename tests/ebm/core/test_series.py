@@ -157,32 +157,27 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     """A step ends where the force is positive again if it falls by less than noise, else in an
     event, as where it begins below."""
     place, run = 0.1, run_at()
-    a, state = run.a, run.state
-
-    def first(length: float) -> tuple[float, int]:
-        state.order, state.length = 2, length
-        guards.first_event(run)
-        return float(state.tau), int(state.guard)
-
+    touch = np.array([place * place - dip, -2.0 * place, 1.0])
     for which in range(len(guards.KIND)):
-        guards.drop(a, which)
-    a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
-    a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0
-    a[Row.P, :3] = place * place - dip, -2.0 * place, 1.0
-    tau, which = first(1.0)
-    a[Row.P, 0] = -1e-8
-    assert first(1.0) == (0.0, Guard.FLOOR_PUSH)
-    a[Row.P, 0] = place * place - dip
+        guards.drop(run.a, which)
+    run.a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
+    run.a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0
+
+    def first(terms, length: float) -> tuple[float, int]:
+        run.a[Row.P, :3] = terms
+        run.state.order, run.state.length = 2, length
+        guards.first_event(run)
+        return float(run.state.tau), int(run.state.guard)
+
+    tau, which = first(touch, 1.0)
+    assert first([-1e-8, *touch[1:]], 1.0) == (0.0, Guard.FLOOR_PUSH)
     if dip > series.NOISE[Kind.FORCE]:
         assert (tau, which) == (pytest.approx(place - math.sqrt(dip), abs=1e-12), Guard.FLOOR_PUSH)
-    else:
-        touched = pytest.approx(place + math.sqrt(dip), abs=3e-9)
-        assert (tau, which) == (touched, Guard.NONE) or (
-            dip == 0.0 and (tau, which) == (1.0, Guard.NONE)
-        )
-        a[Row.P, 0] += tau * (a[Row.P, 1] + tau)  # the series about tau
-        a[Row.P, 1] += 2.0 * tau
-        assert first(0.5) == (0.5, Guard.NONE)
+        return
+    assert which == Guard.NONE
+    assert tau == pytest.approx(place + math.sqrt(dip), abs=3e-9) or (dip == 0.0 and tau == 1.0)
+    about = [polyval(tau, touch), touch[1] + 2.0 * tau, 1.0]
+    assert first(about, 0.5) == (0.5, Guard.NONE)
 
 
 @pytest.mark.parametrize("noise", NOISES)
