@@ -245,13 +245,16 @@ class PaperModel:
             if Sw * (v - R * C * w) >= 0.0:  # B
                 return np.array([y[0], y[1], v, w]), False
             return np.array([y[0], y[1], 0.0, 0.0]), e == 0.0  # C
-        found = []
-        for Sr in (1, -1):
-            for sy in (1, -1):
-                v, w, P, Q, N = self.impact(S, y, vertical, e=e, slips=Sr, sense=sy)
-                if sign(P) == sy and sign(v + R * c * w) == Sr:
-                    found.append((v, w, N, -self.mu_k * Sr * sy))
-        ((v, w, N, k),) = found
+        trials = [
+            (-self.mu_k * Sr * sy, Sr, sy, *self.impact(S, y, vertical, e=e, slips=Sr, sense=sy))
+            for Sr in (1, -1)
+            for sy in (1, -1)
+        ]
+        ((v, w, N, k),) = (
+            (v, w, N, k)
+            for k, Sr, sy, v, w, P, _, N in trials
+            if sign(P) == sy and sign(v + R * c * w) == Sr
+        )
         if N >= 0.0:  # D
             return np.array([y[0], y[1], v, w]), e == 0.0
         # E: no impulse from the wall, whose corner neither rebounds nor enters; the moment is what
@@ -373,11 +376,7 @@ class PaperModel:
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """x, theta, dx/dt, dtheta/dt at the times, up to where the run ended."""
-        rows, k = [], 0
-        for t in times:
-            while k < len(self.pieces) - 1 and t > self.pieces[k][1]:
-                k += 1
-            if t > self.pieces[k][1] + 1e-9:
-                break
-            rows.append(self.pieces[k][2](t))
-        return np.array(rows)
+        ends = [end for _, end, _ in self.pieces]
+        times = times[times <= ends[-1] + 1e-9]
+        pieces = np.minimum(np.searchsorted(ends, times), len(ends) - 1)
+        return np.array([self.pieces[k][2](t) for k, t in zip(pieces, times, strict=True)])
