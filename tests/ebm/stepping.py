@@ -24,26 +24,13 @@ def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int)
     are 0."""
     state = np.zeros(1, STATE)[0]
     state.t, state.t_end = t, math.inf
-    put(state.motion, motion)
+    for name, value in zip(state.motion.dtype.names, motion, strict=True):
+        setattr(state.motion, name, value)
     for name, value in mode.items():
         setattr(state.mode, name, value)
     modes.forget(state)
     state.control = (1e-10, 100, 100, False, 1.0)
     return Run(state, *workspace(), nothing())
-
-
-def changed(setting: Any, **values: float) -> Any:
-    """A record with other values in these fields."""
-    other = setting.copy()
-    for name, value in values.items():
-        setattr(other, name, value)
-    return other
-
-
-def put(motion: Any, values: Sequence[float]) -> None:
-    """Writes x, y, theta and their rates."""
-    for name, value in zip(motion.dtype.names, values, strict=True):
-        setattr(motion, name, value)
 
 
 def six(motion: Any) -> np.ndarray:

@@ -46,40 +46,41 @@ def test_a_block_rocks_on_until_its_rate_is_a_ten_millionth(pivot):
         assert len(rates) == math.ceil(math.log(5e-8 / first) / math.log(ratio))
 
 
+@pytest.mark.parametrize(
+    ("which", "pivot", "toward"),
+    [
+        (Guard.LANDING, Pivot.OFF, 0),
+        (Guard.TIP_GAP, Pivot.STICK, 1),
+        (Guard.TIP_GAP, Pivot.SLIPPING, 1),
+        (Guard.FAR_GAP, Pivot.SLIPPING, -1),
+    ],
+)
+@pytest.mark.parametrize("tilt", [0.0, 0.15])
 @pytest.mark.parametrize("side", [1, -1])
-def test_a_block_is_put_onto_the_contact_that_closes(side):
+def test_a_block_is_put_onto_the_contact_that_closes(side, tilt, which, pivot, toward):
     """The gap is zero to rounding, whichever it was and whatever the pivot does; what need not give
     way keeps its place."""
-    alpha, gap, off = 0.4, 0.05, 1e-7
-    walls = (Wall(side="left", gap=gap), Wall(side="right", gap=2.0 * gap))
-    b = setting_of(alpha, walls=walls)
-    for tilt in (0.0, 0.15):
-        family, tip = (Family.TILT, side) if tilt else (Family.FLAT, 1)
-        for which, floor, wall in (
-            (Guard.LANDING, Pivot.OFF, 0),
-            (Guard.TIP_GAP, Pivot.STICK, tip),
-            (Guard.TIP_GAP, Pivot.SLIPPING, tip),
-            (Guard.FAR_GAP, Pivot.SLIPPING, -tip),
-        ):
-            place = [0.0, math.cos(alpha - tilt), side * tilt, 0.0, 0.0, 0.0]
-            state = run_at(place, family=family, sense=tip, pivot=floor).state
-            z = state.motion
-            if wall:
-                z.x = -wall * (contacts.wall_gap(b, z, wall) - off)
-            else:
-                z.y += off
-            before = six(z)
-            strike.touch(b, state.mode, z, which)
-            gap = contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
-            assert gap == pytest.approx(0.0, abs=1e-13)
-            assert np.max(np.abs(six(z) - before)) == pytest.approx(off, rel=1.0)
-            if wall and tilt and floor == Pivot.STICK:
-                pivots = [one[0] - side * math.sin(alpha - abs(one[2])) for one in (before, six(z))]
-                assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
-                assert contacts.floor_gap(b, z) == 0.0
-            else:
-                kept = [k for k in range(6) if k != (0 if wall else 1)]
-                np.testing.assert_array_equal(six(z)[kept], before[kept])
+    alpha, off = 0.4, 1e-7
+    b = setting_of(alpha, walls=[Wall(side="left", gap=0.05), Wall(side="right", gap=0.1)])
+    family, sense = (Family.TILT, side) if tilt else (Family.FLAT, 1)
+    wall = toward * sense
+    place = [0.0, math.cos(alpha - tilt) + off * (wall == 0), side * tilt, 0.0, 0.0, 0.0]
+    state = run_at(place, family=family, sense=sense, pivot=pivot).state
+    z = state.motion
+    if wall:
+        z.x = -wall * (contacts.wall_gap(b, z, wall) - off)
+    before = six(z)
+    strike.touch(b, state.mode, z, which)
+    gap = contacts.wall_gap(b, z, wall) if wall else contacts.floor_gap(b, z)
+    assert gap == pytest.approx(0.0, abs=1e-13)
+    assert np.max(np.abs(six(z) - before)) == pytest.approx(off, rel=1.0)
+    if wall and tilt and pivot == Pivot.STICK:
+        pivots = [one[0] - side * math.sin(alpha - abs(one[2])) for one in (before, six(z))]
+        assert pivots[1] == pytest.approx(pivots[0], abs=1e-15)
+        assert contacts.floor_gap(b, z) == 0.0
+    else:
+        kept = [k for k in range(6) if k != (0 if wall else 1)]
+        np.testing.assert_array_equal(six(z)[kept], before[kept])
 
 
 @pytest.mark.parametrize(
