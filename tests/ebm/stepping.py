@@ -46,23 +46,6 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     return states[0]
 
 
-ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
-EVEN = ("t", "y", "y_dot", "mode")
-
-
-def assert_mirror_images(a: History, b: History) -> None:
-    for name in EVEN:
-        np.testing.assert_array_equal(a.channels[name], b.channels[name], err_msg=name)
-    for name in ODD:
-        np.testing.assert_array_equal(a.channels[name], -b.channels[name], err_msg=name)
-    swap = {"overturned left": "overturned right", "overturned right": "overturned left"}
-    assert b.outcome == swap.get(a.outcome, a.outcome)
-    assert [
-        (e.t, swap.get(e.kind, e.kind), e.mode_before, e.mode_after, e.impulse)
-        for e in a.event_list
-    ] == [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in b.event_list]
-
-
 def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) -> None:
     """Finite rows, and no corner by more than `reach` m in the floor or in a wall."""
     x, y, theta = (history.channels[name] for name in ("x", "y", "theta"))

@@ -252,24 +252,22 @@ def test_least_overturning_amplitude_and_area():
     assert np.isnan(least[1])
 
 
+STILL = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
+
+
 @pytest.mark.parametrize(
-    ("frequencies", "amplitudes", "said"),
+    ("start", "frequencies", "amplitudes", "said"),
     [
-        ([], [1.0], "frequency_ratios"),
-        ([1.0, np.nan], [1.0], "positive finite"),
-        ([1.0], [2.0, 1.0], "amplitude_ratios: increasing"),
-        ([1.0], [0.0, 1.0], "positive"),
-        ([1.0], ["a"], "numbers are asked for"),
-        ([[1.0]], [1.0], "dimensions"),
-        (np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
+        (scene(), [], [1.0], "frequency_ratios"),
+        (scene(), [1.0, np.nan], [1.0], "positive finite"),
+        (scene(), [1.0], [2.0, 1.0], "amplitude_ratios: increasing"),
+        (scene(), [1.0], [0.0, 1.0], "positive"),
+        (scene(), [1.0], ["a"], "numbers are asked for"),
+        (scene(), [[1.0]], [1.0], "dimensions"),
+        (scene(), np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
+        (STILL, [1.0], [1.0], "ricker or sine pulse, or a record"),
     ],
 )
-def test_grids_that_cannot_be(frequencies, amplitudes, said):
+def test_what_has_no_spectrum(start, frequencies, amplitudes, said):
     with pytest.raises(InputError, match=said):
-        overturning_spectrum(scene(), frequencies, amplitudes)
-
-
-def test_a_base_at_rest_has_no_spectrum():
-    at_rest = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
-    with pytest.raises(InputError, match="ricker or sine pulse, or a record"):
-        overturning_spectrum(at_rest, [1.0], [1.0])
+        overturning_spectrum(start, frequencies, amplitudes)
