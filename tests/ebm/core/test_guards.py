@@ -19,7 +19,7 @@ from situations import (
     run_of,
     standing,
 )
-from stepping import ROCKS, TILTED, run_at, setting_of, six
+from stepping import ROCKS, TILTED, run_at, setting_of
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import (
@@ -33,7 +33,6 @@ from rockcheck.ebm.core import (
 )
 from rockcheck.ebm.core.names import Guard, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.ebm.core.state import Run
 from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -270,10 +269,11 @@ def test_series_begin_with_newton_and_euler(mode, case):
         assert found == pytest.approx(expected[2:], rel=1e-9, abs=1e-9), (mode, case, S)
 
 
+@pytest.mark.parametrize("friction", ["coulomb", "bouc-wen"])
 @pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
-def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
-    """x follows the corner's reach, +-s', in every term of the series, for 100 loaded blocks that
-    turn along a wall."""
+def test_series_keep_the_corner_on_its_wall(case, friction):
+    """x follows the corner's reach, +-s', and y the pivot's in every term of the series, for 100
+    loaded blocks that turn along a wall."""
     rng, order = np.random.default_rng(14), 8
     for _ in range(100):
         scene = random_scene(rng).replace(walls=WALLS)
@@ -285,35 +285,12 @@ def test_bouc_wens_series_keep_the_corner_on_its_wall(case):
         along = {"sense": S, "slip": 1 if S * w > 0 else -1, "tip": case > 0, "far": case < 0}
         start = [0.0, -pivot[1], theta, w * corner[1], -w * pivot[0], w]
         run = run_at(start, t=1.0, **TILTED, pivot=Pivot.SLIPPING, **along)
-        bouc_wen.friction_series(b, natural.base_of(scene), run, 0.3, False, order)
-        a = run.a
+        if friction == "coulomb":
+            motion.tilt_series(b, natural.base_of(scene), run, order, 0.0, 0.0)
+            terms = run.a[:, : order - 1]
+            assert terms[Row.Y] == pytest.approx(terms[Row.COS], rel=1e-10, abs=1e-10)
+        else:
+            bouc_wen.friction_series(b, natural.base_of(scene), run, 0.3, False, order)
+        x, s, c = (run.a[row, : order - 1] for row in (Row.XI, Row.SIN, Row.COS))
         sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
-        reach = case * (sine * a[Row.COS] - cosine * a[Row.SIN])
-        assert a[Row.XI, 1 : order - 1] == pytest.approx(reach[1 : order - 1], rel=1e-10, abs=1e-10)
-
-
-@pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
-def test_a_step_along_a_wall_ends_on_wall_and_floor(case):
-    """LADDER of 50 loaded blocks: corner and pivot stay where they are held, and rates are those of
-    the places."""
-    rng = np.random.default_rng(21)
-    for _ in range(50):
-        scene = random_scene(rng).replace(walls=WALLS)
-        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
-        S, w = int(rng.choice([-1, 1])), rng.uniform(-0.3, 0.3)
-        side = b.left if S > 0 else b.right
-        phi = rng.uniform(0.1, 0.8) * side.alpha
-        along = {"sense": S, "pivot": Pivot.SLIPPING, "slip": 1, "tip": case > 0, "far": case < 0}
-        run = run_at([0.0, 0.0, S * phi, 0.0, 0.0, S * w], t=1.0, **TILTED | along)
-        z = run.state.motion
-        z.x -= S * case * contacts.wall_gap(b, z, S * case)
-        run.state.order = motion.tilt_series(b, natural.base_of(scene), run, 15, 0.0, 0.0)
-        before, there, after = (ended_at(b, run, tau) for tau in (0.02 - 1e-5, 0.02, 0.02 + 1e-5))
-        assert contacts.wall_gap(b, run.state.sampled, S * case) == pytest.approx(0.0, abs=1e-14)
-        assert contacts.floor_gap(b, run.state.sampled) == pytest.approx(0.0, abs=1e-14)
-        assert there[3:] == pytest.approx((after - before)[:3] / 2e-5, abs=1e-8)
-
-
-def ended_at(b: np.record, run: Run, tau: float) -> np.ndarray:
-    motion.motion_at(b, run.state, run.a, tau, run.state.sampled)
-    return six(run.state.sampled)
+        assert x[1:] == pytest.approx(case * (sine * c - cosine * s)[1:], rel=1e-10, abs=1e-10)
