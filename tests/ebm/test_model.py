@@ -145,27 +145,25 @@ def test_note_where_a_record_is_short():
     assert notes == (f"the horizontal {ends}", f"the vertical {ends}")
 
 
-@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
 @pytest.mark.parametrize(
     "settings", [{}, {"pivot": "unilateral"}, {"friction": "bouc-wen"}], ids=str
 )
 @pytest.mark.parametrize(("tilt", "spin"), [(0.99, 0.3), (1.3, 0.0)])
-def test_overturning_ends_the_history(tilt, spin, settings, side):
+def test_overturning_ends_the_history(tilt, spin, settings, side, sign):
     """Also from past the balance point, at rest."""
-    sign = 1.0 if side == "left" else -1.0
     scene = scene_of(
         initial_rotation=sign * tilt * PAPER_BLOCK.alpha,
         initial_angular_velocity=sign * spin,
         duration=30.0,
     )
     history = EventBasedModel(**settings).simulate(scene)
-    assert history.outcome == f"overturned {side}"
-    last = history.event_list[-1]
-    assert last.kind == f"overturned {side}"
-    assert history.channels["t"][-1] < last.t < history.channels["t"][-1] + scene.output_step
-    assert 1.4 < abs(history.channels["theta"][-1]) < math.pi / 2
-    assert np.all(np.diff(sign * history.channels["theta"]) > 0.0)
-    assert {len(channel) for channel in history.channels.values()} == {len(history.channels["t"])}
+    last, t, theta = history.event_list[-1], history.channels["t"], history.channels["theta"]
+    assert history.outcome == last.kind == f"overturned {side}"
+    assert t[-1] < last.t < t[-1] + scene.output_step
+    assert 1.4 < abs(theta[-1]) < math.pi / 2
+    assert np.all(np.diff(sign * theta) > 0.0)
+    assert {len(channel) for channel in history.channels.values()} == {len(t)}
 
 
 def test_events_of_a_flight_are_not_floor_impacts():

@@ -15,6 +15,7 @@ from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
+RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
 SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 
@@ -201,14 +202,13 @@ def test_what_is_decided_early_of_loaded_blocks():
 
 
 def test_a_record_is_scaled_and_the_block_resized():
-    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
-    start = scene(excitation=record)
+    start = scene(excitation=RECORD)
     node = node_scene(start, 2.0, 0.5)
     assert (node.block.half_width, node.block.half_height) == (
         0.5 * PAPER_BLOCK.half_width,
         0.5 * PAPER_BLOCK.half_height,
     )
-    np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
+    np.testing.assert_allclose(node.excitation.samples, 2.0 * RECORD.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
     model, nodes = EventBasedModel(tolerance=1e-9), itertools.product(scales, sizes)
@@ -219,10 +219,9 @@ def test_a_record_is_scaled_and_the_block_resized():
 
 
 def test_motions_at_nodes_are_those_that_the_model_simulates():
-    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
     model, seen = EventBasedModel(tolerance=1e-10), set()
     a, f = np.array([1.2, 2.0, 4.0, 9.0]), np.array([0.8, 0.5, 1.0, 2.5])
-    for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=record)):
+    for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=RECORD)):
         for motion, *node in zip(
             play_motions(start, a, f, model=model, parts=50), a, f, strict=True
         ):

@@ -83,20 +83,19 @@ def test_signs_of_all_short_patterns():
         assert found == (0.0 if first < 0.0 else None), pattern
 
 
-def test_a_zero_at_the_start_is_divided_out():
+@pytest.mark.parametrize("k", [1, 2, 3])
+def test_a_zero_at_the_start_is_divided_out(k):
     """tau^k q(tau) with q(0) > 0: the event that was just met is not met again, and the next one is
     found."""
     rng = np.random.default_rng(43)
-    for k in (1, 2, 3):
-        for _ in range(100):
-            root = rng.uniform(0.05, 0.9)
-            c = np.concatenate([np.zeros(k), [root, -1.0], np.zeros(4)])
-            c[:k] = rng.normal(0.0, 1e-15, k)  # what rounding leaves of the zeros
-            assert leading(c) == 1
-            assert first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
-            assert first_root(c, 0.9 * root) is None
-            assert leading(-c) == -1
-            assert first_root(-c, 1.0) == 0.0
+    for root in rng.uniform(0.05, 0.9, 100):
+        # What rounding leaves of the zeros.
+        c = np.array([*rng.normal(0.0, 1e-15, k), root, -1.0, 0.0, 0.0, 0.0, 0.0])
+        assert leading(c) == 1
+        assert first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
+        assert first_root(c, 0.9 * root) is None
+        assert leading(-c) == -1
+        assert first_root(-c, 1.0) == 0.0
 
 
 @pytest.mark.parametrize("start", [-0.9, -0.4, 0.0, 0.4, 0.9])
@@ -183,17 +182,34 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
 @pytest.mark.parametrize("noise", NOISES)
 def test_noise_is_no_sign(noise):
     """A value below the noise tells nothing: what follows it does."""
-    for sign in (1.0, -1.0):
-        assert leading([sign * 0.5 * noise], noise) == 0
-        assert leading([sign * 2.0 * noise], noise) == sign
-        assert leading([-sign * 0.5 * noise, sign], noise) == sign
-        assert leading([0.0, -sign * 0.5 * noise / series.AHEAD, sign], noise) == sign
-    assert first_root([0.5 * noise, 0.0, -1.0], 1.0, noise) == 0.0
-    assert first_root([-0.5 * noise, 0.0, 1.0], 1.0, noise) is None
+    for terms, sign in (
+        ([0.5 * noise], 0),
+        ([2.0 * noise], 1),
+        ([-0.5 * noise, 1.0], 1),
+        ([0.0, -0.5 * noise / series.AHEAD, 1.0], 1),
+    ):
+        assert leading(terms, noise) == sign
+        assert leading(-np.array(terms), noise) == -sign
+    for terms, root in (([0.5, 0.0, -1.0 / noise], 0.0), ([-0.5, 0.0, 1.0 / noise], None)):
+        assert first_root(noise * np.array(terms), 1.0, noise) == root
     assert first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None
-    # Negative, but for less than an instant: an event's time is not known better than that.
-    assert leading([-1e-10, 1.0]) == 1
-    assert leading([-1e-8, 1.0]) == -1
+
+
+@pytest.mark.parametrize(
+    ("terms", "sign"),
+    [
+        # Negative, but for less than an instant: an event's time is not known better than that.
+        ([-1e-10, 1.0], 1),
+        ([-1e-8, 1.0], -1),
+        # Where friction nearly jams the pivot terms beyond the third grow without bound: the noise
+        # that they bring is not that of a slope. The third one's is.
+        ([0.0, -1e-7, 0.0, 1e12], -1),
+        ([0.0, -1e-7, 1e12], 1),
+    ],
+    ids=str,
+)
+def test_what_counts_as_a_start(terms, sign):
+    assert leading(terms) == sign
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -212,20 +228,13 @@ def test_what_is_noise_at_first_may_grow(noise):
     )
 
 
-def test_terms_beyond_the_third_drown_no_earlier_one():
-    """Where friction nearly jams the pivot they grow without bound: the noise that they bring is
-    not that of a slope."""
-    assert leading([0.0, -1e-7, 0.0, 1e12]) == -1
-    assert leading([0.0, -1e-7, 1e12]) == 1, "the third one does"
-
-
+@pytest.mark.parametrize(("share", "leads"), [(0.99, True), (1.01, False)])
 @pytest.mark.parametrize("ahead", [0.1, 10.0])
-def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead):
-    for share, leads in ((0.99, True), (1.01, False)):
-        noisy = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
-        assert series.leads_up(1.0, noisy[0], 0.0, 0.0, ahead) == leads
-        assert series.leads_up(1.0, 0.0, -noisy[1], 0.0, ahead) == leads
-        assert series.leads_up(1.0, 0.0, 0.0, share, ahead) == leads
+def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead, share, leads):
+    rate, bend = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
+    assert series.leads_up(1.0, rate, 0.0, 0.0, ahead) == leads
+    assert series.leads_up(1.0, 0.0, -bend, 0.0, ahead) == leads
+    assert series.leads_up(1.0, 0.0, 0.0, share, ahead) == leads
 
 
 @pytest.mark.parametrize("seed", range(40))
