@@ -91,10 +91,10 @@ RACK = Block(
 )
 
 
-def loaded_scene(block: Block = RACK, mu: float = 0.6, **more: Any) -> Scene:
+def block_scene(block: Block = RACK, mu: float = 0.6, **more: Any) -> Scene:
     return Scene(
         **{
-            "name": "loaded",
+            "name": "block",
             "block": block,
             "floor": Floor(friction=mu),
             "duration": 4.0,
@@ -133,6 +133,6 @@ def random_scene(rng: np.random.Generator) -> Scene:
         if rng.uniform() < 0.6
     ]
     pulse = Ricker(amplitude=G * block.slope * rng.uniform(1.0, 4.0), period=rng.uniform(0.4, 1.5))
-    return loaded_scene(
+    return block_scene(
         block, min(mu, 1.0), walls=walls, excitation=pulse, duration=3.0, output_step=0.01
     )

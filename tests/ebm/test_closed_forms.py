@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from cases import RACK, G, loaded_scene
+from cases import RACK, G, block_scene
 from scipy.integrate import quad, solve_ivp
 from stepping import block_of
 
@@ -18,13 +18,6 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall, kinematics
 
 PIVOTS = ["bilateral", "unilateral"]
-
-
-def scene_of(block: Block, mu: float, duration: float, **more: object) -> Scene:
-    return Scene(
-        **{"name": "closed form", "block": block, "floor": Floor(friction=mu), "duration": duration}
-        | more
-    )
 
 
 # --- Housner (1963): free rocking
@@ -60,7 +53,7 @@ def first_impact(scene: Scene, **settings: object) -> float:
 @pytest.mark.parametrize("alpha", [0.02, 0.25, 0.6])
 def test_quarter_period(alpha, tilt, pivot):
     block = block_of(alpha, 1.6)
-    scene = scene_of(block, 1.3, 8.0, initial_rotation=tilt * alpha)
+    scene = block_scene(block, 1.3, duration=8.0, initial_rotation=tilt * alpha)
     assert first_impact(
         scene, pivot=pivot, friction="no-slip" if pivot == "bilateral" else "coulomb"
     ) == pytest.approx(quarter_period(block, abs(tilt) * alpha), abs=1e-9)
@@ -70,7 +63,7 @@ def test_quarter_period(alpha, tilt, pivot):
 def test_quarter_period_of_a_needle_is_housners(tilt):
     """acosh(1/(1 - theta/alpha))/p, which is exact for alpha -> 0."""
     block = block_of(1e-5, 2.0)
-    scene = scene_of(block, 0.5, 3.0, initial_rotation=tilt * block.alpha)
+    scene = block_scene(block, 0.5, duration=3.0, initial_rotation=tilt * block.alpha)
     assert first_impact(scene) == pytest.approx(
         math.acosh(1.0 / (1.0 - tilt)) / scene.frequency_parameter, abs=1e-9
     )
@@ -81,7 +74,7 @@ def test_quarter_period_of_a_needle_is_housners(tilt):
 def test_energy_is_conserved_between_impacts_and_falls_by_housners_ratio(tilt, pivot, block):
     """Angular velocity after over before an impact, 1 - 1.5 sin^2 alpha, from the energy of the
     rows around it."""
-    scene = scene_of(block, 1.0, 10.0, initial_rotation=tilt * block.alpha)
+    scene = block_scene(block, 1.0, duration=10.0, initial_rotation=tilt * block.alpha)
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
     motion = history.channels
     energy = kinematics.energy(
@@ -129,7 +122,7 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio):
     model = EventBasedModel(tolerance=1e-13, friction="no-slip")
     for factor in (1.0 - 1e-9, 1.0 + 1e-9):
         pulse = Record.from_samples([a, a], time_step=factor * least)
-        scene = scene_of(block, 1.0, 60.0, excitation=pulse, output_step=1.0)
+        scene = block_scene(block, 1.0, duration=60.0, excitation=pulse, output_step=1.0)
         assert (model.simulate(scene).outcome == "overturned left") is (factor > 1.0)
 
 
@@ -141,7 +134,7 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio):
 def test_sliding_distance(mu, speed, pivot, block):
     """v^2/(2 mu g), in the time v/(mu g)."""
     history = EventBasedModel(pivot=pivot).simulate(
-        scene_of(block, mu, 4.0, initial_velocity=speed)
+        block_scene(block, mu, duration=4.0, initial_velocity=speed)
     )
     assert history.outcome == "at rest"
     assert history.channels["x"][-1] == pytest.approx(
@@ -157,7 +150,7 @@ def test_bounce_heights(restitution, block):
     """A flat drop from h rises to e^(2n) h after its n-th bounce, and hits the floor when a ball
     would."""
     drop = 0.1
-    scene = scene_of(block, 0.5, 3.0, initial_height=drop).replace(
+    scene = block_scene(block, 0.5, duration=3.0, initial_height=drop, output_step=0.005).replace(
         floor=Floor(friction=0.5, restitution=restitution)
     )
     history = EventBasedModel(pivot="unilateral").simulate(scene)
@@ -263,7 +256,7 @@ def rocking_by_lagrange(scene: Scene) -> Callable[[np.ndarray], np.ndarray]:
 def test_free_rocking_is_lagranges(tilt, pivot):
     """1.2 s of free rocking over several landings, to 1e-9 rad, whichever pivot comes first; energy
     is kept between impacts."""
-    scene = loaded_scene(duration=1.2, initial_rotation=tilt)
+    scene = block_scene(duration=1.2, initial_rotation=tilt)
     history = EventBasedModel(pivot=pivot, tolerance=1e-13).simulate(scene)
     c = history.channels
     np.testing.assert_allclose(c["theta"], rocking_by_lagrange(scene)(c["t"]), rtol=0.0, atol=1e-9)
@@ -281,7 +274,7 @@ def test_free_rocking_is_lagranges(tilt, pivot):
 def test_a_pulse_is_lagranges(sense):
     """Rocking on both pivots and landings under a pulse, to 1e-8 rad."""
     pulse = Sine(amplitude=sense * 6.0, period=0.7)
-    scene = loaded_scene(duration=1.4, excitation=pulse, initial_rotation=-0.05 * sense)
+    scene = block_scene(duration=1.4, excitation=pulse, initial_rotation=-0.05 * sense)
     c = EventBasedModel(friction="no-slip", tolerance=1e-13).simulate(scene).channels
     assert min(np.max(c["theta"]), -np.min(c["theta"])) > 0.02
     np.testing.assert_allclose(c["theta"], rocking_by_lagrange(scene)(c["t"]), rtol=0.0, atol=1e-8)
@@ -316,7 +309,7 @@ def test_uplift_at_the_least_acceleration_of_each_side(sense, mu, settings):
     alpha of that side's pivot, whatever its friction if it cannot slip."""
     side = RACK.pivot("left" if sense > 0.0 else "right")
     ramp = Record.from_samples(sense * np.linspace(0.0, 0.6 * G, 601), 0.01)
-    scene = loaded_scene(mu=mu, duration=6.0, excitation=ramp)
+    scene = block_scene(mu=mu, duration=6.0, excitation=ramp)
     uplift = EventBasedModel(tolerance=1e-12, **settings).simulate(scene).event_list[0]
     assert uplift.kind == "uplift"
     assert uplift.t == pytest.approx(side.arm / side.height / 0.6 * 6.0, abs=1e-9)
@@ -330,7 +323,7 @@ def test_the_homogeneous_block_is_the_symmetric_instance(pivot):
     assert block.replace(centre_of_mass=(0.0, 0.0)) == block
     same = block.replace(mass=3.0, moment_of_inertia=0.3**2 + 1.0)
     walls, pulse = [Wall(side="left", gap=0.03, restitution=0.4)], Ricker(amplitude=7.0, period=0.9)
-    scene = loaded_scene(block, 0.4, excitation=pulse, walls=walls, duration=3.0)
+    scene = block_scene(block, 0.4, excitation=pulse, walls=walls, duration=3.0)
     model = EventBasedModel(pivot=pivot, tolerance=1e-12)
     plain, *others = (
         model.simulate(scene.replace(block=one)).channels["theta"]

@@ -23,8 +23,7 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 SLOPE = PAPER_BLOCK.half_width / PAPER_BLOCK.half_height
 G = 9.81
-PIVOTS = ("bilateral", "unilateral")
-pivots = pytest.mark.parametrize("pivot", PIVOTS)
+pivots = pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
 
 
 def scene_of(**change: object) -> Scene:

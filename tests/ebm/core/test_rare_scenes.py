@@ -45,11 +45,10 @@ SETTINGS = (
 )
 
 
-def both(left: float, right: float, e: float, e_right: float | None = None) -> tuple[Wall, Wall]:
-    other = e if e_right is None else e_right
+def both(left: float, right: float, e: float) -> tuple[Wall, Wall]:
     return (
         Wall(side="left", gap=left, restitution=e),
-        Wall(side="right", gap=right, restitution=other),
+        Wall(side="right", gap=right, restitution=e),
     )
 
 
@@ -156,7 +155,10 @@ SCENES = {
         TALL,
         0.2,
         4.0,
-        walls=both(TALL.radius - 0.2, TALL.radius - 0.2, 1.0, 0.0),
+        walls=[
+            Wall(side="left", gap=TALL.radius - 0.2, restitution=1.0),
+            Wall(side="right", gap=TALL.radius - 0.2, restitution=0.0),
+        ],
         initial_angular_velocity=0.99,
         gravity=1.0,
     ),
@@ -166,7 +168,7 @@ SCENES = {
         Block(half_width=0.25, half_height=1.0),
         0.75,
         4.0,
-        walls=both(0.75, 0.0, 0.5, 0.5),
+        walls=both(0.75, 0.0, 0.5),
         initial_angular_velocity=-0.7,
         gravity=10.0,
         vertical=Record.from_samples([-10.0] * 400, 0.01),
