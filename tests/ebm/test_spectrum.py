@@ -159,11 +159,11 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
 
 def decided_early(scenes, tolerance, **near):
     """Runs of scenes, decided as soon as all is certain: sides and peaks are those of the whole
-    runs."""
+    runs, on however many threads."""
     model = EventBasedModel(tolerance=tolerance)
     early, whole = (
-        batch.run_batch(batch.pack(scenes, model), model, until_decided=decided)
-        for decided in (True, False)
+        batch.run_batch(batch.pack(scenes, model), model, until_decided=decided, jobs=jobs)
+        for decided, jobs in ((True, 1), (False, 3))
     )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, **near)
