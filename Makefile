@@ -31,7 +31,7 @@ nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for
 	$(BIN)/python .ci/nightly.py
 
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.
-INTERPRETED := tests/ebm/core/test_series.py tests/ebm/core/test_guards.py tests/ebm/core/test_selection.py tests/ebm/core/test_impact_laws.py tests/ebm/test_edges.py tests/ebm/core/test_rare_scenes.py::test_it_runs \
+INTERPRETED := tests/ebm/core/test_series.py tests/ebm/core/test_guards.py tests/ebm/core/test_selection.py tests/ebm/core/test_impact_laws.py tests/ebm/test_edges.py tests/ebm/core/test_rare_scenes.py::test_it_runs_and_contacts_hold \
 	tests/cm/test_contact.py
 coverage: $(VENV)/.ready ## branch coverage by folder, and the lines that no test runs; slow
 	mkdir -p build/coverage

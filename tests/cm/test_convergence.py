@@ -3,12 +3,12 @@ contact says."""
 
 import numpy as np
 import pytest
-from cases import UNAMBIGUOUS, peak_errors, ricker
+from cases import UNAMBIGUOUS, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, Scene, Sine, Wall, load_scene
+from rockcheck.scenes import Floor, Scene, Sine, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 G = 9.81
@@ -16,13 +16,10 @@ G = 9.81
 
 def rms(history, theta):
     """RMS difference of theta from the array, in alpha."""
-    rows = min(
-        len(theta), len(history.channels["theta"])
-    )  # one may overturn a step before the other
-    return (
-        float(np.sqrt(np.mean((history.channels["theta"][:rows] - theta[:rows]) ** 2)))
-        / PAPER_BLOCK.alpha
-    )
+    # One may overturn a step before the other.
+    rows = min(len(theta), len(history.channels["theta"]))
+    apart = history.channels["theta"][:rows] - theta[:rows]
+    return float(np.sqrt(np.mean(apart**2))) / PAPER_BLOCK.alpha
 
 
 def rigid(scene):
@@ -49,15 +46,7 @@ def test_error_falls_with_the_penetration_in_rocking():
 
 
 def test_error_falls_with_the_duration_of_a_wall_contact():
-    walls = [Wall(side="left", gap=0.003, restitution=0.5)]
-    scene = Scene(
-        name="wall",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=0.6),
-        walls=walls,
-        excitation=ricker(6.0, 3.0),
-        duration=4.0,
-    )
+    scene = pulse_scene(6.0, 3.0, 0.6, ("left", 0.003, 0.5), duration=4.0)
     exact = rigid(scene)
     errors = [
         rms(ContinuousModel(penetration=depth).simulate(scene), exact)
@@ -99,16 +88,9 @@ def test_paper_rule_is_further_off():
     ("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)]
 )
 def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
-    pulse = ricker(omega, amplitude)
-    scene = Scene(
-        name="pulse",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=mu),
-        walls=[Wall(side="left", gap=gap, restitution=e)],
-        excitation=pulse,
-        duration=4.0 * pulse.period + 3.0,
-        output_step=0.001,
-    )
+    duration = 4.0 * ricker(omega, amplitude).period + 3.0
+    beside = {"wall": ("left", gap, e), "duration": duration, "output_step": 0.001}
+    scene = pulse_scene(omega, amplitude, mu, **beside)
     assert rms(ContinuousModel().simulate(scene), rigid(scene)) < 1e-3
 
 

@@ -44,18 +44,21 @@ def strikes(history, kind):
 # Settings
 
 
-@pytest.mark.parametrize("setting", ["penetration", "stiffness", "time_step"])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan, "stiff"])
-def test_settings_are_validated(setting, value):
-    with pytest.raises(InputError, match=setting):
-        ContinuousModel(**{setting: value})
+REFUSED = [
+    ({setting: value}, setting)
+    for setting in ("penetration", "stiffness", "time_step")
+    for value in (0.0, -1.0, math.inf, math.nan, "stiff")
+]
+REFUSED += [
+    ({"damping_rule": "guess"}, "damping_rule"),
+    ({"stiffness": 5e6, "penetration": 1e-6}, "stiffness"),
+]
 
 
-def test_settings_unknown_or_contradictory_are_refused():
-    with pytest.raises(InputError, match="damping_rule"):
-        ContinuousModel(damping_rule="guess")
-    with pytest.raises(InputError, match="stiffness"):
-        ContinuousModel(stiffness=5e6, penetration=1e-6)
+@pytest.mark.parametrize(("settings", "said"), REFUSED, ids=str)
+def test_settings_are_validated(settings, said):
+    with pytest.raises(InputError, match=said):
+        ContinuousModel(**settings)
 
 
 def test_stiffness_and_step_follow_from_the_penetration():
@@ -70,13 +73,6 @@ def test_stiffness_and_step_follow_from_the_penetration():
 
 
 # At rest
-
-
-def test_depth_under_own_weight_is_the_target_penetration():
-    history = ContinuousModel(penetration=2e-6).simulate(scene(duration=0.2))
-    assert PAPER_BLOCK.half_height - history.channels["y"][-1] == pytest.approx(
-        1e-6, rel=1e-6
-    )  # two corners share the weight
 
 
 @pytest.mark.parametrize(
@@ -95,6 +91,8 @@ def test_block_left_alone_stays(walls):
     for channel in ("x", "theta", "x_dot", "y_dot", "theta_dot", "slip"):
         assert np.max(np.abs(history.channels[channel])) < 1e-12
     assert np.ptp(history.channels["y"][1:]) < 1e-12
+    depth = PAPER_BLOCK.half_height - history.channels["y"][-1]
+    assert depth == pytest.approx(5e-6, rel=1e-6)  # two corners share the weight
 
 
 def test_block_shaken_below_slip_and_uplift_does_not_creep():
@@ -146,11 +144,9 @@ def test_floor_impact_has_housners_ratio_and_does_not_slip(mu):
     c = history.channels
     e = energy(PAPER_BLOCK, G, c["y"], c["theta"], c["x_dot"], c["y_dot"], c["theta_dot"])
     ratio = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
-    impacts = strikes(history, "floor impact")
-    assert len(impacts) == 2
-    for event in impacts:
-        before, after = np.searchsorted(c["t"], [event.t - 0.01, event.t + 0.01])
-        assert math.sqrt(e[after] / e[before]) == pytest.approx(ratio, abs=2e-6)
+    times = np.array([event.t for event in strikes(history, "floor impact")])
+    before, after = (e[np.searchsorted(c["t"], times + apart)] for apart in (-0.01, 0.01))
+    assert np.sqrt(after / before) == pytest.approx([ratio] * 2, abs=2e-6)
     assert np.max(np.abs(c["slip"])) < 2e-6
 
 
@@ -182,39 +178,6 @@ def test_energy_never_rises_without_excitation():
     e = energy(PAPER_BLOCK, G, c["y"], c["theta"], c["x_dot"], c["y_dot"], c["theta_dot"])
     assert len(strikes(history, "wall impact")) >= 3
     assert np.max(e[1:] - np.minimum.accumulate(e)[:-1]) < 1e-5 * e[0]
-
-
-# Flight and walls
-
-
-@pytest.mark.parametrize("e", [0.5, 1.0])
-def test_dropped_block_bounces_to_its_height(e):
-    height = 0.01
-    history = ContinuousModel().simulate(
-        scene(floor=Floor(friction=0.3, restitution=e), initial_height=height, duration=0.2)
-    )
-    c = history.channels
-    fall = math.sqrt(2.0 * height / G)
-    first = strikes(history, "floor impact")[:2]
-    assert [event.t for event in first] == pytest.approx([fall, fall], abs=1e-6)  # both corners
-    assert sum(event.impulse for event in first) == pytest.approx((1.0 + e) * G * fall, rel=1e-3)
-    top = np.max(c["y"][c["t"] > fall]) - PAPER_BLOCK.half_height
-    assert top == pytest.approx(e * e * height, rel=3e-3)
-    assert np.max(np.abs(c["theta"])) < 1e-9
-
-
-def test_block_goes_to_and_fro_between_two_walls():
-    walls = [
-        Wall(side="left", gap=0.05, restitution=1.0),
-        Wall(side="right", gap=0.15, restitution=1.0),
-    ]
-    history = ContinuousModel().simulate(
-        scene(floor=Floor(friction=0.0), walls=walls, initial_velocity=0.5, duration=2.0)
-    )
-    times = [event.t for event in strikes(history, "wall impact")[::2]]
-    assert times == pytest.approx([0.3, 0.7, 1.1, 1.5, 1.9], abs=1e-3)
-    assert np.max(history.channels["x"]) == pytest.approx(0.15, abs=1e-4)
-    assert np.min(history.channels["x"]) == pytest.approx(-0.05, abs=1e-3)
 
 
 # Excitation
@@ -292,24 +255,17 @@ def test_short_block_and_rattling_walls_come_to_an_end():
     )
     history = ContinuousModel().simulate(small)
     assert len(history.channels["t"]) == len(small.output_times)
-    assert all(
-        np.all(np.isfinite(history.channels[c]))
-        for c in ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
-    )
+    numbers = [channel for name, channel in history.channels.items() if name != "mode"]
+    assert np.all(np.isfinite(numbers))
 
 
 @pytest.mark.parametrize("name", ["fig4a", "fig5b"])
 def test_named_scene_runs(name):
-    shown = load_scene(name)
-    history = ContinuousModel().simulate(shown)
+    shown, model = load_scene(name), ContinuousModel()
+    history = model.simulate(shown)
     assert history.outcome == "at rest"
     assert np.array_equal(history.channels["t"], shown.output_times)
-    assert (
-        history.cost.evaluations
-        >= history.cost.steps
-        > 36.0 / ContinuousModel().time_step_in(shown)
-    )
+    assert history.cost.evaluations >= history.cost.steps > 36.0 / model.time_step_in(shown)
     assert bool(strikes(history, "wall impact")) == bool(shown.walls)
-    assert [event.t for event in history.event_list] == sorted(
-        event.t for event in history.event_list
-    )
+    times = [event.t for event in history.event_list]
+    assert times == sorted(times)

@@ -1,5 +1,5 @@
-"""Pulses in the block's own units, and runs of independent programs with the scenes that they
-played (tests/data/README.md says what the columns mean)."""
+"""Pulses in the block's own units, runs of independent programs with the scenes that they played
+(tests/data/README.md says what the columns mean), and blocks that are not homogeneous."""
 
 import csv
 import math
@@ -35,21 +35,32 @@ def ricker(frequency: float, amplitude: float, block: Block = PAPER_BLOCK) -> Ri
     )
 
 
+def pulse_scene(
+    frequency: float,
+    amplitude: float,
+    mu: float,
+    wall: tuple[str, float, float] | None = None,
+    **more: Any,
+) -> Scene:
+    """The paper's block under a Ricker pulse, perhaps beside a wall: its side, gap, restitution."""
+    walls = [dict(zip(("side", "gap", "restitution"), wall, strict=True))] if wall else []
+    fields = {
+        "name": "pulse",
+        "block": PAPER_BLOCK,
+        "floor": Floor(friction=mu),
+        "walls": walls,
+        "excitation": ricker(frequency, amplitude),
+        "duration": 5.0,
+    }
+    return Scene(**fields | more)
+
+
 def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
     """The scene of a run, up to a time after its pulse."""
-    pulse = ricker(float(row["wp_over_p"]), float(row["ap_ratio"]))
-    return Scene(
-        name="reference",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=float(row["mu"])),
-        walls=[
-            Wall(side=row["side"], gap=float(gap), restitution=float(row["e_w"]))
-            for gap in filter(None, [row["gap"]])
-        ],
-        excitation=pulse,
-        duration=4.0 * pulse.period + rest,
-        **more,
-    )
+    frequency, amplitude, mu = (float(row[name]) for name in ("wp_over_p", "ap_ratio", "mu"))
+    wall = (row["side"], float(row["gap"]), float(row["e_w"])) if row["gap"] else None
+    duration = 4.0 * ricker(frequency, amplitude).period + rest
+    return pulse_scene(frequency, amplitude, mu, wall, duration=duration, **more)
 
 
 def peak_errors(
@@ -67,3 +78,61 @@ def peak_errors(
             peak = history.peak_rotation / PAPER_BLOCK.alpha
             errors.append(abs(peak - float(row["peak_theta_over_alpha"])))
     return np.array(errors), missed
+
+
+G = 9.81
+#: A rack loaded low and to the right: its right pivot is the weaker one.
+RACK = Block(
+    half_width=0.3,
+    half_height=1.0,
+    mass=400.0,
+    centre_of_mass=(0.08, -0.25),
+    moment_of_inertia=110.0,
+)
+
+
+def block_scene(block: Block = RACK, mu: float = 0.6, **more: Any) -> Scene:
+    return Scene(
+        **{
+            "name": "block",
+            "block": block,
+            "floor": Floor(friction=mu),
+            "duration": 4.0,
+            "output_step": 0.002,
+        }
+        | more
+    )
+
+
+def places(block: Block, theta: float, sense: int, case: int) -> tuple[np.ndarray, np.ndarray]:
+    """The pivot of a block that tips to `sense` (+1 left), and its corner toward the tip wall (case
+    1) or the far wall (-1): from the mass's centre, in the world."""
+    turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
+    size = np.array([block.half_width, block.half_height])
+    pivot, corner = np.array([(-sense, -1), (-sense * case, case)]) * size - block.offset
+    return turn @ pivot, turn @ corner
+
+
+def random_scene(rng: np.random.Generator) -> Scene:
+    b, h = rng.uniform(0.1, 0.5), rng.uniform(0.4, 1.5)
+    place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
+    block = Block(
+        half_width=b,
+        half_height=h,
+        centre_of_mass=place,
+        moment_of_inertia=rng.uniform(0.2, 0.5) * (b * b + h * h),
+    )
+    mu = rng.uniform(0.1, 0.9) * block.least_painleve_friction
+    walls = [
+        Wall(
+            side=side,
+            gap=float(rng.choice([0.0, rng.uniform(0.0, 0.1)])),
+            restitution=float(rng.choice([0.0, 0.5])),
+        )
+        for side in ("left", "right")
+        if rng.uniform() < 0.6
+    ]
+    pulse = Ricker(amplitude=G * block.slope * rng.uniform(1.0, 4.0), period=rng.uniform(0.4, 1.5))
+    return block_scene(
+        block, min(mu, 1.0), walls=walls, excitation=pulse, duration=3.0, output_step=0.01
+    )

@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -246,13 +245,16 @@ class PaperModel:
             if Sw * (v - R * C * w) >= 0.0:  # B
                 return np.array([y[0], y[1], v, w]), False
             return np.array([y[0], y[1], 0.0, 0.0]), e == 0.0  # C
-        found = []
-        for Sr in (1, -1):
-            for sy in (1, -1):
-                v, w, P, Q, N = self.impact(S, y, vertical, e=e, slips=Sr, sense=sy)
-                if sign(P) == sy and sign(v + R * c * w) == Sr:
-                    found.append((v, w, N, -self.mu_k * Sr * sy))
-        ((v, w, N, k),) = found
+        trials = [
+            (-self.mu_k * Sr * sy, Sr, sy, *self.impact(S, y, vertical, e=e, slips=Sr, sense=sy))
+            for Sr in (1, -1)
+            for sy in (1, -1)
+        ]
+        ((v, w, N, k),) = (
+            (v, w, N, k)
+            for k, Sr, sy, v, w, P, _, N in trials
+            if sign(P) == sy and sign(v + R * c * w) == Sr
+        )
         if N >= 0.0:  # D
             return np.array([y[0], y[1], v, w]), e == 0.0
         # E: no impulse from the wall, whose corner neither rebounds nor enters; the moment is what
@@ -296,8 +298,7 @@ class PaperModel:
                     return self
                 self.events.append((t, "uplift"))
                 continue
-            advance = self.lean_until if mode.name == "lean" else self.step
-            t, y, kind = advance(mode, t, y)
+            t, y, kind = self.step(mode, t, y)
             if kind == "end":
                 return self
             if kind != "sense":
@@ -336,40 +337,14 @@ class PaperModel:
         V = self.slip(y)
         return np.array([y[0], y[1], y[2] - V, y[3]]) if abs(V) < 1e-12 else y
 
-    def lean_until(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
-        def margin(which: str, t: float) -> float:
-            _, _, P, Q, N = self.motion(m, t, y)
-            return N if which == "release" else self.mu_s * P - abs(Q)
-
-        times = np.arange(t, self.scene.duration, 1e-3)
-        for a, b in pairwise(times):
-            for which in ("release", "slip"):
-                if margin(which, b) < 0.0:
-                    root = brentq(
-                        lambda s, which=which: margin(which, s), a, b, xtol=1e-15, rtol=1e-15
-                    )
-                    self.pieces.append((t, root, lambda _, y=y: y))
-                    return root, y, which
-        self.pieces.append((t, self.scene.duration, lambda _, y=y: y))
-        return self.scene.duration, y, "end"
-
     def step(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
         def rates(t: float, y: State) -> list[float]:
             x2, turn, _, _, _ = self.motion(m, t, y)
             return [y[2], y[3], x2, turn]
 
         named = self.guards(m)
-        events = []
         for function in named.values():
-
-            def falls(
-                t: float, y: State, function: Callable[[float, State], float] = function
-            ) -> float:
-                return function(t, y)
-
-            falls.terminal = True  # type: ignore[attr-defined]
-            falls.direction = -1.0  # type: ignore[attr-defined]
-            events.append(falls)
+            function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
         ends = [self.scene.duration]
         excitation = self.scene.excitation
         if isinstance(excitation, Record):  # stop at the samples, where the motion has kinks
@@ -387,7 +362,7 @@ class PaperModel:
                 rtol=1e-13,
                 atol=1e-15,
                 max_step=self.max_step,
-                events=events,
+                events=list(named.values()),
                 dense_output=True,
             )
             self.pieces.append((t, run.t[-1], run.sol))
@@ -401,11 +376,7 @@ class PaperModel:
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """x, theta, dx/dt, dtheta/dt at the times, up to where the run ended."""
-        rows, k = [], 0
-        for t in times:
-            while k < len(self.pieces) - 1 and t > self.pieces[k][1]:
-                k += 1
-            if t > self.pieces[k][1] + 1e-9:
-                break
-            rows.append(self.pieces[k][2](t))
-        return np.array(rows)
+        ends = [end for _, end, _ in self.pieces]
+        times = times[times <= ends[-1] + 1e-9]
+        pieces = np.minimum(np.searchsorted(ends, times), len(ends) - 1)
+        return np.array([self.pieces[k][2](t) for k, t in zip(pieces, times, strict=True)])

@@ -9,18 +9,15 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from stepping import TILTED, run_at
+from numpy.polynomial import Polynomial
+from stepping import TILTED, block_of, run_at
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core import (
-    guards,
-    modes,
-    motion,
-    series,
-)
-from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core import guards, modes, motion
+from rockcheck.ebm.core.names import Family, Guard, Pivot, Row
 from rockcheck.ebm.core.rules import Rule
-from rockcheck.scenes import Block, Floor, Record, Scene, Wall
+from rockcheck.ebm.core.state import Run
+from rockcheck.scenes import Floor, Record, Scene, Wall
 
 PIVOTS = ["bilateral", "unilateral"]
 #: Order of the series that guards are taken from.
@@ -39,6 +36,21 @@ def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
     if mu_s >= (a * (1.0 + 4.0 * slope**2) + 3.0 * slope) / (4.0 + slope**2 + 3.0 * a * slope):
         return "rock"
     return "slide-rock" if mu_k > slope else "slide"
+
+
+GUARDS = {
+    "far gap": Guard.FAR_GAP,
+    "tip gap": Guard.TIP_GAP,
+    "landing": Guard.LANDING,
+    "push": Guard.FLOOR_PUSH,
+    "tip push": Guard.TIP_PUSH,
+    "far push": Guard.FAR_PUSH,
+    "cone +": Guard.CONE_PLUS,
+    "cone -": Guard.CONE_MINUS,
+    "slip": Guard.SLIP,
+    "topple": Guard.TOPPLE,
+    "phi": Guard.PHI,
+}
 
 
 class Mode(NamedTuple):
@@ -63,99 +75,17 @@ class Mode(NamedTuple):
         return {"off": "flight", "stick": "rock", "slip": "slide-rock"}[self.floor]
 
 
-class Core:
-    """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
-
-    @staticmethod
-    def first_root(
-        coefficients, h: float, noise: float = series.NOISE[Kind.POSITION]
-    ) -> float | None:
-        """First time in [0, h] at which the polynomial (constant first) turns negative."""
-        row, stack = _row(coefficients), np.full((48, series.WIDTH), np.nan)
-        found = series.first_root(row, 0, len(coefficients) - 1, h, h, noise, series.AHEAD, stack)
-        return None if found == series.NO_ROOT else found
-
-    @staticmethod
-    def leading(coefficients, noise: float = series.NOISE[Kind.POSITION]) -> int:
-        """Sign with which the polynomial leaves zero."""
-        return series.leading(_row(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
-
-    def __init__(self, scene: Scene, pivot: str, friction: str = "coulomb") -> None:
-        assert scene.gravity == scene.block.radius == 1.0
-        self.setting = natural.setting_of(
-            scene, unilateral=pivot == "unilateral", no_slip=friction == "no-slip", energy_cap=False
-        )
-        self.base = natural.base_of(scene)
-
-    def select(self, state) -> Mode | None:
-        """The mode in which the state (x, y, theta and their rates) goes on."""
-        run = run_at(state)
-        found = run.state
-        if not modes.select(self.setting, self.base, run):
-            return None
-        if found.rules[Rule.LEAST_CONTRADICTION]:
-            return None
-        mode = found.mode
-        floor = {Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot]
-        at = (bool(mode.tip), bool(mode.far))
-        tilted = bool(mode.family == Family.TILT)
-        return Mode(tilted, int(mode.sense), floor, int(mode.slip), int(mode.pull), *at)
-
-    def guards(self, mode: Mode, state) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
-        follow."""
-        run = run_at(
-            state,
-            **TILTED | {"pull": mode.pull},
-            sense=mode.side,
-            slip=mode.slip,
-            pivot={"off": Pivot.OFF, "stick": Pivot.STICK, "slip": Pivot.SLIPPING}[mode.floor],
-            tip=mode.tip,
-            far=mode.far,
-        )
-        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
-        a = self.work = run.a
-        pivot = run.state.place = mode.side * state[0] - a[Row.SIN, 0]
-        names = {
-            "far gap": Guard.FAR_GAP,
-            "tip gap": Guard.TIP_GAP,
-            "landing": Guard.LANDING,
-        }
-        names |= {
-            "push": Guard.FLOOR_PUSH,
-            "tip push": Guard.TIP_PUSH,
-            "far push": Guard.FAR_PUSH,
-        }
-        names |= {
-            "cone +": Guard.CONE_PLUS,
-            "cone -": Guard.CONE_MINUS,
-            "slip": Guard.SLIP,
-        }
-        names |= {"topple": Guard.TOPPLE, "phi": Guard.PHI}
-        guards.fill_guards(self.setting, run.state, run.a)
-        found = {}
-        for name, which in names.items():
-            degree = guards.guard(which, order, a)
-            if degree >= 0:
-                found[name] = a[Row.GUARD, : degree + 1].copy()
-        rock = mode.floor == "stick" and not mode.tip and not mode.far
-        rows = {"phi": a[Row.PHI, : order + 1].copy()}
-        xi = a[Row.SIN if rock else Row.XI, : order + 1].copy()
-        xi[0] += pivot if rock else 0.0
-        return found, rows | {
-            "xi": xi,
-            "y": a[Row.COS if rock else Row.Y, : order + 1].copy(),
-        }
-
-
-def _row(coefficients) -> np.ndarray:
-    row = np.zeros((1, series.WIDTH))
-    row[0, : len(coefficients)] = coefficients
-    return row
-
-
-def value(coefficients, tau):
-    return np.polynomial.polynomial.polyval(tau, coefficients)
+def run_of(mode: Mode, state) -> Run:
+    """A run of a tilted block in this mode and state."""
+    return run_at(
+        state,
+        **TILTED | {"pull": mode.pull},
+        sense=mode.side,
+        slip=mode.slip,
+        pivot={"off": Pivot.OFF, "stick": Pivot.STICK, "slip": Pivot.SLIPPING}[mode.floor],
+        tip=mode.tip,
+        far=mode.far,
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -173,26 +103,64 @@ class Situation:
 
     @property
     def scene(self) -> Scene:
-        block = Block(half_width=math.sin(self.alpha), half_height=math.cos(self.alpha))
-        block = Block(
-            half_width=block.half_width / block.radius, half_height=block.half_height / block.radius
-        )
-        if block.radius != 1.0:  # of the last bit
-            block = block.model_copy(update={"half_height": math.sqrt(1.0 - block.half_width**2)})
         horizontal, vertical = (
             Record.from_samples([a, a, a], time_step=1.0) for a in (self.u, self.g - 1.0)
         )
-        floor = Floor(friction=self.mu_k, static_friction=self.mu_s)
         return Scene(
             name="part",
-            block=block,
-            floor=floor,
+            block=block_of(self.alpha),
+            floor=Floor(friction=self.mu_k, static_friction=self.mu_s),
             walls=self.walls,
             excitation=horizontal,
             vertical=vertical,
             duration=1.0,
             gravity=1.0,
         )
+
+
+class Core:
+    """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
+
+    def __init__(self, at: Situation, pivot: str, friction: str = "coulomb") -> None:
+        self.setting = natural.setting_of(
+            at.scene,
+            unilateral=pivot == "unilateral",
+            no_slip=friction == "no-slip",
+            energy_cap=False,
+        )
+        self.base = natural.base_of(at.scene)
+
+    def select(self, state) -> Mode | None:
+        """The mode in which the state (x, y, theta and their rates) goes on."""
+        run = run_at(state)
+        selected = modes.select(self.setting, self.base, run)
+        if not selected or run.state.rules[Rule.LEAST_CONTRADICTION]:
+            return None
+        mode = run.state.mode
+        floor = {Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot]
+        at = (bool(mode.tip), bool(mode.far))
+        tilted = bool(mode.family == Family.TILT)
+        return Mode(tilted, int(mode.sense), floor, int(mode.slip), int(mode.pull), *at)
+
+    def guards(self, mode: Mode, state) -> tuple[dict[str, Polynomial], dict[str, Polynomial]]:
+        """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
+        follow."""
+        run = run_of(mode, state)
+        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
+        a = run.a
+        run.state.place = mode.side * state[0] - a[Row.SIN, 0]
+        guards.fill_guards(self.setting, run.state, a)
+        found = {}
+        for name, which in GUARDS.items():
+            degree = guards.guard(which, order, a)
+            if degree >= 0:
+                found[name] = Polynomial(a[Row.GUARD, : degree + 1].copy())
+        rock = mode.floor == "stick" and not mode.tip and not mode.far
+        rows = {"phi": Row.PHI, "xi": Row.SIN, "y": Row.COS}
+        rows |= {} if rock else {"xi": Row.XI, "y": Row.Y}
+        follows = {name: Polynomial(a[row, : order + 1].copy()) for name, row in rows.items()}
+        follows["xi"] += run.state.place if rock else 0.0
+        return found, follows
 
 
 def upright(u: float, g: float, alpha: float, mu_s: float, mu_k: float) -> Situation:
@@ -256,26 +224,21 @@ def margin(at: Situation, mode: Mode, touched: tuple[bool, bool], pivot: str) ->
     rows, bias = contacts(at.alpha, phi, w)
     rates = rows @ np.array([mode.side * at.state[3], at.state[4], w])
     opens = rows @ found.acceleration + bias
-    kept = [math.inf]
-    if mode.tip:
-        kept.append(found.tip)
-    elif touched[0]:
-        kept.append(opens[2])
-    if mode.far:
-        kept.append(found.far)
-    elif touched[1]:
-        kept.append(opens[3])
-    if mode.floor == "off":
-        kept.append(opens[0])
-    elif pivot == "unilateral" or mode.floor == "slip":
-        kept.append(mode.pull * found.normal)
-    if mode.floor == "stick":
-        kept += [at.mu_s * mode.pull * found.normal - sense * found.friction for sense in (1, -1)]
-        kept.append(-1.0 if abs(rates[1]) > 1e-9 else math.inf)
-    if mode.floor == "slip":
-        slips = rates[1] if abs(rates[1]) > 1e-9 else opens[1]
-        kept.append(mode.slip * slips)
-    return min(kept)
+    stands, slides = mode.floor == "stick", mode.floor == "slip"
+    moves = abs(rates[1]) > 1e-9
+    pushes = mode.pull * found.normal
+    asked = [
+        (mode.tip, found.tip),
+        (touched[0] and not mode.tip, opens[2]),
+        (mode.far, found.far),
+        (touched[1] and not mode.far, opens[3]),
+        (mode.floor == "off", opens[0]),
+        (slides or (stands and pivot == "unilateral"), pushes),
+        (stands, at.mu_s * pushes - abs(found.friction)),
+        (stands and moves, -1.0),
+        (slides, mode.slip * (rates[1] if moves else opens[1])),
+    ]
+    return min((least for holds, least in asked if holds), default=math.inf)
 
 
 def candidates(side: int, touched: tuple[bool, bool], pivot: str) -> list[Mode]:

@@ -24,26 +24,13 @@ def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int)
     are 0."""
     state = np.zeros(1, STATE)[0]
     state.t, state.t_end = t, math.inf
-    put(state.motion, motion)
+    for name, value in zip(state.motion.dtype.names, motion, strict=True):
+        setattr(state.motion, name, value)
     for name, value in mode.items():
         setattr(state.mode, name, value)
     modes.forget(state)
     state.control = (1e-10, 100, 100, False, 1.0)
     return Run(state, *workspace(), nothing())
-
-
-def changed(setting: Any, **values: float) -> Any:
-    """A record with other values in these fields."""
-    other = setting.copy()
-    for name, value in values.items():
-        setattr(other, name, value)
-    return other
-
-
-def put(motion: Any, values: Sequence[float]) -> None:
-    """Writes x, y, theta and their rates."""
-    for name, value in zip(motion.dtype.names, values, strict=True):
-        setattr(motion, name, value)
 
 
 def six(motion: Any) -> np.ndarray:
@@ -57,23 +44,6 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     records = Records(*(part[None] for part in nothing()))
     march.play(packed.rows, states, work or workspace(), records, np.empty(1, FOUND))
     return states[0]
-
-
-ODD = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
-EVEN = ("t", "y", "y_dot", "mode")
-
-
-def assert_mirror_images(a: History, b: History) -> None:
-    for name in EVEN:
-        np.testing.assert_array_equal(a.channels[name], b.channels[name], err_msg=name)
-    for name in ODD:
-        np.testing.assert_array_equal(a.channels[name], -b.channels[name], err_msg=name)
-    swap = {"overturned left": "overturned right", "overturned right": "overturned left"}
-    assert b.outcome == swap.get(a.outcome, a.outcome)
-    assert [
-        (e.t, swap.get(e.kind, e.kind), e.mode_before, e.mode_after, e.impulse)
-        for e in a.event_list
-    ] == [(e.t, e.kind, e.mode_before, e.mode_after, e.impulse) for e in b.event_list]
 
 
 def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) -> None:

@@ -8,60 +8,37 @@ and friction, not from the paper's solved forms. SI units, unit mass, signs as i
 
 import numpy as np
 import pytest
-from cases import ricker
+from cases import pulse_scene
 from paper_model import PaperModel
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
-from rockcheck.scenes.scene import PAPER_BLOCK
-
-
-def beside(side: str, gap: float, e: float) -> list[Wall]:
-    return [Wall(side=side, gap=gap, restitution=e)]
-
-
-def scene(
-    name: str,
-    excitation: Ricker | Record,
-    duration: float,
-    mu: float,
-    walls: list[Wall] | None = None,
-    *,
-    static: float | None = None,
-    vertical: Sine | None = None,
-) -> Scene:
-    floor = Floor(friction=mu, static_friction=static)
-    return Scene(
-        name=name,
-        block=PAPER_BLOCK,
-        floor=floor,
-        walls=walls or [],
-        excitation=excitation,
-        vertical=vertical or Rest(),
-        duration=duration,
-    )
-
+from rockcheck.scenes import Floor, Sine, load_scene
 
 SCENES = [
-    scene("rocking", ricker(2.0, 1.1), 5.0, 1.0),
-    scene("slide-rock", ricker(4.5, 4.0), 6.0, 0.3),
-    scene("static above kinetic friction", ricker(4.5, 4.0), 5.0, 0.28, static=0.45),
-    scene(
-        "vertical shaking",
-        ricker(4.5, 4.0),
+    pulse_scene(2.0, 1.1, 1.0, name="rocking"),
+    pulse_scene(4.5, 4.0, 0.3, name="slide-rock", duration=6.0),
+    pulse_scene(
+        4.5,
+        4.0,
+        0.28,
+        name="static above kinetic friction",
+        floor=Floor(friction=0.28, static_friction=0.45),
+    ),
+    pulse_scene(
+        4.5,
         4.0,
         0.3,
+        name="vertical shaking",
+        duration=4.0,
         vertical=Sine(amplitude=4.0, period=0.4, cycles=8),
     ),
-    scene("plastic left wall", ricker(4.5, 4.0), 5.0, 0.3, beside("left", 0.053, 0.0)),
-    scene("plastic right wall", ricker(3.0, 2.5), 5.0, 0.6, beside("right", 0.053, 0.0)),
-    scene("leaning on the wall", ricker(1.0, 1.1), 5.6, 0.3, beside("left", 0.003, 0.0)),
-    scene("left wall, half restitution", ricker(4.5, 4.0), 5.0, 0.3, beside("left", 0.053, 0.5)),
-    scene(
-        "elastic right wall, overturning", ricker(3.0, 2.5), 5.0, 0.3, beside("right", 0.103, 1.0)
-    ),
-    scene("grazing the wall", ricker(3.0, 6.0), 6.0, 0.3, beside("right", 0.003, 1.0)),
-    scene("recorded", load_scene("fig4a").excitation, 5.0, 0.3),
+    pulse_scene(4.5, 4.0, 0.3, ("left", 0.053, 0.0), name="plastic left wall"),
+    pulse_scene(3.0, 2.5, 0.6, ("right", 0.053, 0.0), name="plastic right wall"),
+    pulse_scene(1.0, 1.1, 0.3, ("left", 0.003, 0.0), name="leaning on the wall", duration=5.6),
+    pulse_scene(4.5, 4.0, 0.3, ("left", 0.053, 0.5), name="left wall, half restitution"),
+    pulse_scene(3.0, 2.5, 0.3, ("right", 0.103, 1.0), name="elastic right wall, overturning"),
+    pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), name="grazing the wall", duration=6.0),
+    load_scene("fig4a").replace(name="recorded", duration=5.0),
 ]
 MODES = {
     "slide-rock": {"rest", "rock", "slide-rock"},

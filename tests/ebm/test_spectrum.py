@@ -1,11 +1,12 @@
 """Overturning spectra: against reference runs at their nodes, refinement against the full grid,
 records, and bad input."""
 
-from itertools import groupby
+import itertools
+from operator import itemgetter
 
 import numpy as np
 import pytest
-from cases import BILATERAL
+from cases import BILATERAL, random_scene
 
 from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
@@ -14,6 +15,7 @@ from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
 from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
+RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
 SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 
@@ -29,19 +31,15 @@ def scene(*walls, friction=0.3, excitation=None):
     )
 
 
-def reference_runs():
-    def setting(row):
-        return row["side"], row["gap"], row["e_w"], row["mu"]
-
-    return [
-        (key, list(group)) for key, group in groupby(sorted(BILATERAL, key=setting), key=setting)
-    ]
+setting_of = itemgetter("side", "gap", "e_w", "mu")
+RUNS = {
+    key: list(rows)
+    for key, rows in itertools.groupby(sorted(BILATERAL, key=setting_of), key=setting_of)
+}
 
 
 @pytest.mark.parametrize(
-    ("setting", "rows"),
-    reference_runs(),
-    ids=["-".join(filter(None, key)) for key, _ in reference_runs()],
+    ("setting", "rows"), RUNS.items(), ids=["-".join(filter(None, key)) for key in RUNS]
 )
 def test_outcomes_agree_with_reference_runs(setting, rows):
     side, gap, e, mu = setting
@@ -64,59 +62,44 @@ def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
     assert refined.evaluations < 0.35 * full.evaluations
 
 
-@pytest.mark.parametrize("shape", [(257, 257), (100, 130), (9, 8), (2, 2)])
-def test_refinement_of_a_disc(shape):
+def disc(a, f):
+    return np.hypot(a - 5.0, f - 5.0) < 3.0
+
+
+def tongue(a, f):
+    return (a < 2.0) | (np.abs(a - f) < 0.05)
+
+
+def hair(a, f):
+    """64 dots: of some 180 columns that it crosses."""
+    return (a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))
+
+
+@pytest.mark.parametrize(
+    ("shape", "grid", "share"),
+    [
+        (disc, (257, 257), 0.12),
+        (disc, (100, 130), 1.0),
+        (disc, (9, 8), 1.0),
+        (disc, (2, 2), 1.0),
+        (tongue, (257, 257), 0.15),
+        (hair, (257, 257), 0.999),
+    ],
+)
+def test_refinement_finds_all_of_a_shape(shape, grid, share):
+    """A thin tongue to its tip, and the dots of a hair, without a node played twice."""
+    amplitudes, frequencies = (np.linspace(1.0, 9.0, n) for n in grid)
     played = []
 
-    def disc(scene, a, f):
+    def play(scene, a, f):
         played.extend(zip(a.tolist(), f.tolist(), strict=True))
-        return (np.hypot(a - 5.0, f - 5.0) < 3.0).astype(np.int8), np.zeros(len(a), dtype=bool)
+        return shape(a, f).astype(np.int8), np.zeros(len(a), dtype=bool)
 
-    amplitudes, frequencies = np.linspace(1.0, 9.0, shape[0]), np.linspace(1.0, 9.0, shape[1])
-    spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=disc)
-    np.testing.assert_array_equal(
-        spectrum.outcomes, np.hypot(amplitudes[:, None] - 5.0, frequencies - 5.0) < 3.0
-    )
-    assert spectrum.evaluations == len(played) == len(set(played))
-    if shape[0] > 200:
-        assert spectrum.evaluations < 0.12 * spectrum.outcomes.size
-
-
-def tongue(scene, a, f):
-    return ((a < 2.0) | (np.abs(a - f) < 0.05)).astype(np.int8), np.zeros(len(a), dtype=bool)
-
-
-def hair(scene, a, f):
-    """64 dots: of some 180 columns that it crosses."""
-    crossed = (np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0)
-    return ((a < 2.0) | crossed).astype(np.int8), np.zeros(len(a), dtype=bool)
-
-
-@pytest.mark.parametrize(("shape", "dots", "share"), [(tongue, None, 0.15), (hair, 64, 1.0)])
-def test_refinement_follows_a_thin_tongue_to_its_tip_and_finds_the_dots_of_a_hair(
-    shape, dots, share
-):
-    axis = np.linspace(1.0, 9.0, 257)
-    spectrum = overturning_spectrum(scene(), axis, axis, refine=True, play=shape)
-    full = shape(None, *np.broadcast_arrays(axis[:, None], axis))[0]
-    assert dots is None or np.count_nonzero(full[axis >= 2.0]) == dots
+    spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=play)
+    full = shape(*np.broadcast_arrays(amplitudes[:, None], frequencies))
+    assert shape is not hair or np.count_nonzero(full[amplitudes >= 2.0]) == 64
     np.testing.assert_array_equal(spectrum.outcomes, full)
-    assert spectrum.evaluations < share * spectrum.outcomes.size
-
-
-def test_a_node_is_what_the_model_simulates():
-    wall = Wall(side="left", gap=0.053, restitution=0.5)
-    a, f = np.array([1.2, 2.0, 3.0, 6.0]), np.array([0.8, 2.5, 4.0, 5.0])
-    sides, failed = play_nodes(scene(wall), a, f, model=EventBasedModel())
-    assert not failed.any()
-    outcomes = [
-        EventBasedModel().simulate(node_scene(scene(wall), *node, settle=20.0)).outcome
-        for node in zip(a, f, strict=True)
-    ]
-    assert [
-        {"overturned left": -1, "overturned right": 1}.get(outcome, 0) for outcome in outcomes
-    ] == sides.tolist()
-    assert len(set(sides.tolist())) > 1
+    assert spectrum.evaluations == len(played) == len(set(played)) <= share * full.size
 
 
 def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
@@ -155,9 +138,10 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
         np.array([1.0 + 11.0 * i / 99 for i in (6, 7, 7)]),
         np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)]),
     )
-    sides, failed = play_nodes(scene(wall), a, f, model=model)
-    assert not failed.any()
-    assert not sides.any()
+    for beside, sign in ((scene(wall), 1.0), (scene(wall).mirrored(), -1.0)):
+        sides, failed = play_nodes(beside, sign * a, f, model=model)
+        assert not failed.any()
+        assert not sides.any()
     nodes = [node_scene(scene(wall), *node, settle=300.0) for node in zip(a, f, strict=True)]
     early = batch.run_batch(batch.pack(nodes, model), model)
     fine = EventBasedModel(tolerance=1e-13)
@@ -171,70 +155,73 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     assert (
         energy / (1.0 - np.cos(PAPER_BLOCK.alpha))
     ).max() > 0.9  # where impacts might add what is missing
-    mirrored, failed = play_nodes(scene(wall).mirrored(), -a, f, model=model)
-    assert not failed.any()
-    assert not mirrored.any()
 
 
-def decided_and_whole(wall, most):
-    """Scenes of a grid of pulses beside a wall, and their runs, decided early and to the end: sides
-    and peaks are the same."""
-    axes = np.meshgrid(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
-    nodes = [
-        node_scene(scene(wall), *node, settle=60.0)
-        for node in zip(*map(np.ravel, axes), strict=True)
-    ]
-    model = EventBasedModel(tolerance=1e-9)
+def decided_early(scenes, tolerance, **near):
+    """Runs of scenes, decided as soon as all is certain: sides and peaks are those of the whole
+    runs, on however many threads."""
+    model = EventBasedModel(tolerance=tolerance)
     early, whole = (
-        batch.run_batch(batch.pack(nodes, model), model, until_decided=decided)
-        for decided in (True, False)
+        batch.run_batch(batch.pack(scenes, model), model, until_decided=decided, jobs=jobs)
+        for decided, jobs in ((True, 1), (False, 3))
     )
     np.testing.assert_array_equal(early.side, whole.side)
-    np.testing.assert_allclose(early.peak, whole.peak, rtol=1e-6)
-    return nodes, early
+    np.testing.assert_allclose(early.peak, whole.peak, **near)
+    assert np.sum(early.series) < np.sum(whole.series)
+    return early
+
+
+def grid_beside(wall, most):
+    """Scenes of a grid of pulses beside a wall."""
+    axes = np.meshgrid(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
+    nodes = zip(*map(np.ravel, axes), strict=True)
+    return [node_scene(scene(wall), *node, settle=60.0) for node in nodes]
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
 def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
     """Beside walls that return nearly all."""
-    decided_and_whole(Wall(side="right", gap=0.053, restitution=restitution), 9.0)
+    wall = Wall(side="right", gap=0.053, restitution=restitution)
+    decided_early(grid_beside(wall, 9.0), 1e-9, rtol=1e-6)
 
 
 def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     """What is left of the pulse bounds the energy that it can still bring."""
-    nodes, early = decided_and_whole(Wall(side="left", gap=0.003), 5.0)
+    nodes = grid_beside(Wall(side="left", gap=0.003), 5.0)
+    early = decided_early(nodes, 1e-9, rtol=1e-6)
     quiet = np.array([quiet_from(natural.base_of(node), 1e-9) for node in nodes])
     safe = (early.side == 0) & (early.peak > 0.0)
     assert np.count_nonzero(early.t_end[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
 
 
+def test_what_is_decided_early_of_loaded_blocks():
+    rng = np.random.default_rng(13)
+    scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
+    early = decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11)
+    assert {-1, 0, 1} == set(early.side.tolist())
+
+
 def test_a_record_is_scaled_and_the_block_resized():
-    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
-    start = scene(excitation=record)
+    start = scene(excitation=RECORD)
     node = node_scene(start, 2.0, 0.5)
     assert (node.block.half_width, node.block.half_height) == (
         0.5 * PAPER_BLOCK.half_width,
         0.5 * PAPER_BLOCK.half_height,
     )
-    np.testing.assert_allclose(node.excitation.samples, 2.0 * record.samples)
+    np.testing.assert_allclose(node.excitation.samples, 2.0 * RECORD.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
-    for i, scale in enumerate(scales):
-        for j, size in enumerate(sizes):
-            outcome = (
-                EventBasedModel(tolerance=1e-9)
-                .simulate(node_scene(start, scale, size, settle=20.0))
-                .outcome
-            )
-            assert outcome.startswith("overturned") == bool(spectrum.outcomes[i, j])
+    model, nodes = EventBasedModel(tolerance=1e-9), itertools.product(scales, sizes)
+    for node, overturned in zip(nodes, spectrum.outcomes.ravel(), strict=True):
+        outcome = model.simulate(node_scene(start, *node, settle=20.0)).outcome
+        assert outcome.startswith("overturned") == bool(overturned)
     assert 0 < np.count_nonzero(spectrum.outcomes) < spectrum.outcomes.size
 
 
 def test_motions_at_nodes_are_those_that_the_model_simulates():
-    record = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
     model, seen = EventBasedModel(tolerance=1e-10), set()
     a, f = np.array([1.2, 2.0, 4.0, 9.0]), np.array([0.8, 0.5, 1.0, 2.5])
-    for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=record)):
+    for start in (scene(Wall(side="left", gap=0.053, restitution=0.5)), scene(excitation=RECORD)):
         for motion, *node in zip(
             play_motions(start, a, f, model=model, parts=50), a, f, strict=True
         ):
@@ -255,19 +242,6 @@ def test_a_motion_that_fails_is_none():
     assert play_motions(scene(), np.array([4.0]), np.array([2.0]), model=model, parts=10) == [None]
 
 
-def test_the_mirror_image_and_the_number_of_threads():
-    wall = Wall(side="left", gap=0.053, restitution=1.0)
-    a, f = (
-        axis.ravel() for axis in np.meshgrid(np.linspace(1.0, 12.0, 12), np.linspace(0.5, 8.0, 12))
-    )
-    model = EventBasedModel(tolerance=1e-8)
-    sides, _ = play_nodes(scene(wall), a, f, model=model, jobs=1)
-    again, _ = play_nodes(scene(wall), a, f, model=model, jobs=3)
-    np.testing.assert_array_equal(sides, again)
-    mirrored, _ = play_nodes(scene(wall).mirrored(), -a, f, model=model)
-    np.testing.assert_array_equal(mirrored, -sides)
-
-
 def test_least_overturning_amplitude_and_area():
     spectrum = overturning_spectrum(scene(), [2.0, 8.0], [1.0, 3.0, 6.0, 9.0])
     assert spectrum.outcomes.shape == (4, 2)
@@ -277,24 +251,22 @@ def test_least_overturning_amplitude_and_area():
     assert np.isnan(least[1])
 
 
+STILL = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
+
+
 @pytest.mark.parametrize(
-    ("frequencies", "amplitudes", "said"),
+    ("start", "frequencies", "amplitudes", "said"),
     [
-        ([], [1.0], "frequency_ratios"),
-        ([1.0, np.nan], [1.0], "positive finite"),
-        ([1.0], [2.0, 1.0], "amplitude_ratios: increasing"),
-        ([1.0], [0.0, 1.0], "positive"),
-        ([1.0], ["a"], "numbers are asked for"),
-        ([[1.0]], [1.0], "dimensions"),
-        (np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
+        (scene(), [], [1.0], "frequency_ratios"),
+        (scene(), [1.0, np.nan], [1.0], "positive finite"),
+        (scene(), [1.0], [2.0, 1.0], "amplitude_ratios: increasing"),
+        (scene(), [1.0], [0.0, 1.0], "positive"),
+        (scene(), [1.0], ["a"], "numbers are asked for"),
+        (scene(), [[1.0]], [1.0], "dimensions"),
+        (scene(), np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
+        (STILL, [1.0], [1.0], "ricker or sine pulse, or a record"),
     ],
 )
-def test_grids_that_cannot_be(frequencies, amplitudes, said):
+def test_what_has_no_spectrum(start, frequencies, amplitudes, said):
     with pytest.raises(InputError, match=said):
-        overturning_spectrum(scene(), frequencies, amplitudes)
-
-
-def test_a_base_at_rest_has_no_spectrum():
-    at_rest = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
-    with pytest.raises(InputError, match="ricker or sine pulse, or a record"):
-        overturning_spectrum(at_rest, [1.0], [1.0])
+        overturning_spectrum(start, frequencies, amplitudes)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from loaded import RACK
+from cases import RACK
 from scipy.integrate import quad
 
 from rockcheck import engines
