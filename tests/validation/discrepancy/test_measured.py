@@ -147,12 +147,10 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
 
 
 def swing(scale=1.0, delay=0.0):
-    scene, state = (
-        load_scene("bookcase").replace(duration=4.0, output_step=0.01),
-        np.zeros((401, 6)),
-    )
+    scene = load_scene("bookcase").replace(duration=4.0, output_step=0.01)
     t = scene.output_times - 1.2 - delay
-    state[:, 2] = 0.1 * scale * np.exp(-4.0 * t**2) * np.cos(3.0 * t)
+    theta = 0.1 * scale * np.exp(-4.0 * t**2) * np.cos(3.0 * t)
+    state = np.column_stack([0.0 * t, 0.0 * t, theta, 0.0 * t, 0.0 * t, 0.0 * t])
     return observe(scene, "measured", state)
 
 
@@ -164,7 +162,9 @@ def test_a_shift_in_time_is_found(delay):
 
 
 def test_the_interval_of_a_mean_covers_as_often_as_it_says():
-    chance, truth, inside = np.random.default_rng(3), swing().peak_rotation, 0
+    chance = np.random.default_rng(3)
+    truth = swing().peak_rotation
+    inside = 0
     for _ in range(400):
         mean = mean_history([swing(scale) for scale in 1.0 + 0.1 * chance.standard_normal(4)])
         inside += abs(mean.peak_rotation - truth) <= mean.uncertainty["peak_rotation"]

@@ -41,7 +41,7 @@ def tilted(tilt, correlations=None, duration=1.0, given=None):
 
 def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
     found = propagate(tilted(0.5), indices=False)
-    inputs, none = found.inputs, found.inputs.overturns
+    inputs = found.inputs
     assert [(one.name, one.unit) for one in inputs.figures] == [
         ("peak_rotation", "alpha"),
         ("last_slip", "m"),
@@ -54,9 +54,8 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
     assert (inputs.samples, inputs.model, inputs.sensitivities) == (SAMPLES, "ebm-unilateral", ())
     assert not found.fallen.any()
     wilson = NORMAL**2 / (SAMPLES + NORMAL**2)
-    assert (none.value, none.low, none.high) == pytest.approx(
-        (0.0, 0.0, wilson), rel=1e-3, abs=1e-12
-    )
+    falls = (inputs.overturns.value, inputs.overturns.low, inputs.overturns.high)
+    assert falls == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
     # At the start the bands are the quantiles of a normal number.
     quantiles = [0.5 + 0.05 * z for z in (-NORMAL, -0.994458, 0.0, 0.994458, NORMAL)]
     assert found.bands[:, 0] == pytest.approx(quantiles, abs=2e-3)

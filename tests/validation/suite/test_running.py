@@ -134,7 +134,8 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
 def test_only_what_changed_runs_again(tmp_path, run):
     """Neither documentation nor a remark is code."""
     models = STILL | {"b": 'model = "faulty:Still"\noffset = 1e-12'}
-    path, code = write_suite(tmp_path, models, FINE.format(model="a")), tmp_path / "faulty.py"
+    path = write_suite(tmp_path, models, FINE.format(model="a"))
+    code = tmp_path / "faulty.py"
     for file, old, new, played in (
         (path, "1e-12", "1e-12", ["still", "a", "b"]),
         (path, "1e-12", "1e-12", []),
@@ -234,7 +235,8 @@ def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(
 
 
 def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
-    done, out = run(write_suite(tmp_path, STILL, FINE.format(model="a"))), tmp_path / "out"
+    done = run(write_suite(tmp_path, STILL, FINE.format(model="a")))
+    out = tmp_path / "out"
     done.save(out)
     assert Run.load(out) == done
     assert done.exit_code == 0
