@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine
+from rockcheck import Block, EventBasedModel, Floor, Record, Rest, Scene, Sine
 from rockcheck.validation import criteria
 
 G = 9.81

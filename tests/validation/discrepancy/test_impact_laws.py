@@ -2,11 +2,18 @@
 
 import pytest
 
-from rockcheck import engines
-from rockcheck.cm import ContinuousModel
-from rockcheck.ebm import EventBasedModel
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    EventBasedModel,
+    Floor,
+    History,
+    Ricker,
+    Scene,
+    Wall,
+    engines,
+)
 from rockcheck.engines import stepping
-from rockcheck.scenes import Block, Floor, History, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed, parting_landing
 

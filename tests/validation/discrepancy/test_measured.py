@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Event, InputError, load_scene
+from rockcheck import Event, EventBasedModel, InputError, load_scene
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.discrepancy.measured import (
     Measured,

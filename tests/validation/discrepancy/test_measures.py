@@ -6,10 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Event, Floor, InputError, Scene
+from rockcheck import Event, EventBasedModel, Floor, InputError, Scene, compare
 from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation import compare
 from rockcheck.validation.discrepancy.compare import describe
 from rockcheck.validation.discrepancy.figures import Pair, match_impacts
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES

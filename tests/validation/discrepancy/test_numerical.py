@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from rockcheck import ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
-from rockcheck.scenes.block import Block
+from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 

@@ -13,14 +13,15 @@ from rockcheck import (
     EventBasedModel,
     Floor,
     InputError,
+    MuJoCo,
     Ricker,
     Scene,
     Wall,
+    load_scene,
 )
 from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.engines import MuJoCo
 from rockcheck.scenes.experience import Range, axes_of, expected, outside
-from rockcheck.scenes.files import load_scene, load_uncertain_scene
+from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.suite.across import trust_in
 from rockcheck.validation.suite.comparing import explanations
 from rockcheck.validation.suite.results import Cell

@@ -8,8 +8,7 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from rockcheck.ebm import Spectrum
-from rockcheck.scenes import Floor
+from rockcheck import Floor, Spectrum
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request

@@ -13,10 +13,8 @@ import pandas as pd
 import pytest
 from junitparser import JUnitXml
 
-from rockcheck import engines
+from rockcheck import Floor, InputError, ModelFailure, MuJoCo, Wall, engines, load_scene
 from rockcheck.commands.cli import main
-from rockcheck.engines import MuJoCo
-from rockcheck.scenes import Floor, InputError, ModelFailure, Wall, load_scene
 from rockcheck.scenes.writing import json_text
 from rockcheck.validation.execute.models import engine_names, not_installed
 from rockcheck.validation.execute.pool import guarded

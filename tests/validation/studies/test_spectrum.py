@@ -10,10 +10,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from rockcheck.cm import ContinuousModel
-from rockcheck.ebm import Spectrum
-from rockcheck.ebm.spectrum import node_scene, overturning_spectrum
-from rockcheck.scenes import Block, Ricker, Scene, Wall
+from rockcheck import Block, ContinuousModel, Ricker, Scene, Spectrum, Wall, overturning_spectrum
+from rockcheck.ebm.spectrum import node_scene
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.spectrum import tiles

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck.scenes import Block, Floor, Rest, Scene
-from rockcheck.validation.discrepancy.compare import compare
+from rockcheck import Block, Floor, Rest, Scene, compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.across import _moved
 from rockcheck.validation.suite.results import Cell, Check, Run

@@ -2,11 +2,8 @@
 back."""
 
 import json
-import math
 import shutil
-import subprocess
 import sys
-from collections import deque
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,7 +11,6 @@ import pytest
 
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
-from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import SuiteStudy, run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -250,33 +246,6 @@ def test_how_things_look_plays_no_cell_again(name):
     code = provenance.reachable(provenance.home(name))
     assert "rockcheck.scenes.base" in code
     assert not [module for module in code if module.startswith("rockcheck.reports")]
-
-
-#: Ends when a file is there; fails after a minute.
-WAITS = """
-import pathlib, sys, time
-for _ in range(600):
-    if pathlib.Path(sys.argv[1]).exists():
-        sys.exit(0)
-    time.sleep(0.1)
-sys.exit(1)
-"""
-
-
-def test_only_calls_that_compile_wait_for_each_other(tmp_path):
-    """The second call can end only while the third one runs, which begins as the first one ends."""
-    there = str(tmp_path / "there")
-    plain = [
-        [sys.executable, "-c", WAITS, there],
-        [sys.executable, "-c", "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()", there],
-    ]
-    calls = [
-        Call(math.sqrt, (4.0,), compiles="a package"),
-        *(Call(subprocess.run, (command,)) for command in plain),
-    ]
-    with Pool(2) as pool:
-        found = [ended.result for ended in pool.run(deque(calls))]
-    assert [one.returncode for one in found if one != 2.0] == [0, 0]
 
 
 @pytest.mark.parametrize(
