@@ -31,15 +31,12 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.work_precision.study import WorkPrecision
 from rockcheck.validation.study import FAULTS, Study, run
 
-Squares = Callable[..., Study]
-
 
 @pytest.fixture
-def squares(monkeypatch: pytest.MonkeyPatch) -> Squares:
+def squares(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Study]:
     """The made-up study, which workers import from its folder."""
     monkeypatch.syspath_prepend(Path(__file__).parent / "models")
-    made: Squares = import_module("squares").Squares
-    return made
+    return import_module("squares").Squares  # type: ignore[no-any-return]
 
 
 @pytest.fixture
@@ -55,7 +52,7 @@ def played(log: Path) -> list[float]:
 
 @pytest.mark.parametrize("jobs", [0, 1, 2])
 def test_what_was_played_is_read_back_whatever_plays_it(
-    squares: Squares, tmp_path: Path, log: Path, jobs: int
+    squares: Callable[..., Study], tmp_path: Path, log: Path, jobs: int
 ) -> None:
     heard: list[tuple[float, float]] = []
     study = squares([2.0, 3.0, 3.0, 11.0], log)  # whose square is a task of a second wave
@@ -72,7 +69,7 @@ def test_what_was_played_is_read_back_whatever_plays_it(
 
 
 def test_a_fault_of_one_task_takes_no_other_down(
-    squares: Squares, tmp_path: Path, log: Path
+    squares: Callable[..., Study], tmp_path: Path, log: Path
 ) -> None:
     found = run(squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
     assert found.data == {"count": 1}
@@ -91,7 +88,7 @@ def test_a_fault_of_one_task_takes_no_other_down(
 
 
 def test_an_interrupted_run_gathers_what_there_is_and_goes_on(
-    squares: Squares, tmp_path: Path, log: Path
+    squares: Callable[..., Study], tmp_path: Path, log: Path
 ) -> None:
     late = run(squares([2.0], log), tmp_path, jobs=0, minutes=1e-9)
     assert (late.complete, late.exit_code, played(log)) == (False, 0, []), "there was no time"
@@ -102,7 +99,7 @@ def test_an_interrupted_run_gathers_what_there_is_and_goes_on(
 
 
 def test_timed_tasks_are_played_here_and_a_damaged_record_again(
-    squares: Squares, tmp_path: Path, log: Path
+    squares: Callable[..., Study], tmp_path: Path, log: Path
 ) -> None:
     study = squares([2.0], log, where="timed")
     run(study, tmp_path, jobs=2)
@@ -116,7 +113,7 @@ def test_timed_tasks_are_played_here_and_a_damaged_record_again(
     ("values", "expected", "said"), [([2.0, 3.0], 90.0, ["3 min"]), ([4.0], 1.0, [])]
 )
 def test_a_long_run_says_how_long(
-    squares: Squares, tmp_path: Path, log: Path, values, expected, said
+    squares: Callable[..., Study], tmp_path: Path, log: Path, values, expected, said
 ) -> None:
     heard: list[str] = []
     with announcing(heard.append):
@@ -144,7 +141,9 @@ def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
     assert not any(path.is_file() for path in tmp_path.rglob("*"))
 
 
-def test_a_folder_that_cannot_be_used_is_bad_input(squares: Squares, log: Path) -> None:
+def test_a_folder_that_cannot_be_used_is_bad_input(
+    squares: Callable[..., Study], log: Path
+) -> None:
     with pytest.raises(InputError, match="output folder"):
         run(squares([2.0], log), log)
 

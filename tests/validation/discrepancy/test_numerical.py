@@ -72,7 +72,6 @@ def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_
     ids=["an order too low", "no order"],
 )
 def test_what_does_not_converge_gets_the_larger_factor(error):
-    """By the largest change of any history."""
     found = judged(Made(lambda h: 1.0 + error(h / 1e-3)))
     change = max(abs(error(n) - error(1.0)) for n in (2.0, 3.0, 4.0))
     for name in ("peak_rotation", "theta_rms"):
@@ -162,7 +161,6 @@ def test_a_last_slip_that_all_runs_share_is_as_sure_as_its_history(factor, slid,
 
 @pytest.mark.parametrize(("late", "u_num"), [(0, 0.0), (1, 1.25 * 3.0), (-1, 1.25 * 3.0)])
 def test_the_time_of_a_fall_is_that_of_its_changes_and_of_a_row(late, u_num):
-    """It falls so many rows later or sooner with each unit of the step."""
     found = judged(
         Made(lambda h: 1.0, falls=lambda h: True, rows=lambda h: 600 + late * round(h / 1e-3))
     )

@@ -57,7 +57,6 @@ class Answers(Book):
 
 @pytest.fixture
 def agree(monkeypatch):
-    """What is found of spectra whose nodes these models play."""
 
     def found_of(letter, models, spectra, map_size):
         for name, value in {

@@ -134,14 +134,18 @@ def test_every_measure_takes_out_the_record_s_own_size(measure):
     assert one.peaks == pytest.approx(other.peaks, abs=1e-6)
 
 
-def test_measures_have_the_units_of_engineers():
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("pga", 9.80665),
+        ("pga-ratio", 9.81 * 0.3),
+        ("pgv-ratio", 9.81 * 0.3 / SCENE.frequency_parameter),
+    ],
+)
+def test_measures_have_the_units_of_engineers(name, unit):
     record = motion(1.0)
-    of = {name: measure_of(name)[2](record, SCENE) for name in MEASURES}
-    pga = np.max(np.abs(record.samples))
-    p = SCENE.frequency_parameter
-    wanted = {"pga": pga / 9.80665, "pga-ratio": pga / (9.81 * 0.3)}
-    wanted |= {"pgv-ratio": of["pgv"] * p / (9.81 * 0.3)}
-    assert {name: of[name] for name in wanted} == pytest.approx(wanted)
+    size = np.max(np.abs(record.samples)) if "pga" in name else measure_of("pgv")[2](record, SCENE)
+    assert measure_of(name)[2](record, SCENE) == pytest.approx(size / unit)
     assert measure_of("sa:0.5")[:2] == ("Sa(0.5 s), 5 %", "g")
 
 
@@ -223,11 +227,16 @@ def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
     assert found == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
 
 
-def test_a_set_that_is_none_is_refused():
-    with pytest.raises(InputError, match="is no pulse"):
-        fragility(SCENE, LEVELS, (1.0, 2.0))
-    with pytest.raises(InputError, match="still: a record with"):
-        ida(SCENE, [("still", motion(0.0))] * 2, LEVELS)
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (lambda: fragility(SCENE, LEVELS, (1.0, 2.0)), "is no pulse"),
+        (lambda: ida(SCENE, [("still", motion(0.0))] * 2, LEVELS), "still: a record with"),
+    ],
+)
+def test_a_set_that_is_none_is_refused(asked, said):
+    with pytest.raises(InputError, match=said):
+        asked()
 
 
 # Curves
@@ -299,25 +308,29 @@ def test_the_band_covers_as_often_as_it_says(motions, shared):
 
 def test_a_curve_never_counts_a_failed_run_as_safe():
     """Of four motions in both directions: what failed is in no share, no band and no fit."""
-    intensities, failed = np.array([1.0, 2.0, 3.0]), np.zeros((4, 2, 3), dtype=bool)
-    hit = np.zeros_like(failed)
+    hit = np.zeros((4, 2, 3), dtype=bool)
     hit[:, :, 2] = hit[:2, :, 1] = True
-    plain = curve_of("made", hit, failed, intensities)
-    # all that did not overturn at 2: now nothing is known to be safe there
-    failed[2:, :, 1] = failed[0, 0, 2] = True
-    curve = curve_of("made", hit, failed, intensities)
-    assert [point[1] for point in plain.points] == [0.0, 0.5, 1.0]
-    assert [point[1] for point in curve.points] == [0.0, 1.0, 1.0]
+    some = np.zeros_like(
+        hit
+    )  # all that did not overturn at 2: now nothing is known to be safe there
+    some[2:, :, 1] = some[0, 0, 2] = True
+    all_at_2 = some | (np.arange(3) == 1)
+    plain, curve, nowhere, nothing = (
+        curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
+        for failed in (np.zeros_like(hit), some, all_at_2, np.ones_like(hit))
+    )
+    for one, shares in (
+        (plain, [0.0, 0.5, 1.0]),
+        (curve, [0.0, 1.0, 1.0]),
+        (nowhere, [0.0, math.nan, 1.0]),
+    ):
+        assert [point[1] for point in one.points] == pytest.approx(shares, nan_ok=True)
     # Wilson's band of both motions
     assert curve.points[1][2:4] == pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4)
     assert curve.undecided == 5
     assert curve.median < plain.median
-    failed[:, :, 1] = True
-    nowhere = curve_of("made", hit, failed, intensities)
-    shares = [point[1] for point in nowhere.points]
-    assert shares == pytest.approx([0.0, math.nan, 1.0], nan_ok=True)
     assert nowhere.median > 0.0
-    assert math.isnan(curve_of("made", hit, np.ones_like(failed), intensities).median)
+    assert math.isnan(nothing.median)
 
 
 # The command

@@ -43,7 +43,6 @@ PANELS = {panel.name: panel for panel in paper_panels()}
 
 
 def outcomes(found):
-    """The grids of a finding's files, by name."""
     return {
         name.removesuffix(".npz"): dict(np.load(io.BytesIO(content)))
         for name, content in found.files.items()
@@ -52,7 +51,6 @@ def outcomes(found):
 
 
 def on_grid(frequencies, amplitudes, **how):
-    """A request of a grid of any axes."""
     request = Request(size=len(amplitudes), **how)
     request.__dict__.update(frequencies=np.asarray(frequencies), amplitudes=np.asarray(amplitudes))
     return request

@@ -1,13 +1,11 @@
-"""The harness as a whole, on copies of the project: faults put in on purpose, and runs that are
-killed. Minutes, not seconds."""
+"""The harness as a whole, on copies of the project: faults put in on purpose, what runs
+again, and two runs at once. Minutes, not seconds."""
 
 import os
-import random
 import re
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -175,30 +173,6 @@ def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, un
     assert "25 of 25 simulations were up to date" in project.run()[1]
     _, out = project.run_changed(file, old, new)
     assert f"{untouched} of 25 simulations were up to date" in out
-
-
-def tables(folder: Path) -> list[bytes]:
-    return [(folder / name).read_bytes() for name in ("checks.csv", "figures.csv")]
-
-
-@pytest.mark.slow
-def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
-    began = time.perf_counter()
-    project.run("--out", str(tmp_path / "undisturbed"))
-    length = time.perf_counter() - began
-    chance = random.Random(20)
-    killed = 0
-    for attempt in range(20):
-        out = tmp_path / f"killed-{attempt}"
-        process = project.start("--out", str(out))
-        time.sleep(chance.uniform(0.0, 1.1) * length)
-        killed += process.poll() is None
-        process.kill()
-        process.communicate()
-        code, text = project.run("--out", str(out))
-        assert code == 0, text
-        assert tables(out) == tables(tmp_path / "undisturbed")
-    assert killed >= 10
 
 
 @pytest.mark.slow

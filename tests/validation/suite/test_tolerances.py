@@ -93,17 +93,19 @@ def line_of(expected, limit, drift, why="a test"):
     return {"expected": expected, "limit": limit, "drift": drift, "why": why}
 
 
-MOVED = (
-    "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015,"
-    " limit 0.002, drift 0.0001"
-)
 FAR = Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
 
 
 @pytest.mark.parametrize(
     ("one", "reason", "change", "line"),
     [
-        (check(1.5e-3), "another step", MOVED, line_of(1.5e-3, 2e-3, 1e-4, "another step")),
+        (
+            check(1.5e-3),
+            "another step",
+            "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015,"
+            " limit 0.002, drift 0.0001",
+            line_of(1.5e-3, 2e-3, 1e-4, "another step"),
+        ),
         (check(1e-3, FAR), None, ": tightened: ", line_of(1e-3, 2e-3, 2e-4)),
         (check(0.15, FAR), "why not", ": moved: ", line_of(0.15, 0.2, 0.01, "why not")),
         (check(0.5, FAR), "so", ": loosened: ", line_of(0.5, 1.0, 0.01, "so")),
@@ -126,7 +128,6 @@ FAR = Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
 def test_accept_names_each_change_and_leaves_the_rest_of_the_file(
     accepted, one, reason, change, line
 ):
-    """What is not defined needs no line."""
     (said,), refused, text = accepted(FILE, one, NOT_DEFINED, reason=reason)
     assert change in said
     assert refused == []
