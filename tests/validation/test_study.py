@@ -34,7 +34,6 @@ from rockcheck.validation.study import FAULTS, Study, run
 
 @pytest.fixture
 def squares(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Study]:
-    """The made-up study, which workers import from its folder."""
     monkeypatch.syspath_prepend(Path(__file__).parent / "models")
     return import_module("squares").Squares  # type: ignore[no-any-return]
 

@@ -177,9 +177,9 @@ def test_repeats_that_end_differently_have_no_mean():
 
 
 def test_other_events_beside_a_measured_history_make_another_cell(tmp_path):
-    scene, path = load_scene("bookcase"), tmp_path / "table.csv"
-    EventBasedModel().simulate(scene).save(path)
-    given = {"files": {scene.name: str(path)}}
+    scene = load_scene("bookcase")
+    EventBasedModel().simulate(scene).save(tmp_path / "table.csv")
+    given = {"files": {scene.name: str(tmp_path / "table.csv")}}
     key, events = cell_key(scene, "measured", given), tmp_path / "table.events.csv"
     events.write_text(events.read_text(encoding="utf-8").replace("floor", "wall"), encoding="utf-8")
     assert cell_key(scene, "measured", given) != key

@@ -80,11 +80,10 @@ def tongue(spectrum):
 
 def as_said(mu, *wall):
     """Safe areas as the paper says they are."""
-    if not wall:
-        return {0.3: 0.5, 0.6: 0.4}[mu]
-    gap, e = wall[1:]
-    helps = 0.5 if (wall[0], gap, e) == ("right", 0.003, 0.0) else 0.0
-    return 0.2 - 0.3 * (mu - 0.3) - 0.05 * e - 0.5 * gap + helps
+    _, gap, e = wall or ("", 0.0, 0.0)
+    helps = 0.5 if wall == ("right", 0.003, 0.0) else 0.0
+    beside = 0.2 - 0.3 * (mu - 0.3) - 0.05 * e - 0.5 * gap + helps
+    return beside if wall else {0.3: 0.5, 0.6: 0.4}[mu]
 
 
 def harmed_by_e(*walls):

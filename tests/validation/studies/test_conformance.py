@@ -46,8 +46,6 @@ def verdicts(found, *wanted):
 
 @pytest.fixture
 def planted(monkeypatch):
-    """The finding of an engine that plays a scene so."""
-
     def gather(play):
         monkeypatch.setattr(study, "build_own", lambda *_: SimpleNamespace(simulate=play))
         player = Player("planted", "best", 1e-3, "planted:Planted", {}, "1")

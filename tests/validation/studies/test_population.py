@@ -60,7 +60,6 @@ MOTIONS = [("H1", motion(1.0)), ("H2", motion(2.5, 5.0)), ("H3", motion(0.3, 2.0
 
 
 def played(study):
-    """What the tasks gave, and the finding."""
     done = {task: task.play() for task in study.batches}
     return done, Finding("", "", *study.gather(done))
 

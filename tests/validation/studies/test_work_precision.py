@@ -239,7 +239,6 @@ def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(
 
 
 def made(*errors: float, model: str = "mujoco", scene: str = TWO_WALLS[0]) -> list[BenchmarkRun]:
-    """Runs with these errors against the unilateral model, steps falling tenfold from 1e-3."""
     steps = [10.0 ** -(3 + n) for n in range(len(errors))]
     return [
         BenchmarkRun(scene, 0, model, step, 5.0, rms=error, against_ebm=0.1, step=step)

@@ -51,8 +51,6 @@ overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none f
 
 @pytest.fixture
 def loaded(tmp_path, faulty):
-    """The suite of a text."""
-
     def load(text=SUITE):
         (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
         return load_suite(tmp_path / "mine.toml", allow_code=OWN)
@@ -257,18 +255,17 @@ def test_what_a_statistic_tells_apart():
     }
 
 
-TIMES, CROWD = 600, 60
 BIAS, SCATTER, AGREE = 0.05, 0.2, 0.9
 
 
 def made_up(chance) -> Samples:
     """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no
     ratio."""
-    peaks = chance.uniform(0.2, 0.8, CROWD)
-    outcomes = np.where(chance.random(CROWD) < 0.3, "overturned left", "at rest")
+    peaks = chance.uniform(0.2, 0.8, 60)
+    outcomes = np.where(chance.random(60) < 0.3, "overturned left", "at rest")
     other = np.where(outcomes == "at rest", "overturned left", "at rest")
-    theirs = np.where(chance.random(CROWD) < AGREE, outcomes, other)
-    ratios = np.exp(BIAS + SCATTER * chance.standard_normal(CROWD))
+    theirs = np.where(chance.random(60) < AGREE, outcomes, other)
+    ratios = np.exp(BIAS + SCATTER * chance.standard_normal(60))
     return Samples(Sample(peaks, list(outcomes)), Sample(peaks * ratios, list(theirs)))
 
 
@@ -278,8 +275,8 @@ def made_up(chance) -> Samples:
 )
 def test_the_interval_in_the_remark_covers(name, truth):
     chance, inside = np.random.default_rng(11), 0
-    for _ in range(TIMES):
+    for _ in range(600):
         _, remark = STATISTICS[name].evaluate(made_up(chance))
         low, high = map(float, re.match(r"\[(-?[\d.e-]+), (-?[\d.e-]+)\]", remark).groups())
         inside += low <= truth <= high
-    assert 0.92 <= inside / TIMES <= 0.98
+    assert 0.92 <= inside / 600 <= 0.98

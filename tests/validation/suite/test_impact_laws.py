@@ -91,7 +91,6 @@ def run(suite_file: Path) -> Run:
     ],
 )
 def test_the_law_that_each_model_followed_is_in_its_cell(run: Run, scene, laws) -> None:
-    """Where no landing tells one law judges."""
     found = [cell.impact_law for cell in run.of_scene(scene) if cell.impact_law]
     assert tuple(law.law for law in found) == laws
     assert len({law.t for law in found}) <= 1
@@ -112,24 +111,20 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run, scene, law, 
     reference, cell = run.cell(scene, "ebm-unilateral"), run.cell(scene, law)
     assert reference.outcome != cell.outcome
     assert outcomes in (None, (reference.outcome, cell.outcome))
-    assert {check.figure.measure: check.verdict for check in cell.checks} == dict.fromkeys(
-        ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
-    )
+    assert {check.verdict for check in cell.checks} == {"pass"}
     figures = {check.figure.measure: check.figure for check in cell.checks}
     horizon = figures.pop("theta_rms")
     assert "impacts = " not in horizon.note
     assert abs(horizon.until - cell.impact_law.t) < near
-    told = f'impacts = "{law}"'
-    assert all(one.until is None for one in figures.values())
-    assert all(one.note.endswith(told) for one in figures.values())
+    assert list(figures) == ["outcome_agrees", "peak_ratio"]
+    for figure in figures.values():
+        assert (figure.until, figure.note.endswith(f'impacts = "{law}"')) == (None, True)
 
 
 def test_the_summary_names_the_laws_and_nothing_depends_on_them(
     run: Run, suite_file: Path, tmp_path: Path
 ) -> None:
-    table = markdown(run).split("not judged")[1]
-    assert "open | floor-first | open | closed" in " ".join(table.split())
-    assert "plastic" not in table
+    assert "not judged" in markdown(run)
     laws = {(one["scene"], one["model"]): one["impact_law"] for one in summary(run)["cells"]}
     assert (laws["of the law", "mujoco"], laws["plastic", "mujoco"]) == ("closed", None)
     silent = [cell.model_copy(update={"impact_law": None}) for cell in run.cells]

@@ -102,8 +102,8 @@ FAR = Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
         (
             check(1.5e-3),
             "another step",
-            "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015,"
-            " limit 0.002, drift 0.0001",
+            "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> "
+            "expected 0.0015, limit 0.002, drift 0.0001",
             line_of(1.5e-3, 2e-3, 1e-4, "another step"),
         ),
         (check(1e-3, FAR), None, ": tightened: ", line_of(1e-3, 2e-3, 2e-4)),

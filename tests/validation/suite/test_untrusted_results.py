@@ -111,7 +111,6 @@ DAMAGE: dict[str, Callable[[Path], Any]] = {
     ],
 )
 def test_what_is_damaged_is_found_and_made_again(tmp_path, run, kind, damage):
-    """The same figures and verdicts as before, and no traceback."""
     before = plain(run())
     whole = {path: path.read_bytes() for path in stored(tmp_path, kind)}
     assert len(whole) >= 2
@@ -138,7 +137,6 @@ def test_a_record_that_is_a_pipe_is_not_waited_for(tmp_path, run):
 
 
 def test_a_record_under_another_name_is_none(tmp_path, run):
-    """The figures of one cell, copied over those of another."""
     before = plain(run())
     paths = [path for path in stored(tmp_path) if path.parent.name == COMPARISONS]
     texts = [path.read_text() for path in paths]
