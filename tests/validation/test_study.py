@@ -139,6 +139,8 @@ def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
     said = refused(*words.split(), "--scheduler", address, "--quiet")
     assert said.startswith(f"rockcheck: --scheduler: {address!r}")
     assert not any(path.is_file() for path in tmp_path.rglob("*"))
+    with pytest.raises(InputError, match="--scheduler"):
+        run(None, tmp_path, scheduler=address)  # type: ignore[arg-type]  # no study is looked at
 
 
 def test_a_folder_that_cannot_be_used_is_bad_input(
