@@ -3,6 +3,7 @@ the shape."""
 
 import json
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -31,15 +32,10 @@ from rockcheck.validation.studies.work_precision.study import WorkPrecision
 from rockcheck.validation.study import FAULTS, Study, run
 
 
-@pytest.fixture(autouse=True)
-def _importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Workers import the made-up study from its folder."""
+@pytest.fixture
+def squares(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Study]:
     monkeypatch.syspath_prepend(Path(__file__).parent / "models")
-
-
-def squares(*arguments: Any, **how: Any) -> Study:
-    made: Study = import_module("squares").Squares(*arguments, **how)
-    return made
+    return import_module("squares").Squares  # type: ignore[no-any-return]
 
 
 @pytest.fixture
@@ -55,29 +51,26 @@ def played(log: Path) -> list[float]:
 
 @pytest.mark.parametrize("jobs", [0, 1, 2])
 def test_what_was_played_is_read_back_whatever_plays_it(
-    tmp_path: Path, log: Path, jobs: int
+    squares: Callable[..., Study], tmp_path: Path, log: Path, jobs: int
 ) -> None:
     heard: list[tuple[float, float]] = []
     study = squares([2.0, 3.0, 3.0, 11.0], log)  # whose square is a task of a second wave
-    found = run(
-        study,
-        tmp_path / "out",
-        jobs=jobs,
-        on_progress=lambda done, of, what="": heard.append((done, of)),
-    )
-    again = run(study, tmp_path / "out", jobs=jobs)
+    how: dict[str, Any] = {"folder": tmp_path / "out", "jobs": jobs}
+    found = run(study, **how, on_progress=lambda done, of, what="": heard.append((done, of)))
     values = [2.0, 3.0, 11.0, 121.0, 14641.0]
     rows = [[value, value**2] for value in values]
-    assert found.table("squares").rows == again.table("squares").rows == rows
+    assert found.table("squares").rows == run(study, **how).table("squares").rows == rows
     assert played(log) == values
     assert (heard[0], heard[-1]) == ((0, 3), (5, 5))
     assert found.complete
     assert found.made
-    assert run(study, tmp_path / "out", jobs=jobs, force=True).data == {"count": 5}
+    assert run(study, **how, force=True).data == {"count": 5}
     assert played(log) == sorted(2 * values)
 
 
-def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> None:
+def test_a_fault_of_one_task_takes_no_other_down(
+    squares: Callable[..., Study], tmp_path: Path, log: Path
+) -> None:
     found = run(squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
     assert found.data == {"count": 1}
     assert {
@@ -94,19 +87,20 @@ def test_a_fault_of_one_task_takes_no_other_down(tmp_path: Path, log: Path) -> N
     assert played(log).count(2.0) == 1
 
 
-def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path: Path, log: Path) -> None:
+def test_an_interrupted_run_gathers_what_there_is_and_goes_on(
+    squares: Callable[..., Study], tmp_path: Path, log: Path
+) -> None:
+    late = run(squares([2.0], log), tmp_path, jobs=0, minutes=1e-9)
+    assert (late.complete, late.exit_code, played(log)) == (False, 0, []), "there was no time"
     found = run(squares([2.0, 16.0, 3.0], log), tmp_path, jobs=0)
     assert (found.complete, found.exit_code, found.data) == (False, 130, {"count": 1})
     assert run(squares([2.0, 3.0], log), tmp_path, jobs=0).data == {"count": 2}
     assert played(log) == [2.0, 3.0, 16.0]
 
 
-def test_what_there_is_no_time_for_is_left_out(tmp_path: Path, log: Path) -> None:
-    found = run(squares([2.0], log), tmp_path, jobs=0, minutes=1e-9)
-    assert (found.complete, found.exit_code, played(log)) == (False, 0, [])
-
-
-def test_timed_tasks_are_played_here_and_a_damaged_record_again(tmp_path: Path, log: Path) -> None:
+def test_timed_tasks_are_played_here_and_a_damaged_record_again(
+    squares: Callable[..., Study], tmp_path: Path, log: Path
+) -> None:
     study = squares([2.0], log, where="timed")
     run(study, tmp_path, jobs=2)
     (record,) = (tmp_path / "records").glob("*.json")
@@ -115,48 +109,43 @@ def test_timed_tasks_are_played_here_and_a_damaged_record_again(tmp_path: Path, 
     assert run(study, tmp_path, jobs=2).table("squares").rows == [[2.0, 4.0]]
 
 
-def test_a_long_run_says_how_long(tmp_path: Path, log: Path) -> None:
-    said: list[str] = []
-    with announcing(said.append):
-        run(squares([2.0, 3.0], log, expected=90.0), tmp_path, jobs=0)
-        run(squares([4.0], log, expected=1.0), tmp_path, jobs=0)
-    (words,) = said
-    assert "3 min" in words
-
-
-@pytest.mark.long
-def test_on_a_dask_cluster_it_is_the_same(tmp_path: Path, log: Path) -> None:
-    found = run(squares([2.0, 11.0, 13.0, 15.0], log), tmp_path / "out", scheduler="local:2")
-    assert found.data == {"count": 4}
-    assert len(found.failures) == 2
-
-
-@pytest.mark.parametrize("address", ["local:0", "local:two", "nonsense", ""])
-def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
-    tmp_path: Path, log: Path, monkeypatch: pytest.MonkeyPatch, address: str
+@pytest.mark.parametrize(
+    ("values", "expected", "said"), [([2.0, 3.0], 90.0, ["3 min"]), ([4.0], 1.0, [])]
+)
+def test_a_long_run_says_how_long(
+    squares: Callable[..., Study], tmp_path: Path, log: Path, values, expected, said
 ) -> None:
-    study, asked = squares([2.0], log), []
-    monkeypatch.setattr(type(study), "tasks", lambda *_: asked.append(1))
-    with pytest.raises(InputError) as told:
-        run(study, tmp_path / "out", scheduler=address)
-    assert told.value.key == "--scheduler"
-    assert not asked
-    assert not (tmp_path / "out").exists()
+    heard: list[str] = []
+    with announcing(heard.append):
+        run(squares(values, log, expected=expected), tmp_path, jobs=0)
+    assert [part in words for part, words in zip(said, heard, strict=True)] == [True] * len(said)
 
 
 @pytest.mark.parametrize(
-    "words", ["validate smoke", "assess fig5a", "spectrum", "conformance", "stress", "accept smoke"]
+    ("words", "address"),
+    [
+        ("validate smoke", "local:0"),
+        ("assess fig5a", "local:two"),
+        ("spectrum", "nonsense"),
+        ("conformance", ""),
+        ("stress", "local:0"),
+        ("accept smoke", "local:0"),
+    ],
 )
-def test_every_study_says_so_in_one_line(
-    words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused
+def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
+    words: str, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert refused(*words.split(), "--scheduler", "local:0", "--quiet").startswith(
-        "rockcheck: --scheduler: 'local:0'"
-    )
+    said = refused(*words.split(), "--scheduler", address, "--quiet")
+    assert said.startswith(f"rockcheck: --scheduler: {address!r}")
+    assert not any(path.is_file() for path in tmp_path.rglob("*"))
+    with pytest.raises(InputError, match="--scheduler"):
+        run(None, tmp_path, scheduler=address)  # type: ignore[arg-type]  # no study is looked at
 
 
-def test_a_folder_that_cannot_be_used_is_bad_input(log: Path) -> None:
+def test_a_folder_that_cannot_be_used_is_bad_input(
+    squares: Callable[..., Study], log: Path
+) -> None:
     with pytest.raises(InputError, match="output folder"):
         run(squares([2.0], log), log)
 
@@ -171,13 +160,14 @@ FOUND = Finding(
             "numbers",
             [
                 text("name"),
+                Column("bias", optional=True),  # no value: in files only
                 Column("model", kind="model"),
                 Column("share", kind="percent"),
                 Column("x", "length", "m"),
             ],
             [
-                ["=1+1|", "mujoco", 0.25, 1.23456e-9],
-                ["b", "mine", None, Mark(2.0, "fail", "too long")],
+                ["=1+1|", None, "mujoco", 0.25, 1.23456e-9],
+                ["b", Mark(None), "mine", None, Mark(2.0, "fail", "too long")],
             ],
             "Numbers",
         ),
@@ -197,25 +187,15 @@ FOUND = Finding(
 )
 
 
-def test_an_optional_column_without_a_value_is_in_files_only() -> None:
-    columns = [text("name"), Column("bias", optional=True), Column("x")]
-    table = Table("t", columns, [["a", None, 1.0], ["b", Mark(None), None]])
-    assert [column.name for column in table.shown.columns] == ["name", "x"]
-    assert table.shown.rows == [["a", 1.0], ["b", None]]
-    assert csv(table).splitlines()[0] == "name,bias,x"
-    known = replace(table, rows=[["a", 0.0, 1.0]])
-    assert known.shown.rows == known.rows
-
-
 def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:
     table = FOUND.table("numbers")
-    assert csv(table).splitlines()[0] == "name,model,share,x"
-    assert "1.23456e-09" in csv(table)
-    assert csv(table).splitlines()[2] == "b,mine,,2.0"
+    head, first, second = csv(table).splitlines()
+    assert (head, second) == ("name,bias,model,share,x", "b,,mine,,2.0")
+    assert "1.23456e-09" in first
     shown = block_markdown(table)
-    assert "length, m" in shown
-    assert "25.0 %" in shown
-    assert "✕ 2" in shown
+    assert [part for part in ("length, m", "25.0 %", "✕ 2") if part not in shown] == []
+    assert "bias" not in shown
+    assert "bias" in block_markdown(replace(table, rows=[["a", 0.0, "mine", 0.5, 1.0]]))
     page = publish(FOUND, tmp_path).read_text(encoding="utf-8")
     assert "Made up &lt;b&gt;" in page
     assert 'class="n fail" title="too long"' in page

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from rockcheck import ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
-from rockcheck.scenes.block import Block
+from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
 from rockcheck.scenes.observation import observe
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
@@ -24,36 +23,47 @@ BOOKCASE = Scene(
 @dataclass(frozen=True)
 class Made:
     """A model whose rotation is sin t times a factor that depends on its step: exactly 1 for a step
-    of zero."""
+    of zero. It slips by up to `slid` alpha R half-way, and is back at 0 in the end; a history of
+    fewer `rows` ends in a fall."""
 
     factor: object
     step: float = 1e-3
     falls: object = field(default=lambda step: False)
+    slid: object = field(default=lambda step: 0.0)
+    rows: object = field(default=lambda step: None)
 
     def coarser(self, factor):
         return replace(self, step=factor * self.step)
 
     def simulate(self, scene):
-        t = scene.output_times
+        t, alpha, radius = scene.output_times, scene.block.alpha, scene.block.radius
         state = np.zeros((len(t), 6))
-        state[:, 2] = 0.5 * scene.block.alpha * np.sin(t) * self.factor(self.step)
-        state[:, 1] = scene.block.radius * np.cos(scene.block.alpha - np.abs(state[:, 2]))
+        state[:, 2] = 0.5 * alpha * np.sin(t) * self.factor(self.step)
+        state[:, 1] = radius * np.cos(alpha - np.abs(state[:, 2]))
         outcome = "overturned left" if self.falls(self.step) else "moving"
-        return observe(scene, "made", state, outcome=outcome)
+        history = observe(scene, "made", state, outcome=outcome)
+        slip = np.where(t == t[len(t) // 2], self.slid(self.step) * alpha * radius, 0.0)
+        columns = history.channels | {"slip": slip}
+        rows = slice(self.rows(self.step))
+        return replace(history, channels={name: one[rows] for name, one in columns.items()})
 
 
-def judged(model):
-    return {q.name: q for q in numerical_uncertainty(model, BOOKCASE).quantities}
+def judged(model, scene=BOOKCASE):
+    return {q.name: q for q in numerical_uncertainty(model, scene).quantities}
 
 
 @pytest.mark.parametrize("order", [0.52, 0.6, 1.0, 2.0, 2.5])
-def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_step(order):
-    found = judged(Made(lambda h: 1.0 + 0.01 * (h / 1e-3) ** order))
-    for name, error in (("peak_rotation", 0.005), ("theta_rms", 0.005 / math.sqrt(2.0))):
-        assert found[name].verdict == "converged"
-        assert found[name].order == pytest.approx(order, abs=1e-6)
-        assert found[name].u_num == pytest.approx(1.25 * error * (4.0**order - 1.0), rel=0.05)
-        assert found[name].u_num > error
+@pytest.mark.parametrize(
+    ("name", "error"), [("peak_rotation", 0.005), ("theta_rms", 0.005 / math.sqrt(2.0))]
+)
+def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_step(
+    order, name, error
+):
+    found = judged(Made(lambda h: 1.0 + 0.01 * (h / 1e-3) ** order))[name]
+    assert found.verdict == "converged"
+    assert found.order == pytest.approx(order, abs=1e-6)
+    assert found.u_num == pytest.approx(1.25 * error * (4.0**order - 1.0), rel=0.05)
+    assert found.u_num > error
 
 
 @pytest.mark.parametrize(
@@ -62,7 +72,6 @@ def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_
     ids=["an order too low", "no order"],
 )
 def test_what_does_not_converge_gets_the_larger_factor(error):
-    """By the largest change of any history."""
     found = judged(Made(lambda h: 1.0 + error(h / 1e-3)))
     change = max(abs(error(n) - error(1.0)) for n in (2.0, 3.0, 4.0))
     for name in ("peak_rotation", "theta_rms"):
@@ -103,11 +112,14 @@ class Tolerant:
 def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
     """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
     found = numerical_uncertainty(Tolerant(), BOOKCASE)
-    change = 0.5 * 0.99e-2 * np.sin(BOOKCASE.output_times)
     assert found.converged
-    assert found.u_num("theta_rms") == pytest.approx(1.25 * math.sqrt(np.mean(change**2)), rel=1e-9)
-    assert found.u_num("peak_rotation") == pytest.approx(1.25 * np.max(change), rel=1e-9)
-    assert found.u_num("outcome") == 0.0
+    change = 0.5 * 0.99e-2 * np.sin(BOOKCASE.output_times)
+    for name, size in (
+        ("theta_rms", math.sqrt(np.mean(change**2))),
+        ("peak_rotation", np.max(change)),
+        ("outcome", 0.0),
+    ):
+        assert found.u_num(name) == pytest.approx(1.25 * size, rel=1e-9), name
 
 
 @pytest.mark.parametrize(
@@ -122,59 +134,49 @@ def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
 )
 def test_histories_that_part_are_refused(at, converged):
     found = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]))
-    for name in ("theta_rms", "peak_rotation", "last_slip"):
-        assert (found[name].verdict == "converged") == converged
-        assert (found[name].u_num is not None) == converged
-        assert ("the histories part" in found[name].reason) != converged
-    assert found["outcome"].verdict == "converged"
+    assert found.pop("outcome").verdict == "converged"
+    for one in found.values():
+        assert (one.verdict == "converged") == (one.u_num is not None) == converged
+        assert ("the histories part" in one.reason) != converged
 
 
-@dataclass(frozen=True)
-class Slid(Made):
-    """The same, with a slip of up to `slid` alpha R half-way, back at 0 in the end."""
-
-    slid: object = field(default=lambda step: 0.0)
-
-    def simulate(self, scene):
-        history = super().simulate(scene)
-        slip = np.zeros(len(scene.output_times))
-        slip[len(slip) // 2] = self.slid(self.step) * scene.block.alpha * scene.block.radius
-        return replace(history, channels={**history.channels, "slip": slip})
-
-
-def test_a_last_slip_that_all_runs_share_is_as_sure_as_its_history():
-    """And where the histories do not converge, as sure as theta is."""
+@pytest.mark.parametrize(
+    ("factor", "slid", "slip", "rotation"),
+    [
+        (lambda h: 1.0 + h, lambda h: 10.0 * h, 1.25 * 0.03, 1.25 * 0.5 * 0.003),
+        # Where the histories do not converge, as sure as theta is, and theta as the slip.
+        (lambda h: 1.0 + 0.02 * (h == 3e-3), lambda h: 0.0, 3.0 * 0.01, 3.0 * 0.01),
+        (lambda h: 1.0, lambda h: 0.02 * (h == 3e-3), 3.0 * 0.02, 3.0 * 0.02),
+    ],
+    ids=["converges", "theta does not", "slip does not"],
+)
+def test_a_last_slip_that_all_runs_share_is_as_sure_as_its_history(factor, slid, slip, rotation):
     unit = BOOKCASE.block.alpha * BOOKCASE.block.radius
-    found = judged(Slid(lambda h: 1.0 + h, slid=lambda h: 10.0 * h))
+    found = judged(Made(factor, slid=slid))
     assert found["last_slip"].value == 0.0
-    assert found["last_slip"].u_num == pytest.approx(1.25 * 0.03 * unit)
-    assert found["peak_rotation"].u_num == pytest.approx(1.25 * 0.5 * 0.003, rel=0.05)
-    assert found["last_slip"].order == pytest.approx(1.0)
-    found = judged(Slid(lambda h: 1.0 + 0.02 * (h == 3e-3)))
-    assert found["last_slip"].u_num == pytest.approx(3.0 * 0.01 * unit, rel=1e-3)
-    found = judged(Slid(lambda h: 1.0, slid=lambda h: 0.02 * (h == 3e-3)))
-    assert found["peak_rotation"].u_num == pytest.approx(3.0 * 0.02, rel=1e-3)
-    assert found["theta_rms"].u_num == pytest.approx(3.0 * 0.02, rel=1e-3)
+    assert found["last_slip"].u_num == pytest.approx(slip * unit, rel=1e-3)
+    assert found["peak_rotation"].u_num == pytest.approx(rotation, rel=0.05)
+    assert found["last_slip"].order == (pytest.approx(1.0) if slip == 1.25 * 0.03 else None)
 
 
 @pytest.mark.parametrize(("late", "u_num"), [(0, 0.0), (1, 1.25 * 3.0), (-1, 1.25 * 3.0)])
 def test_the_time_of_a_fall_is_that_of_its_changes_and_of_a_row(late, u_num):
-    """It falls so many rows later or sooner with each unit of the step."""
-
-    class Falls(Made):
-        def simulate(self, scene):
-            history = super().simulate(scene)
-            rows = 600 + late * round(self.step / 1e-3)
-            channels = {name: column[:rows] for name, column in history.channels.items()}
-            return replace(history, channels=channels)
-
-    found = judged(Falls(lambda h: 1.0, falls=lambda h: True))
+    found = judged(
+        Made(lambda h: 1.0, falls=lambda h: True, rows=lambda h: 600 + late * round(h / 1e-3))
+    )
     assert set(found) == {"theta_rms", "end_time", "outcome"}
     expected = math.hypot(u_num, 1.0) * BOOKCASE.output_step
     assert found["end_time"].u_num == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure():
+@pytest.mark.parametrize(
+    ("name", "value_of"),
+    [
+        ("last_slip", lambda history: history.channels["slip"][-1]),
+        ("peak_rotation", lambda history: history.peak_rotation / history.block.alpha),
+    ],
+)
+def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure(name, value_of):
     """At h, 2h and 4h the slip ends at the wall's gap, 0.03993 m; at a sixteenth of the step it
     ends at 0.0323 m."""
     scene = Scene(
@@ -185,15 +187,9 @@ def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure():
         excitation=Ricker(amplitude=10.024828601389073, period=0.5975031779950043),
         duration=3.2637445324945724,
     )
-    found = numerical_uncertainty(MuJoCo(time_step=4e-4), scene)
-    truth = MuJoCo(time_step=2.5e-5).simulate(scene)
-    sought = {
-        "last_slip": truth.channels["slip"][-1],
-        "peak_rotation": truth.peak_rotation / scene.block.alpha,
-    }
-    for name, value in sought.items():
-        (quantity,) = (q for q in found.quantities if q.name == name)
-        assert quantity.u_num is None or abs(quantity.value - value) <= quantity.u_num < 0.1
+    found = judged(MuJoCo(time_step=4e-4), scene)[name]
+    truth = value_of(MuJoCo(time_step=2.5e-5).simulate(scene))
+    assert found.u_num is None or abs(found.value - truth) <= found.u_num < 0.1
 
 
 def test_an_outcome_that_changes_with_the_step_is_not_converged():
@@ -213,34 +209,30 @@ def test_the_interval_covers_as_often_as_it_says():
     """Errors a h + b h^1.5 + c h^2 with random signs, and powers with noise: at least 95 % of the
     intervals hold the truth."""
     chance = np.random.default_rng(5)
-    inside = told = 0
+    inside = []
     for k in range(400):
         a, b, c, d = 0.02 * chance.standard_normal(4)
         if k % 2:
             error = {n: a * n + 0.5 * b * n**1.5 + 0.25 * c * n**2 for n in (1, 2, 3, 4)}
         else:
-            order = chance.uniform(0.9, 2.0)
-            noise = chance.standard_normal(4)
+            order, noise = chance.uniform(0.9, 2.0), chance.standard_normal(4)
             error = {n: 0.02 * n**order + 0.1 * d * noise[n - 1] for n in (1, 2, 3, 4)}
-        made = Made(lambda h, e=error: 1.0 + e[round(h / 1e-3)])
-        u = numerical_uncertainty(made, BOOKCASE).u_num("peak_rotation")
-        if u is not None:
-            told += 1
-            inside += abs(0.5 * error[1]) <= u
-    assert told > 300
-    assert inside / told >= 0.95
+        u = judged(Made(lambda h, e=error: 1.0 + e[round(h / 1e-3)]))["peak_rotation"].u_num
+        inside += [] if u is None else [abs(0.5 * error[1]) <= u]
+    assert len(inside) > 300
+    assert np.mean(inside) >= 0.95
 
 
-def test_event_based_and_continuous_models_are_within_their_own_error():
-    scene = BOOKCASE.replace(
-        excitation=Ricker(amplitude=3.0, period=1.0), floor=Floor(friction=0.6), duration=4.0
-    )
+@pytest.mark.parametrize(
+    "model",
+    [EventBasedModel(pivot="unilateral", tolerance=1e-6), ContinuousModel(penetration=1e-7)],
+    ids=["ebm", "cm"],
+)
+def test_event_based_and_continuous_models_are_within_their_own_error(model):
+    pulse = Ricker(amplitude=3.0, period=1.0)
+    scene = BOOKCASE.replace(excitation=pulse, floor=Floor(friction=0.6), duration=4.0)
     truth = EventBasedModel(pivot="unilateral", tolerance=1e-13).simulate(scene)
-    for model in (
-        EventBasedModel(pivot="unilateral", tolerance=1e-6),
-        ContinuousModel(penetration=1e-7),
-    ):
-        found, history = numerical_uncertainty(model, scene), model.simulate(scene)
-        assert found.converged
-        error = abs(history.peak_rotation - truth.peak_rotation) / BOOKCASE.block.alpha
-        assert error <= found.u_num("peak_rotation") + 1e-12
+    found, history = numerical_uncertainty(model, scene), model.simulate(scene)
+    assert found.converged
+    error = abs(history.peak_rotation - truth.peak_rotation) / BOOKCASE.block.alpha
+    assert error <= found.u_num("peak_rotation") + 1e-12

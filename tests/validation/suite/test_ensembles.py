@@ -12,7 +12,6 @@ from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.motions import Distribution
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -51,28 +50,29 @@ overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none f
 
 
 @pytest.fixture
-def suite_file(tmp_path, faulty):
-    path = tmp_path / "mine.toml"
-    path.write_text(SUITE, encoding="utf-8")
-    return path
+def loaded(tmp_path, faulty):
+    def load(text=SUITE):
+        (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+        return load_suite(tmp_path / "mine.toml", allow_code=OWN)
+
+    return load
 
 
-def test_scenes_are_drawn_alike_whatever_the_count(suite_file):
-    ensemble, base = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
+def test_scenes_are_drawn_alike_whatever_the_count(loaded):
+    ensemble, base = loaded().ensembles["crowd"]
     first = [ensemble.drawn(base, n) for n in range(10)]
-    again = [ensemble.model_copy(update={"count": 5}).drawn(base, n) for n in range(5)]
-    assert first[:5] == again
+    fewer, reseeded = (ensemble.model_copy(update=one) for one in ({"count": 5}, {"seed": 8}))
+    assert first[:5] == [fewer.drawn(base, n) for n in range(5)]
+    assert reseeded.drawn(base, 0) != first[0]
     assert len({scene.floor.friction for scene in first}) == 10
     for scene in first:
         assert 0.3 <= scene.floor.friction <= 0.8
         assert scene.walls[0].gap > 0.0
         assert 4.0 <= np.max(np.abs(scene.excitation.samples)) <= 5.0
-    assert ensemble.model_copy(update={"seed": 8}).drawn(base, 0) != first[0]
 
 
-def test_noise_has_the_spectrum_that_it_states(suite_file):
-    ensemble, _ = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
-    noise = ensemble.noise.model_copy(update={"strong": 40.0})
+def test_noise_has_the_spectrum_that_it_states(loaded):
+    noise = loaded().ensembles["crowd"][0].noise.model_copy(update={"strong": 40.0})
     power = sum(
         np.abs(np.fft.rfft(noise.draw(np.random.default_rng(n)).samples)) ** 2 for n in range(40)
     )
@@ -87,13 +87,11 @@ def test_noise_has_the_spectrum_that_it_states(suite_file):
     assert band[1] / band[0] == pytest.approx(stated, rel=0.25)
 
 
-def test_statistics_of_known_samples():
-    chance = np.random.default_rng(3)
-    peaks = np.exp(0.3 * chance.standard_normal(4000) - 1.5)
-    outcomes = np.where(peaks > 0.4, "overturned left", "at rest")
-    same = Samples(Sample(peaks, tuple(outcomes)), Sample(peaks, tuple(outcomes)))
-    perfect = {name: measure.evaluate(same) for name, measure in STATISTICS.items()}
-    assert {name: value[0] for name, value in perfect.items()} == {
+def test_statistics_of_a_sample_against_itself():
+    peaks = np.exp(0.3 * np.random.default_rng(3).standard_normal(4000) - 1.5)
+    sample = Sample(peaks, tuple(np.where(peaks > 0.4, "overturned left", "at rest")))
+    same = Samples(sample, sample)
+    assert {name: measure.evaluate(same)[0] for name, measure in STATISTICS.items()} == {
         "ks_distance": 0.0,
         "area_metric": 0.0,
         "overturning_accuracy": 1.0,
@@ -102,84 +100,69 @@ def test_statistics_of_known_samples():
         "peak_bias": 0.0,
         "peak_scatter": 0.0,
     }
-    falls = Samples(
-        Sample(np.ones(4), ("overturned left", "at rest", "moving", "overturned right")),
-        Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving")),
-    )
-    assert [
-        STATISTICS[f"overturning_{name}"].evaluate(falls)[0]
-        for name in ("accuracy", "precision", "recall")
-    ] == [0.5, 0.5, 0.5]
-    assert STATISTICS["ks_distance"].evaluate(falls)[0] == 0.0
-    lost = Samples(
-        falls.reference,
-        Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving")),
-    )
-    unknown = evaluate(STATISTICS["ks_distance"], lost, "alpha")
+
+
+def test_statistics_of_known_outcomes():
+    reference = Sample(np.ones(4), ("overturned left", "at rest", "moving", "overturned right"))
+    other = Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving"))
+    for name in ("accuracy", "precision", "recall"):
+        assert STATISTICS[f"overturning_{name}"].evaluate(Samples(reference, other))[0] == 0.5
+    assert STATISTICS["ks_distance"].evaluate(Samples(reference, other))[0] == 0.0
+    lost = Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving"))
+    unknown = evaluate(STATISTICS["ks_distance"], Samples(reference, lost), "alpha")
     assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
 
-def test_an_ensemble_is_judged_and_read_back(suite_file, tmp_path):
-    run = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
+def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
+    run = run_suite(loaded(), tmp_path / "out", jobs=0)
     near, broken = run.cell("crowd", "near"), run.cell("crowd", "broken")
     assert [check.verdict for check in near.checks] == ["pass", "pass"]
     assert near.outcome == "0 of 10 overturned"
     assert run.ensembles[0].peaks["near"] == pytest.approx([1e-3 / math.atan2(0.4, 1.5)] * 10)
-    assert broken.status == "failed"
-    assert broken.reason == "10 of 10 scenes failed; the first: more than 10 events"
-    assert run.exit_code == 3
-    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
-    assert [cell.read_back for cell in again.cells] == [True, True, True]
+    reason = "10 of 10 scenes failed; the first: more than 10 events"
+    assert (broken.status, broken.reason, run.exit_code) == ("failed", reason, 3)
+    again = run_suite(loaded(), tmp_path / "out", jobs=0)
     assert again.cells == tuple(cell.model_copy(update={"read_back": True}) for cell in run.cells)
     run.save(tmp_path / "out")
     assert type(run).load(tmp_path / "out") == run
 
 
-def test_a_measured_history_takes_no_part_in_an_ensemble(suite_file):
+def test_a_measured_history_takes_no_part_in_an_ensemble(loaded):
     table = '[models.table]\nmodel = "measured"\nfiles = { shelf = "run1.csv" }\n[require]'
-    suite_file.write_text(SUITE.replace("[require]", table), encoding="utf-8")
-    suite = load_suite(suite_file, allow_code=OWN)
-    assert [work.label for _, work, ensemble in suite.cells() if ensemble] == [
-        "still",
-        "near",
-        "broken",
-    ]
+    cells = loaded(SUITE.replace("[require]", table)).cells()
+    assert [work.label for _, work, ensemble in cells if ensemble] == ["still", "near", "broken"]
 
 
-def test_accept_writes_what_an_ensemble_is_judged_by(suite_file, tmp_path):
-    suite_file.write_text(SUITE.partition("[tolerances")[0], encoding="utf-8")
-    first = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
+def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
+    suite = loaded(SUITE.partition("[tolerances")[0])
+    first = run_suite(suite, tmp_path / "out", jobs=0)
     assert first.cell("crowd", "near").verdict == "fail"
-    changes, refused = accept(load_suite(suite_file, allow_code=OWN), first, None)
+    changes, refused = accept(suite, first, None)
     assert [change.partition(":")[0] for change in changes] == [
         f"[crowd.near.still] {measure}" for measure in ("ks_distance", "overturning_accuracy")
     ]
     assert not refused
-    again = run_suite(load_suite(suite_file, allow_code=OWN), tmp_path / "out", jobs=0)
-    assert [check.verdict for check in again.cell("crowd", "near").checks] == ["pass", "pass"]
-
-
-@pytest.mark.parametrize(
-    "given", [{}, {"uniform": (0.0, 1.0), "lognormal": (1.0, 1.0)}, {"lognormal": (-1.0, 1.0)}]
-)
-def test_a_distribution_is_one_thing(given):
-    with pytest.raises(InputError):
-        Distribution(**given)
+    written = load_suite(tmp_path / "mine.toml", allow_code=OWN)
+    assert run_suite(written, tmp_path / "out", jobs=0).cell("crowd", "near").verdict == "pass"
 
 
 def samples(
     reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()
 ) -> Samples:
     """Peaks of both; in the scenes `fallen` the candidate falls."""
-    safe = ("at rest",) * len(reference)
     ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
-    return Samples(Sample(np.array(reference), safe), Sample(np.array(candidate), ends))
+    safe = Sample(np.array(reference), ("at rest",) * len(reference))
+    return Samples(safe, Sample(np.array(candidate), ends))
 
 
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
         ("[0.3, 0.8]", "[0.8, 0.3]", "friction.uniform: the lower end comes first"),
+        # One kind of distribution, and a positive one.
+        ("{ uniform = [0.3, 0.8] }", "{}", "friction"),
+        ("uniform = [0.3", "lognormal = [1.0, 1.0], uniform = [0.3", "friction"),
+        ("lognormal = [0.05", "lognormal = [-1.0", "gap"),
         ("[0.3, 0.8]", "[-0.3, 0.8]", "friction.uniform: the lower end must be 0 or more"),
         ("lognormal = [0.05", "uniform = [-0.05", "gap.uniform: the lower end must be 0 or more"),
         (
@@ -197,10 +180,9 @@ def samples(
         ),
     ],
 )
-def test_what_no_scene_can_have_is_refused_at_once(suite_file, old, new, said):
-    suite_file.write_text(SUITE.replace(old, new), encoding="utf-8")
+def test_what_no_scene_can_have_is_refused_at_once(loaded, old, new, said):
     with pytest.raises(InputError, match=re.escape(said)):
-        load_suite(suite_file, allow_code=OWN)
+        loaded(SUITE.replace(old, new))
 
 
 def test_the_fallen_are_beyond_all_others():
@@ -231,34 +213,32 @@ def test_bias_and_scatter_by_student_and_chi_squared():
 
 
 def test_only_scenes_in_which_both_rock_have_a_ratio():
-    """A peak of a thousandth and less, and a fall, have none; with fewer than two there is no bias
-    and no scatter."""
+    """A peak of a thousandth and less, and a fall, have none."""
     both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
     assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
-    for name in ("peak_bias", "peak_scatter"):
-        found = evaluate(STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
-        assert found.value is None
-        assert found.note == "fewer than two scenes in which both rock and neither falls"
+
+
+@pytest.mark.parametrize("name", ["peak_bias", "peak_scatter"])
+def test_of_fewer_than_two_ratios_there_is_no_bias_and_no_scatter(name):
+    found = evaluate(STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
+    said = "fewer than two scenes in which both rock and neither falls"
+    assert (found.value, found.note) == (None, said)
 
 
 def test_shares_have_wilsons_interval():
     """Three of four: Wilson (1927) by his formula; where none falls, precision and recall are 1."""
-    value, remark = STATISTICS["overturning_accuracy"].evaluate(
-        samples([0.1] * 4, [0.1] * 4, fallen=(0,))
-    )
+    one_falls = samples([0.1] * 4, [0.1] * 4, fallen=(0,))
     z, p, n = 1.959963984540054, 0.75, 4
-    middle, half = (
-        (p + z * z / (2 * n)) / (1 + z * z / n),
-        z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n)),
-    )
-    assert (value, remark) == (0.75, f"[{middle - half:.3f}, {middle + half:.3f}], 3 of 4")
-    assert STATISTICS["overturning_recall"].evaluate(
-        samples([0.1] * 4, [0.1] * 4, fallen=(0,))
-    ) == (1.0, "none fall")
-    assert (
-        STATISTICS["overturning_precision"].evaluate(samples([0.1] * 4, [0.1] * 4, fallen=(0,)))[0]
-        == 0.0
-    )
+    middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+    half = z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    assert {
+        name: STATISTICS[f"overturning_{name}"].evaluate(one_falls)
+        for name in ("accuracy", "recall")
+    } == {
+        "accuracy": (0.75, f"[{middle - half:.3f}, {middle + half:.3f}], 3 of 4"),
+        "recall": (1.0, "none fall"),
+    }
+    assert STATISTICS["overturning_precision"].evaluate(one_falls)[0] == 0.0
 
 
 def test_a_failed_scene_is_counted():
@@ -275,18 +255,17 @@ def test_what_a_statistic_tells_apart():
     }
 
 
-TIMES, CROWD = 600, 60
 BIAS, SCATTER, AGREE = 0.05, 0.2, 0.9
 
 
 def made_up(chance) -> Samples:
     """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no
     ratio."""
-    peaks = chance.uniform(0.2, 0.8, CROWD)
-    outcomes = np.where(chance.random(CROWD) < 0.3, "overturned left", "at rest")
+    peaks = chance.uniform(0.2, 0.8, 60)
+    outcomes = np.where(chance.random(60) < 0.3, "overturned left", "at rest")
     other = np.where(outcomes == "at rest", "overturned left", "at rest")
-    theirs = np.where(chance.random(CROWD) < AGREE, outcomes, other)
-    ratios = np.exp(BIAS + SCATTER * chance.standard_normal(CROWD))
+    theirs = np.where(chance.random(60) < AGREE, outcomes, other)
+    ratios = np.exp(BIAS + SCATTER * chance.standard_normal(60))
     return Samples(Sample(peaks, list(outcomes)), Sample(peaks * ratios, list(theirs)))
 
 
@@ -296,11 +275,11 @@ def made_up(chance) -> Samples:
 )
 def test_the_interval_in_the_remark_covers(name, truth):
     chance, inside = np.random.default_rng(11), 0
-    for _ in range(TIMES):
+    for _ in range(600):
         _, remark = STATISTICS[name].evaluate(made_up(chance))
         low, high = map(float, re.match(r"\[(-?[\d.e-]+), (-?[\d.e-]+)\]", remark).groups())
         inside += low <= truth <= high
-    assert 0.92 <= inside / TIMES <= 0.98
+    assert 0.92 <= inside / 600 <= 0.98
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.0])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Scene
+from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.store import COMPARISONS, Store
 from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.comparing import Window, by_any, landing_of, under_other_laws
@@ -68,36 +68,18 @@ peak_ratio = { expected = 1.0, limit = 1e-6, drift = 1e-6, why = "the nearer of 
 @pytest.fixture(scope="module")
 def suite_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The suite, with a pulse that is a node of the paper's Fig. 6 of which the law decides."""
-    block = Scene(
-        name="a",
-        **{
-            "block": {"half_width": 0.397, "half_height": 1.555},
-            "floor": {"friction": 0.3},
-            "duration": 1.0,
-        },
-    )
-    ratio = np.linspace(0.5, 8.0, 100)[73]
-    period, amplitude = (
-        2.0 * np.pi / (ratio * block.frequency_parameter),
-        6.0 * 9.81 * 0.397 / 1.555,
-    )
+    p = PAPER_BLOCK.weaker_pivot.frequency_parameter(9.81)
+    period = 2.0 * np.pi / (np.linspace(0.5, 8.0, 100)[73] * p)
+    amplitude = 6.0 * 9.81 * 0.397 / 1.555
+    text = SUITE.replace("AMPLITUDE", repr(amplitude)).replace("PERIOD", repr(float(period)))
     path = tmp_path_factory.mktemp("suite") / "laws.toml"
-    path.write_text(
-        SUITE.replace("AMPLITUDE", repr(float(amplitude))).replace("PERIOD", repr(float(period))),
-        encoding="utf-8",
-    )
+    path.write_text(text, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
 def run(suite_file: Path) -> Run:
     return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
-
-
-def test_what_is_read_back_is_in_the_same_order(run: Run, suite_file: Path) -> None:
-    again = run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
-    assert again.up_to_date == len(again.cells)
-    assert [cell.figures for cell in again.cells] == [cell.figures for cell in run.cells]
 
 
 @pytest.mark.parametrize(
@@ -112,6 +94,8 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run: Run, scene, laws) 
     found = [cell.impact_law for cell in run.of_scene(scene) if cell.impact_law]
     assert tuple(law.law for law in found) == laws
     assert len({law.t for law in found}) <= 1
+    notes = [figure.note for cell in run.of_scene(scene) for figure in cell.figures]
+    assert any("impacts = " in note for note in notes) == bool(laws)
 
 
 @pytest.mark.parametrize(
@@ -127,41 +111,31 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run: Run, scene, law, 
     reference, cell = run.cell(scene, "ebm-unilateral"), run.cell(scene, law)
     assert reference.outcome != cell.outcome
     assert outcomes in (None, (reference.outcome, cell.outcome))
-    assert {check.figure.measure: check.verdict for check in cell.checks} == dict.fromkeys(
-        ("outcome_agrees", "peak_ratio", "theta_rms"), "pass"
-    )
+    assert {check.verdict for check in cell.checks} == {"pass"}
     figures = {check.figure.measure: check.figure for check in cell.checks}
     horizon = figures.pop("theta_rms")
     assert "impacts = " not in horizon.note
     assert abs(horizon.until - cell.impact_law.t) < near
+    assert list(figures) == ["outcome_agrees", "peak_ratio"]
     for figure in figures.values():
-        assert figure.until is None
-        assert figure.note.endswith(f'impacts = "{law}"')
+        assert (figure.until, figure.note.endswith(f'impacts = "{law}"')) == (None, True)
 
 
-def test_where_no_landing_tells_one_law_judges(run: Run) -> None:
-    for cell in run.of_scene("plastic"):
-        assert all("impacts = " not in figure.note for figure in cell.figures)
-
-
-def test_the_summary_names_the_laws_and_nothing_depends_on_them(run: Run, tmp_path: Path) -> None:
-    table = markdown(run).split("not judged")[1]
-    assert "of the law" in table
-    assert "open | floor-first | open | closed" in " ".join(table.split())
-    assert "plastic" not in table
+def test_the_summary_names_the_laws_and_nothing_depends_on_them(
+    run: Run, suite_file: Path, tmp_path: Path
+) -> None:
+    assert "not judged" in markdown(run)
     laws = {(one["scene"], one["model"]): one["impact_law"] for one in summary(run)["cells"]}
-    assert laws["of the law", "mujoco"] == "closed"
-    assert laws["plastic", "mujoco"] is None
+    assert (laws["of the law", "mujoco"], laws["plastic", "mujoco"]) == ("closed", None)
+    silent = [cell.model_copy(update={"impact_law": None}) for cell in run.cells]
+    untold = run.model_copy(update={"cells": tuple(silent)})
+    assert "not judged" not in markdown(untold)
+    assert untold.verdict == run.verdict
     run.save(tmp_path)
-    assert (
-        Run.load(tmp_path).cell("of the law", "mujoco").impact_law
-        == run.cell("of the law", "mujoco").impact_law
-    )
-    silent = run.model_copy(
-        update={"cells": tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)}
-    )
-    assert "not judged" not in markdown(silent)
-    assert silent.verdict == run.verdict
+    assert Run.load(tmp_path) == run
+    again = run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
+    assert again.up_to_date == len(again.cells)
+    assert [cell.figures for cell in again.cells] == [cell.figures for cell in run.cells]
 
 
 def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
@@ -177,17 +151,19 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(
     assert landing_of(store, scene) == first
 
 
-def test_only_a_reference_with_a_law_to_choose_has_another(suite_file: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "others"),
+    [
+        ("ebm-unilateral", ["floor-first", "leading-first", "trailing-first"]),
+        ("floor-first", ["moreau", "leading-first", "trailing-first"]),
+        ("mujoco", []),
+        ("ebm", []),
+    ],
+)
+def test_only_a_reference_with_a_law_to_choose_has_another(suite_file, name, others) -> None:
     suite = load_suite(suite_file)
-    scene = suite.scenes["of the law"]
-    flat = ["leading-first", "trailing-first"]
-    for name, laws in {
-        "ebm-unilateral": ["floor-first", *flat],
-        "floor-first": ["moreau", *flat],
-        "mujoco": [],
-    }.items():
-        assert list(under_other_laws(scene, suite.models[name])) == laws
-    assert under_other_laws(scene, Work(label="paper", family="ebm", settings={})) == {}
+    model = suite.models.get(name, Work(label="paper", family="ebm", settings={}))
+    assert list(under_other_laws(suite.scenes["of the law"], model)) == others
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> None:
@@ -198,5 +174,4 @@ def test_the_reference_itself_counts_where_it_is_nearer(suite_file: Path) -> Non
     )
     whole = Window("", None, ["outcome_agrees", "peak_ratio"])
     found = by_any(one, one, {"floor-first": other}, scene, whole)
-    assert [figure.value for figure, *_ in found] == [1.0, 1.0]
-    assert [gap for _, gap, _ in found] == ["", ""]
+    assert [(figure.value, gap) for figure, gap, _ in found] == [(1.0, ""), (1.0, "")]

@@ -1,7 +1,5 @@
 """Suite files: combinations of scenes, variants of models, and faults told in one line."""
 
-from pathlib import Path
-
 import pytest
 
 from rockcheck.scenes import InputError
@@ -20,12 +18,17 @@ def suite(tmp_path, text):
     return load_suite(path)
 
 
-def test_scenes_by_name_by_table_and_by_file(tmp_path):
+def test_scenes_by_name_by_table_and_by_file_and_models_by_labels_of_their_own(tmp_path):
     (tmp_path / "own.toml").write_text(
         SHELF.replace("[[scene]]\n", "").replace("shelf", "own"), encoding="utf-8"
     )
-    found = suite(tmp_path, 'scenes = ["fig4a", "own.toml"]\n' + MODELS + SHELF)
-    assert list(found.scenes) == ["fig4a", "own", "shelf"]
+    models = MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n'
+    found = suite(tmp_path, 'scenes = ["fig4a", "own.toml"]\n' + models + SHELF)
+    assert [(scene.name, variant.label, variant.family) for scene, variant, _ in found.cells()] == [
+        (name, *model)
+        for name in ("fig4a", "own", "shelf")
+        for model in (("ebm", "ebm"), ("coarse", "mujoco"))
+    ]
     assert found.scenes["shelf"].block.half_width == 0.1
 
 
@@ -64,19 +67,6 @@ walls = [{ restitution = 0.5 }]
     ) == ("right", 0.1, 0.5, 0.9)
 
 
-def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
-    found = suite(
-        tmp_path,
-        SHELF.replace(
-            "[[scene]]", MODELS + '[models.coarse]\nmodel = "mujoco"\ntime_step = 1e-3\n[[scene]]'
-        ),
-    )
-    assert [(scene.name, variant.label, variant.family) for scene, variant, _ in found.cells()] == [
-        ("shelf", "ebm", "ebm"),
-        ("shelf", "coarse", "mujoco"),
-    ]
-
-
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
@@ -103,6 +93,10 @@ def test_variants_of_a_model_have_labels_of_their_own(tmp_path):
         ("reference = [\n", "not valid TOML"),
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),
+        (
+            MODELS + SHELF + "[tolerances.shelf.ebm.figures]\nhighest_hop = { limit = -1 }\n",
+            "highest_hop",
+        ),
     ],
 )
 def test_faults_are_one_line_with_the_file(tmp_path, text, fault):
@@ -111,17 +105,3 @@ def test_faults_are_one_line_with_the_file(tmp_path, text, fault):
     message = str(caught.value)
     assert "\n" not in message
     assert message.count("mine.toml") == 1 or "gone.toml" in message
-
-
-def test_an_unknown_suite_suggests_the_nearest():
-    with pytest.raises(InputError, match="did you mean 'paper'"):
-        load_suite("papre")
-
-
-def test_the_file_is_named_once(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    text = MODELS + SHELF + "[tolerances.shelf.ebm.figures]\nhighest_hop = { limit = -1 }\n"
-    Path("mine.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as told:
-        load_suite("mine.toml")
-    assert str(told.value).count("mine.toml") == 1

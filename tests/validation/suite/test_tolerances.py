@@ -9,39 +9,31 @@ import pytest
 
 from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.results import Cell, Run
 from rockcheck.validation.suite.suites import load_suite, named_suites
-from rockcheck.validation.suite.tolerances import (
-    Tolerance,
-    Windowed,
-    judge,
-    parse_tolerances,
-)
+from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, judge, parse_tolerances
 
 LINE = Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 
 
-def figure(value, measure="theta_rms", **more):
-    return Figure(measure=measure, label=measure, unit="alpha", value=value, **more)
+def check(value, line=LINE, measure="theta_rms", note="", **more):
+    """A figure of scene s and model m against r, judged by the line."""
+    figure = Figure(
+        measure=measure, label=measure, unit="alpha", value=value, against="r", note=note
+    )
+    return judge(figure, line, kind="numerical", measure=MEASURES[measure], **more)
 
 
-def verdict(value, line=LINE, measure="theta_rms", **more):
-    known = DIFFERENCES.get(measure) or FIGURES[measure]
-    return judge(figure(value, measure), line, kind="numerical", measure=known, **more).verdict
-
-
+@pytest.mark.parametrize("measure", ["theta_rms", "events_agree_until", "peak_rotation"])
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf])
-def test_what_is_not_a_number_fails(value):
-    assert verdict(value) == "fail"
-    assert verdict(value, measure="events_agree_until") == "fail"
-    assert verdict(value, measure="peak_rotation") == "fail"
+def test_what_is_not_a_number_fails(value, measure):
+    assert check(value, LINE, measure).verdict == "fail"
 
 
 def test_no_tolerance_and_a_gap_fail():
-    assert verdict(0.0, line=None) == "fail"
-    assert verdict(1.0e-3, gap="mujoco ends at 3 s") == "fail"
+    assert check(0.0, line=None).verdict == "fail"
+    assert check(1.0e-3, gap="mujoco ends at 3 s").verdict == "fail"
 
 
 @pytest.mark.parametrize(
@@ -57,118 +49,130 @@ def test_no_tolerance_and_a_gap_fail():
         ("[a.b.c]\npeak_rotation = {limit = 1.0, expected = 1.0}", "figures"),
         ("[a.b.figures]\npeak_rotation = {limit = 1.0}", "expected: is missing"),
         ("a = 1", "tables"),
+        # What another measure has for every scene completes no line.
+        (
+            '["*".b.c]\ntheta_rms = {why = "so"}\n[a.b.c]\nx_rms = {expected = 0.1, limit = 1.0}',
+            "theta_rms: limit: is missing",
+        ),
     ],
 )
 def test_faults_in_a_file_are_named(text, fault):
     with pytest.raises(InputError, match=fault) as caught:
-        parse_tolerances(tomllib.loads(text))
+        parse_tolerances(tomllib.loads(text), [("a", "b")])
     assert "\n" not in str(caught.value)
-
-
-def made_run(*checks):
-    cell = Cell(scene="s", model="m", status="done", checks=checks)
-    return Run(
-        suite="mine", created="", reference="r", scenes={"s": {}}, models=("r", "m"), cells=(cell,)
-    )
-
-
-def check(value, line=LINE, measure="theta_rms"):
-    return judge(
-        figure(value, measure, against="r"), line, kind="numerical", measure=DIFFERENCES[measure]
-    )
-
-
-def accepted(path: Path, run: Run, reason: str | None = None):
-    part = SimpleNamespace(
-        path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
-    )
-    return accept(SimpleNamespace(parts=[part]), run, reason)
 
 
 FILE = (
     "# by hand\n\n[s.m.r]\n# the main one\n"
     'theta_rms = { expected = 0.001, limit = 0.002, drift = 0.0001, why = "a test" }\n'
 )
+NOT_DEFINED = check(None, None, "peak_ratio", "not defined here: the reference does not rotate")
 
 
 @pytest.fixture
-def tolerance_file(tmp_path):
-    path = tmp_path / "mine.tolerances.toml"
-    path.write_text(FILE, encoding="utf-8")
-    return path
+def accepted(tmp_path):
+    """What `accept` says that it has changed and refused, and the file that had a text before it
+    and has another after it."""
+
+    def accept_of(text, *checks, reason=None):
+        path = tmp_path / "mine.tolerances.toml"
+        path.write_text(text, encoding="utf-8")
+        about = {"suite": "mine", "created": "", "reference": "r", "models": ("r", "m")}
+        cell = Cell(scene="s", model="m", status="done", checks=checks)
+        run = Run(**about, scenes={"s": {}}, cells=(cell,))
+        part = SimpleNamespace(
+            path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
+        )
+        changes, refused = accept(SimpleNamespace(parts=[part]), run, reason)
+        return changes, refused, path.read_text(encoding="utf-8")
+
+    return accept_of
 
 
-def test_accept_leaves_what_passes(tolerance_file):
-    assert accepted(tolerance_file, made_run(check(1.05e-3))) == ([], [])
-    assert tolerance_file.read_text() == FILE
+def line_of(expected, limit, drift, why="a test"):
+    return {"expected": expected, "limit": limit, "drift": drift, "why": why}
 
 
-def test_accept_moves_the_expected_figure_only_with_a_reason_and_keeps_the_limit(tolerance_file):
-    changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)))
-    assert changes == []
-    assert "--reason" in refused[0]
-    assert tolerance_file.read_text() == FILE
-    changes, refused = accepted(tolerance_file, made_run(check(1.5e-3)), "another step")
+FAR = Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
+
+
+@pytest.mark.parametrize(
+    ("one", "reason", "change", "line"),
+    [
+        (
+            check(1.5e-3),
+            "another step",
+            "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> "
+            "expected 0.0015, limit 0.002, drift 0.0001",
+            line_of(1.5e-3, 2e-3, 1e-4, "another step"),
+        ),
+        (check(1e-3, FAR), None, ": tightened: ", line_of(1e-3, 2e-3, 2e-4)),
+        (check(0.15, FAR), "why not", ": moved: ", line_of(0.15, 0.2, 0.01, "why not")),
+        (check(0.5, FAR), "so", ": loosened: ", line_of(0.5, 1.0, 0.01, "so")),
+        # A quantity that has come to that of the reference.
+        (check(0.5, FAR, "last_x", beside=0.5), None, ": tightened: ", line_of(0.5, 0.2, 0.01)),
+        (
+            check(1.23456789e-3, None, "x_rms"),
+            None,
+            ": new: ",
+            line_of(0.0012345679, 2.5e-3, 2.5e-4, "first accepted figure"),
+        ),
+        (
+            check(0.99, None, "peak_ratio"),
+            None,
+            ": new: ",
+            line_of(0.99, 0.02, 2e-3, "first accepted figure"),
+        ),
+    ],
+)
+def test_accept_names_each_change_and_leaves_the_rest_of_the_file(
+    accepted, one, reason, change, line
+):
+    (said,), refused, text = accepted(FILE, one, NOT_DEFINED, reason=reason)
+    assert change in said
     assert refused == []
-    assert changes == [
-        "[s.m.r] theta_rms: moved: expected 0.001, limit 0.002, drift 0.0001 -> expected 0.0015,"
-        " limit 0.002, drift 0.0001"
-    ]
-    text = tolerance_file.read_text()
-    assert text.startswith("# by hand\n\n[s.m.r]\n# the main one\n")
-    assert tomllib.loads(text)["s"]["m"]["r"]["theta_rms"] == {
-        "expected": 0.0015,
-        "limit": 0.002,
-        "drift": 0.0001,
-        "why": "another step",
-    }
+    lines = tomllib.loads(FILE)["s"]["m"]["r"] | {one.figure.measure: line}
+    assert tomllib.loads(text) == {"s": {"m": {"r": lines}}}
+    assert text.startswith(FILE.partition("theta_rms")[0])
 
 
-def test_accept_refuses_what_is_not_a_figure(tolerance_file):
-    changes, refused = accepted(tolerance_file, made_run(check(math.nan)), "because")
-    assert (changes, len(refused)) == ([], 1)
-    gap = judge(
-        figure(1e-3, against="r"),
-        LINE,
-        kind="numerical",
-        measure=DIFFERENCES["theta_rms"],
-        gap="m ends at 3 s",
+@pytest.mark.parametrize(
+    ("one", "reason", "refusals"),
+    [
+        (check(1.05e-3), None, []),  # it passes
+        (check(1.5e-3), None, ["needs --reason"]),
+        (check(0.5, FAR), None, ["needs --reason"]),
+        (check(math.nan), "because", ["theta_rms: "]),
+        (check(1e-3, gap="m ends at 3 s"), "because", ["[s.m.r] theta_rms: m ends at 3 s"]),
+    ],
+)
+def test_accept_leaves_what_passes_and_refuses_what_it_may_not_write(
+    accepted, one, reason, refusals
+):
+    changes, refused, text = accepted(FILE, one, reason=reason)
+    assert (changes, text) == ([], FILE)
+    assert [said in line for said, line in zip(refusals, refused, strict=True)] == [True] * len(
+        refusals
     )
-    assert accepted(tolerance_file, made_run(gap), "because")[1] == [
-        "[s.m.r] theta_rms: m ends at 3 s"
-    ]
-    assert tolerance_file.read_text() == FILE
 
 
-def test_accept_writes_a_line_that_was_missing(tmp_path):
-    path = tmp_path / "new.toml"
-    accepted(path, made_run(check(1.23456789e-3, None), check(0.99, None, "peak_ratio")))
-    lines = parse_tolerances(tomllib.loads(path.read_text()))
-    assert {str(place.what): (line.expected, line.limit) for place, line in lines.items()} == {
-        "theta_rms": (0.0012345679, 0.0025),
-        "peak_ratio": (0.99, 0.02),
-    }
+@pytest.mark.parametrize(
+    ("measure", "value"),
+    [*(("theta_rms", value) for value in (0.0, 1e-12, 3.3e-7, 0.123, 17.0)), ("peak_ratio", 0.99)],
+)
+def test_a_new_line_holds_what_it_was_made_from(accepted, measure, value):
+    _, _, text = accepted("", check(value, None, measure))
+    (line,) = parse_tolerances(tomllib.loads(text)).values()
+    assert check(value, line, measure).verdict == "pass"
 
 
-def test_a_new_line_holds_what_it_was_made_from(tmp_path):
-    numbers = [("theta_rms", value) for value in (0.0, 1e-12, 3.3e-7, 0.123, 17.0)]
-    for number, (measure, value) in enumerate([*numbers, ("peak_ratio", 0.99)]):
-        path = tmp_path / f"{number}.toml"
-        accepted(path, made_run(check(value, None, measure)))
-        (line,) = parse_tolerances(tomllib.loads(path.read_text())).values()
-        assert verdict(value, line, measure) == "pass"
-
-
-def test_shipped_suites_load_and_their_tolerances_have_cells():
-    for name in named_suites():
-        suite = load_suite(name)
-        cells = {((of or scene).name, variant.label) for scene, variant, of in suite.cells()}
-        assert cells, name
-        for place, line in suite.tolerances.items():
-            assert (place.scene, place.model) in cells, str(place)
-            assert line.why, str(place)
-            assert line.expected is not None, str(place)
-            assert line.drift is not None, str(place)
+@pytest.mark.parametrize("name", named_suites())
+def test_a_shipped_suite_loads_and_its_tolerances_are_whole_and_have_cells(name):
+    suite = load_suite(name)
+    cells = {((of or scene).name, variant.label) for scene, variant, of in suite.cells()}
+    assert cells >= {(place.scene, place.model) for place in suite.tolerances}
+    for place, line in suite.tolerances.items():
+        assert None not in (line.expected, line.drift, line.why or None), str(place)
 
 
 EVERYWHERE = """
@@ -203,32 +207,16 @@ def test_a_line_for_every_scene():
     }, "without a cell it is told as a fault"
 
 
-def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(tmp_path):
-    path = tmp_path / "mine.tolerances.toml"
-    path.write_text(EVERYWHERE.replace("[a.m.r]", "[s.m.r]"), encoding="utf-8")
-    lines = {
-        str(place.what): line
-        for place, line in parse_tolerances(tomllib.loads(path.read_text()), [("s", "m")]).items()
-        if place.scene == "s"
-    }
-    same = made_run(
-        check(1.0e-3, lines["theta_rms"]), check(1.0, lines["outcome_agrees"], "outcome_agrees")
+def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(accepted):
+    text = EVERYWHERE.replace("[a.m.r]", "[s.m.r]")
+    (outcome,) = (
+        line
+        for place, line in parse_tolerances(tomllib.loads(text), [("s", "m")]).items()
+        if (place.scene, str(place.what)) == ("s", "outcome_agrees")
     )
-    assert accepted(path, same) == ([], [])
-    changes, refused = accepted(
-        path, made_run(check(0.0, lines["outcome_agrees"], "outcome_agrees")), "one falls now"
-    )
-    assert (len(changes), refused) == (1, [])
-    written = tomllib.loads(path.read_text())
-    assert written["s"]["m"]["r"]["outcome_agrees"] == {
-        "expected": 0.0,
-        "limit": 1.0,
-        "drift": 0.0,
-        "why": "one falls now",
-    }
+    same = check(1.0, outcome, "outcome_agrees")
+    assert accepted(text, same) == ([], [], text)
+    other = check(0.0, outcome, "outcome_agrees")
+    written = tomllib.loads(accepted(text, other, reason="one falls now")[2])
+    assert written["s"]["m"]["r"]["outcome_agrees"] == line_of(0.0, 1.0, 0.0, "one falls now")
     assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
-
-
-def test_windows():
-    assert str(Windowed.parse("theta_rms@8s")) == "theta_rms@8s"
-    assert Windowed.parse("theta_rms@1.5s") == Windowed("theta_rms", "1.5s")

@@ -5,28 +5,34 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
 from rockcheck.validation.suite.tables import (
-    MARKS,
     MOST_SHOWN,
     junit,
     markdown,
     shown,
     verdict_table,
 )
-from rockcheck.validation.suite.tolerances import Tolerance, judge, parse_tolerances
+from rockcheck.validation.suite.tolerances import Tolerance, judge
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
 
 
-def check(value: float | None, measure: str = "theta_rms", line: Tolerance = LINE) -> Check:
-    figure = Figure(measure=measure, label=measure, unit="alpha", value=value, against="r")
-    return judge(figure, line, kind="numerical", measure=DIFFERENCES[measure])
+def check(
+    value: float | None,
+    measure: str = "theta_rms",
+    line: Tolerance = LINE,
+    *,
+    kind: str = "numerical",
+    **more: str,
+) -> Check:
+    about = {"label": measure, "unit": "alpha", "against": "r", **more}
+    figure = Figure(measure=measure, value=value, **about)
+    return judge(figure, line, kind=kind, measure=DIFFERENCES[measure])
 
 
 def run_of(*cells: Cell, **more: object) -> Run:
@@ -42,21 +48,17 @@ def run_of(*cells: Cell, **more: object) -> Run:
     )
 
 
-def cell(scene: str, model: str, *checks: Check, reason: str = "") -> Cell:
-    return Cell(
-        scene=scene,
-        model=model,
-        status="failed" if reason else "done",
-        reason=reason,
-        checks=checks,
-    )
+def cell(scene: str, model: str, *checks: Check, reason: str = "", **more: object) -> Cell:
+    status = "failed" if reason else "done"
+    return Cell(scene=scene, model=model, status=status, reason=reason, checks=checks, **more)
 
 
+BROKEN = cell("a", "n", reason="more than 10 events")
 MIXED = (
     cell(
         "a", "m", check(0.25), check(0.4, "theta_peak"), check(0.75, "x_rms")
     ),  # passes, has changed, fails
-    cell("a", "n", reason="more than 10 events"),
+    BROKEN,
     cell("b", "m", check(0.4), check(0.9, "theta_peak")),
 )
 
@@ -92,61 +94,42 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
     assert error.get("message") == "more than 10 events"
 
 
-def test_a_cell_that_was_read_back_took_no_time():
-    ran = cell("a", "m", check(0.25)).model_copy(update={"cost": CostRecord(worker_seconds=7.5)})
-    for read_back, seconds in ((False, 7.5), (True, 0.0)):
-        root = ET.fromstring(junit(run_of(ran.model_copy(update={"read_back": read_back}))))
-        assert float(root.find("testsuite").get("time")) == seconds
+@pytest.mark.parametrize(("read_back", "seconds"), [(False, 7.5), (True, 0.0)])
+def test_a_cell_that_was_read_back_took_no_time(read_back, seconds):
+    ran = cell("a", "m", cost=CostRecord(worker_seconds=7.5), read_back=read_back)
+    assert float(ET.fromstring(junit(run_of(ran))).find("testsuite").get("time")) == seconds
 
 
-def test_a_cell_that_has_not_converged_is_skipped_with_its_reason():
+SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
+
+
+@pytest.mark.parametrize(
+    ("quantities", "marks"),
+    [
+        (None, []),
+        ([SURE], [[]]),
+        (
+            [SURE, SURE.model_copy(update={"verdict": "not converged", "reason": "it changes"})],
+            [[("skipped", "it changes")]],
+        ),
+    ],
+)
+def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, marks):
     """A case of its own, beside the run's: green where the run has converged, none where nothing
     was asked for."""
-
-    def found(*quantities: Quantity) -> Cell:
-        numerical = Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
-        return cell("a", "m", check(0.25)).model_copy(update={"numerical": numerical})
-
-    sure = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
-    unsure = Quantity(
-        name="outcome",
-        unit="",
-        value="right",
-        verdict="not converged",
-        reason="the outcome changes: right, right, stands",
-    )
-    cases = {}
-    for name, one in {
-        "asked": found(sure),
-        "unsure": found(sure, unsure),
-        "unasked": cell("a", "m", check(0.25)),
-    }.items():
-        root = ET.fromstring(junit(run_of(one)))
-        cases[name] = [case for case in root.iter("testcase") if case.get("name") == "converged"]
-        assert totals(root) == {"tests": 2 + len(cases[name]), "failures": 0, "errors": 0}
-    assert cases["unasked"] == []
-    assert [len(case) for case in cases["asked"]] == [0]
-    (skipped,) = cases["unsure"][0]
-    assert (skipped.tag, skipped.get("message")) == ("skipped", unsure.reason)
+    numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
+    root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
+    cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
+    assert [[(one.tag, one.get("message")) for one in case] for case in cases] == marks
+    assert totals(root) == {"tests": 2 + len(cases), "failures": 0, "errors": 0}
 
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
     """One row a scene with such a landing, one column a model that followed a law in any scene;
     others have none."""
-
-    def followed(scene: str, model: str, law: str) -> Cell:
-        return cell(scene, model).model_copy(
-            update={"impact_law": LawFollowed(t=1.25, law=law, errors={}, spread=0.1)}
-        )
-
-    cells = (
-        followed("a", "m", "closed"),
-        cell("a", "n"),
-        cell("a", "o"),
-        followed("b", "n", "open"),
-        cell("b", "m"),
-        cell("c", "m"),
-    )
+    laws = {"am": "closed", "an": "", "ao": "", "bn": "open", "bm": "", "cm": ""}
+    met = {law: LawFollowed(t=1.25, law=law, errors={}, spread=0.1) for law in ("closed", "open")}
+    cells = (cell(*names, impact_law=met.get(law)) for names, law in laws.items())
     table = markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
     rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
     assert [rows[0], *rows[2:]] == [
@@ -156,28 +139,11 @@ def test_the_table_of_laws_has_the_models_that_met_a_landing():
     ]
 
 
-def test_the_summary_of_a_run_that_nothing_judges_tells_the_outcomes():
-    """And of a cell without a history that it failed, not an outcome."""
-    fell = cell("a", "m").model_copy(update={"outcome": "overturned left", "overturned_at": 3.21})
-    row = markdown(
-        run_of(fell, cell("a", "n", reason="more than 10 events"), judged=False)
-    ).splitlines()[-1]
-    assert [entry.strip() for entry in row.strip("|").split("|")] == [
-        "a",
-        "",
-        "overturned left at 3.21 s",
-        MARKS["error"],
-    ]
-
-
 def test_the_summary_names_what_is_not_a_pass():
     text = markdown(run_of(*MIXED))
     assert "## 💥 rockcheck mine: error" in text
     assert "3 simulations, 0 up to date, 5 checks" in text
     assert "theta_peak against r: 0.9 is more than 0.5" in text
-    assert [line for line in text.splitlines() if line.startswith("| a |")] == [
-        "| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"
-    ]
 
 
 def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
@@ -186,22 +152,15 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     near = [cell(f"near {n}", "m", check(0.4)) for n in range(MOST_SHOWN - 1)]
     far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
     drawn = EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
-    run = run_of(
-        *far[:10],
-        cell("drawn", "m", check(0.1)),
-        *near,
-        *far[10:],
-        cell("out", "m", check(0.75)),
-        ensembles=(drawn,),
-    )
-    assert shown(run) == ("drawn", *(one.scene for one in near), "out")
+    worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", check(0.75)))
+    run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
+    assert shown(run) == tuple(one.scene for one in worst)
+    assert shown(run_of(*near)) == tuple(one.scene for one in near)
     assert len(verdict_table(run).rows) == MOST_SHOWN + 1
     text = markdown(run)
-    assert "| out |" in text
-    assert "| far 3 |" not in text
+    assert ("| out |" in text, "| far 3 |" in text) == (True, False)
     assert "|\n\nand 30 more scenes" in text  # not a row of the table
     assert len(ET.fromstring(junit(run)).findall("testsuite")) == len(run.cells)
-    assert shown(run_of(*near)) == tuple(one.scene for one in near)
 
 
 def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
@@ -210,98 +169,106 @@ def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
     assert "- and 7 more, in junit.xml" in text
 
 
-def test_what_waits_for_its_tolerance_has_not_failed():
-    """Nor has what no tolerance is written for: unless nothing was computed, part of the window is
-    missing, or something else failed."""
-    waits = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
-    gone = waits.model_copy(update={"figure": waits.figure.model_copy(update={"value": None})})
-    assert [one.words for one in (waits, waits.model_copy(update={"gap": "ends early"}), gone)] == [
-        "no tolerance yet",
-        "fail",
-        "fail",
-    ]
-    for cells, faults, expected in (
-        ((cell("a", "m", waits),), (), "no tolerance yet"),
-        ((cell("a", "m", waits),), ("a tolerance without its cell",), "fail"),
-        ((cell("a", "m", waits), cell("b", "m", check(0.75))), (), "fail"),
-        ((cell("a", "m", waits), cell("b", "m", reason="no motion")), (), "error"),
-    ):
-        assert run_of(*cells, faults=faults).words == expected
+WAITS = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
 
 
-def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code():
+@pytest.mark.parametrize(
+    ("one", "words"),
+    [
+        (WAITS, "no tolerance yet"),
+        (WAITS.model_copy(update={"gap": "early"}), "fail"),
+        (WAITS.model_copy(update={"figure": check(None).figure}), "fail"),
+    ],
+)
+def test_what_waits_for_its_tolerance_has_not_failed_unless_a_part_is_missing(one, words):
+    assert one.words == words
+
+
+@pytest.mark.parametrize(
+    ("cells", "faults", "words"),
+    [
+        ([cell("a", "m", WAITS)], (), "no tolerance yet"),
+        ([cell("a", "m", WAITS)], ("a tolerance without its cell",), "fail"),
+        ([cell("a", "m", WAITS), cell("b", "m", check(0.75))], (), "fail"),
+        ([cell("a", "m", WAITS), BROKEN], (), "error"),
+    ],
+)
+def test_nor_has_a_run_that_waits_unless_something_else_failed(cells, faults, words):
+    assert run_of(*cells, faults=faults).words == words
+
+
+ABSENT = Cell(scene="a", model="n", status="absent", reason="needs it")
+PASSES, CHANGES, FAILS = (cell("a", "m", check(value)) for value in (0.25, 0.4, 0.75))
+
+
+@pytest.mark.parametrize(
+    ("cells", "more", "verdict", "code", "strict"),
+    [
+        ([PASSES], {}, "pass", 0, 0),
+        ([PASSES, ABSENT], {}, "incomplete", 0, 1),
+        ([PASSES, ABSENT, CHANGES], {}, "changed", 0, 1),
+        ([CHANGES, FAILS], {}, "fail", 1, 1),
+        ([FAILS, BROKEN], {}, "error", 3, 3),
+        ([PASSES, cell("a", "o", reason="a fault", unexpected=True)], {}, "error", 70, 70),
+        ([PASSES], {"faults": ("no such cell",)}, "fail", 1, 1),
+        ([cell("a", "m")], {}, "fail", 1, 1),
+        ([cell("a", "m")], {"judged": False}, "pass", 0, 0),
+    ],
+)
+def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
+    cells, more, verdict, code, strict
+):
     """A model that is not installed, a figure that has changed, a tolerance without its cell,
     nothing to judge by, a fault inside."""
-    absent = Cell(scene="a", model="n", status="absent", reason="needs it")
-    passes, changed, failed = (cell("a", "m", check(value)) for value in (0.25, 0.4, 0.75))
-    strange = Cell(scene="a", model="o", status="failed", reason="a fault", unexpected=True)
-    for cells, more, verdict, code, strict in (
-        ((passes,), {}, "pass", 0, 0),
-        ((passes, absent), {}, "incomplete", 0, 1),
-        ((passes, absent, changed), {}, "changed", 0, 1),
-        ((changed, failed), {}, "fail", 1, 1),
-        ((failed, cell("b", "m", reason="no motion")), {}, "error", 3, 3),
-        ((passes, strange), {}, "error", 70, 70),
-        ((passes,), {"faults": ("no such cell",)}, "fail", 1, 1),
-        ((cell("a", "m"),), {}, "fail", 1, 1),
-        ((cell("a", "m"),), {"judged": False}, "pass", 0, 0),
-    ):
-        runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
-        assert [run.verdict for run in runs] == [verdict, verdict]
-        assert [run.exit_code for run in runs] == [code, strict]
-    assert run_of(cell("a", "m"), judged=False).words == "not judged"
-    assert not any(value for name, value in vars(CostRecord()).items() if name != "rules"), (
-        "what was not counted is nothing"
-    )
+    runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
+    assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
+    assert (runs[0].words == "not judged") == (not more.get("judged", True))
 
 
-def test_a_figure_that_is_missing_is_not_the_worst_of_those_that_are_there():
-    text = markdown(run_of(cell("a", "m", check(0.9, "theta_peak"), check(None, "x_rms"))))
-    assert "| a |  | ❌ theta_peak 9.00e-01 / 0.5 |" in text
+def test_what_was_not_counted_is_nothing():
+    assert not any(value for name, value in vars(CostRecord()).items() if name != "rules")
 
 
-def test_the_table_shows_what_two_solutions_of_the_same_equations_differ_by():
-    """Neither what another model form differs by, nor a figure that is held against no other
-    model."""
-    figure = Figure(measure="theta_rms", label="theta_rms", unit="alpha", value=0.9, against="r")
-    form = judge(figure, LINE, kind="model form", measure=DIFFERENCES["theta_rms"])
-    alone = judge(
-        figure.model_copy(update={"measure": "x_rms", "against": ""}),
-        LINE,
-        kind="numerical",
-        measure=DIFFERENCES["x_rms"],
-    )
-    text = markdown(
-        run_of(cell("a", "m", check(0.26, "theta_peak"), form, alone), cell("a", "n", form, alone))
-    )
-    assert "| a |  | ❌ theta_peak 2.60e-01 / 0.5 | ❌ |" in text
+FORM = check(0.9, kind="model form")
+ALONE = check(0.9, "x_rms", against="")
 
 
-def test_a_line_for_every_scene_is_completed_by_the_same_line_only():
-    """Another measure's line leaves it as it is: without a limit."""
-    tables = {
-        "*": {"m": {"r": {"theta_rms": {"why": "a test"}}}},
-        "a": {"m": {"r": {"x_rms": {"expected": 0.1, "limit": 1.0}}}},
-    }
-    with pytest.raises(InputError, match="theta_rms: limit: is missing"):
-        parse_tolerances(tables, [("a", "m")])
+@pytest.mark.parametrize(
+    ("cells", "judged", "row"),
+    [
+        (MIXED, True, "| a |  | ❌ x_rms 7.50e-01 / 0.5 | 💥 |"),
+        # Neither what another model form differs by, nor a figure that is held against no other
+        # model, is what two solutions of the same equations differ by.
+        (
+            (cell("a", "m", check(0.26, "theta_peak"), FORM, ALONE), cell("a", "n", FORM, ALONE)),
+            True,
+            "| a |  | ❌ theta_peak 2.60e-01 / 0.5 | ❌ |",
+        ),
+        # A figure that is missing is not the worst of those that are there.
+        (
+            (cell("a", "m", check(0.9, "theta_peak"), check(None, "x_rms")),),
+            True,
+            "| a |  | ❌ theta_peak 9.00e-01 / 0.5 |",
+        ),
+        # Outcomes where nothing is judged, but of a cell without a history that it failed.
+        (
+            (cell("a", "m", outcome="overturned left", overturned_at=3.21), BROKEN),
+            False,
+            "| a |  | overturned left at 3.21 s | 💥 |",
+        ),
+    ],
+)
+def test_the_row_of_a_scene(cells, judged, row):
+    lines = markdown(run_of(*cells, judged=judged)).splitlines()
+    assert [line for line in lines if line.startswith("| a |")] == [row]
 
 
-def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for():
+@pytest.mark.parametrize(
+    ("limit", "reason"),
+    [(0.0, "0, not 1 (at rest, not overturned left)"), (0.5, "0 is more than 0.5 from 1")],
+)
+def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for(limit, reason):
     """Which outcomes they were; of a figure with a limit the distance says enough."""
-    figure = Figure(
-        measure="outcome_agrees",
-        label="outcome",
-        unit="1",
-        value=0.0,
-        against="r",
-        note="at rest, not overturned left",
-    )
-    exact = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
-    wide = Tolerance(expected=1.0, limit=0.5, drift=0.0, why="half of it")
-    told, untold = (
-        judge(figure, line, kind="numerical", measure=DIFFERENCES["outcome_agrees"]).reason
-        for line in (exact, wide)
-    )
-    assert told == "0, not 1 (at rest, not overturned left)"
-    assert untold == "0 is more than 0.5 from 1"
+    line = Tolerance(expected=1.0, limit=limit, drift=0.0, why="the same outcome")
+    note = "at rest, not overturned left"
+    assert check(0.0, "outcome_agrees", line, unit="1", note=note).reason == reason
