@@ -16,12 +16,12 @@ from rockcheck.validation.suite.results import RUN_FILE, Run
 
 
 @pytest.fixture
-def received(tmp_path: Path, run_folder: Path) -> Path:
+def received(tmp_path: Path, site: Path) -> Path:
     """The run as it was sent: run.json and the histories."""
     folder = tmp_path / "received"
     folder.mkdir()
-    shutil.copy(run_folder / RUN_FILE, folder)
-    shutil.copytree(run_folder / HISTORIES, folder / HISTORIES)
+    shutil.copy(site / RUN_FILE, folder)
+    shutil.copytree(site / HISTORIES, folder / HISTORIES)
     return folder
 
 
