@@ -52,13 +52,9 @@ def test_save_and_load_round_trip(history, tmp_path):
     path = tmp_path / "run.csv"
     history.save(path)
     again = History.load(path)
-    assert (again.name, again.model, again.outcome) == ("observed", "model", "moving")
-    assert (again.notes, again.block) == (("a note, with a comma",), SCENE.block)
-    for field in ("cost", "settings", "event_list"):
+    for field in ("name", "model", "outcome", "notes", "block", "cost", "settings", "event_list"):
         assert getattr(again, field) == getattr(history, field), field
-    assert list(again.channels) == list(history.channels)
-    for name, values in history.channels.items():
-        np.testing.assert_array_equal(again.channels[name], values)
+    pd.testing.assert_frame_equal(again.frame, history.frame, check_exact=True)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.events.csv"]
 
 
@@ -88,34 +84,27 @@ def test_a_compressed_history_is_the_same_and_opens_in_pandas(history, tmp_path)
     """Half the size; the same history gives the same bytes, whenever it is written."""
     path = tmp_path / "run.csv.gz"
     history.save(path)
-    written = path.read_bytes()
     history.save(tmp_path / "run.csv")
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
-        "run.csv",
-        "run.csv.gz",
-        "run.events.csv",
-        "run.events.csv.gz",
-    ]
-    assert {f"run{ending}": content for ending, content in history.packed().items()} == {
-        p.name: p.read_bytes() for p in tmp_path.iterdir() if p.suffix == ".gz"
-    }
-    assert gzip.decompress(written) == (tmp_path / "run.csv").read_bytes()
-    again = History.load(path)
-    assert (again.event_list, again.settings) == (history.event_list, history.settings)
-    np.testing.assert_array_equal(again.channels["theta"], history.channels["theta"])
+    written = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
+    packed = {f"run{ending}": content for ending, content in history.packed().items()}
+    assert packed.keys() == {"run.csv.gz", "run.events.csv.gz"}
+    assert written == packed | {name[:-3]: gzip.decompress(packed[name]) for name in packed}
+    assert History.load(path).packed() == history.packed()
     np.testing.assert_allclose(pd.read_csv(path)["theta"], history.channels["theta"], rtol=1e-14)
-    again.save(path)
-    assert path.read_bytes() == written
 
 
-@pytest.mark.parametrize("damage", ["cut", "flipped", "no end"])
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: content[:5],
+        lambda content: content[:99] + bytes([content[99] ^ 0xFF]) + content[100:],
+        lambda content: content[:-8],
+    ],
+    ids=["cut", "flipped", "no end"],
+)
 def test_a_damaged_compressed_history(history, tmp_path, damage):
     path = tmp_path / "run.csv.gz"
-    history.save(path)
-    content = path.read_bytes()
-    middle = len(content) // 2
-    flipped = content[:middle] + bytes([content[middle] ^ 0xFF]) + content[middle + 1 :]
-    path.write_bytes({"cut": content[:5], "flipped": flipped, "no end": content[:-8]}[damage])
+    path.write_bytes(damage(history.packed()[".csv.gz"]))
     with pytest.raises(
         InputError,
         match=r"^[^\n]*run\.csv\.gz: (a compressed file that is damaged|not a CSV table)",
@@ -168,8 +157,7 @@ ROWS = "t,theta\n0,0\n1,0.1\n"
 
 def rows_about(text: str) -> str:
     """The same rows with a column in which the first says this of the history."""
-    quoted = text.replace('"', '""')
-    return f't,theta,rockcheck_history\n0,0,"{quoted}"\n1,0.1,\n'
+    return 't,theta,rockcheck_history\n0,0,"{}"\n1,0.1,\n'.format(text.replace('"', '""'))
 
 
 @pytest.mark.parametrize(
@@ -238,16 +226,6 @@ def test_hostile_events(tmp_path):
         History.load(path)
 
 
-def test_files_that_cannot_be_read(tmp_path):
-    (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
-    for name, said in (
-        ("none.csv", "cannot be read: No such file"),
-        ("binary.csv", "not a CSV table"),
-    ):
-        with pytest.raises(InputError, match=said):
-            History.load(tmp_path / name)
-
-
 def test_unknown_outcome_in_a_header_is_not_believed(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(rows_about(json.dumps({"outcome": "<script>"})))
@@ -280,16 +258,10 @@ def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
 @pytest.mark.parametrize("column", ["t", "theta", "x", "half_width"])
 def test_what_is_too_large_to_square_is_bad_input(tmp_path, column, value):
     """Not warnings of the arithmetic later on."""
-    about = (
-        json.dumps({"half_width": float(value)}).replace('"', '""')
-        if column == "half_width"
-        else "{}"
-    )
+    about = rows_about(f'{{"half_width": {value if value != "inf" else "Infinity"}}}')
     cells = {"t": "1", "theta": "0", "x": "0", column: value}
-    path = tmp_path / "h.csv"
-    path.write_text(
-        f't,theta,x,rockcheck_history\n-1e300,0,0,"{about}"\n'.replace("-1e300", "-2")
-        + "{t},{theta},{x},-\n".format(**cells)
+    (tmp_path / "h.csv").write_text(
+        about if column == "half_width" else "t,theta,x\n-2,0,0\n{t},{theta},{x}\n".format(**cells)
     )
     with pytest.raises(InputError, match=column):
-        History.load(path)
+        History.load(tmp_path / "h.csv")
