@@ -2,12 +2,12 @@
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
 
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.drawers import figure_of
@@ -23,10 +23,11 @@ from rockcheck.validation.studies.spectrum.agreement import (
     blocks,
     mapped,
 )
-from rockcheck.validation.studies.spectrum.study import Spectra, _pulse
+from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
+REQUEST = Request(SIZE)
 
 
 def made(panel):
@@ -43,38 +44,36 @@ def made(panel):
     )
 
 
-def plot_of(*figures, letter="R"):
-    """The plot of a figure whose nodes were all played to one outcome."""
-    study = Spectra(paper_panels(*figures), Request(SIZE))
+def plot_of(*panels, letter="R", request=REQUEST):
+    """The plot of spectra whose nodes were all played to one outcome."""
+    study = Spectra(panels, request)
     done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
     return next(study.gather(done).plots())
 
 
-def test_the_papers_colours():
-    from matplotlib.figure import Figure
+def labels(figure):
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.texts]
 
-    for panel, clockwise in (
-        (paper_panels(8)[0], COLOURS["clockwise"]),
-        (paper_panels(8)[1], COLOURS["overturned"]),
-    ):
-        axes = Figure().subplots()
-        draw(made(panel), axes)
-        (mesh,) = axes.collections
-        axes.figure.draw_without_rendering()
-        colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)
-        np.testing.assert_allclose(colours[0, 0], to_rgba(COLOURS["safe"]))
-        np.testing.assert_allclose(colours[7, 0], to_rgba(clockwise))
-        np.testing.assert_allclose(colours[11, 0], to_rgba(COLOURS["counterclockwise"]))
+
+@pytest.mark.parametrize(("panel", "overturned"), [(0, "clockwise"), (1, "overturned")])
+def test_the_papers_colours(panel, overturned):
+    axes = Figure().subplots()
+    draw(made(paper_panels(8)[panel]), axes)
+    (mesh,) = axes.collections
+    axes.figure.draw_without_rendering()
+    colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)[[0, 7, 11], 0]
+    expected = [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
+    np.testing.assert_allclose(colours, expected)
 
 
 def test_a_figure_has_the_papers_panels():
-    figure = figure_of(plot_of(9))
+    figure = figure_of(plot_of(*paper_panels(9)))
     assert [axes.get_title(loc="left") for axes in figure.axes] == [
         panel.title for panel in paper_panels(9)
     ]
     assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
-    (legend,) = figure.legends
-    assert [text.get_text() for text in legend.texts] == [
+    assert labels(figure) == [
         "safe",
         "no wall: overturned clockwise",
         "overturned; no wall: counterclockwise",
@@ -82,11 +81,10 @@ def test_a_figure_has_the_papers_panels():
 
 
 def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
-    plot = plot_of(9, letter="U")
+    plot = plot_of(*paper_panels(9), letter="U")
     plot.data["panels"][1]["law"] = [[2, 3]]
     figure = figure_of(plot)
-    (legend,) = figure.legends
-    assert {"undecided", "depends on the impact law"} <= {text.get_text() for text in legend.texts}
+    assert {"undecided", "depends on the impact law"} <= {*labels(figure)}
     (ring,) = figure.axes[1].lines
     assert ring.get_marker() == LAW_MARK["marker"]
     assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
@@ -95,24 +93,20 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
 def test_the_pulse_of_ones_own_scene_is_marked():
     """At its ratios; none is marked in the paper's figures."""
     scene = load_scene("rack").replace(excitation=Sine(amplitude=6.0, period=0.8))
-    panel, request = Panel("rack", "Rack", scene), Request(SIZE, (1.0, 8.0), (1.0, 4.0))
-    own = _pulse(panel, request)["own"]
-    slope = scene.gravity * scene.block.slope
-    omega = 2.0 * math.pi / 0.8
-    assert own == pytest.approx([omega / scene.frequency_parameter, 6.0 / slope])
-    assert _pulse(next(iter(paper_panels())), request)["own"] is None
-    plot = plot_of(8)
-    one = {**plot.data, "panels": plot.data["panels"][:1]}
-    one["panels"][0]["place"] = [0, 4, 0]
-    one["pulse"]["own"] = own
-    figure = figure_of(replace(plot, data=one))
+    own = [
+        2.0 * math.pi / 0.8 / scene.frequency_parameter,
+        6.0 / (scene.gravity * scene.block.slope),
+    ]
+    request = Request(SIZE, (1.0, 8.0), (1.0, 4.0))
+    figure = figure_of(plot_of(Panel("rack", "Rack", scene), request=request))
     (star,) = figure.axes[0].lines
-    assert star.get_xydata().tolist() == [own]
-    assert OWN_MARK["label"] in {text.get_text() for text in figure.legends[0].texts}
+    np.testing.assert_allclose(star.get_xydata(), [own])
+    assert OWN_MARK["label"] in labels(figure)
+    assert not any(axes.lines for axes in figure_of(plot_of(*paper_panels(8))).axes)
 
 
 def test_the_scripts_hold_every_node(tmp_path):
-    plot = plot_of(8)
+    plot = plot_of(*paper_panels(8))
     scripts = write_scripts(plot, tmp_path)
     assert "figures/figure-8.nodes.js" in scripts
     text = (tmp_path / "figure-8.nodes.js").read_text(encoding="utf-8")

@@ -89,21 +89,25 @@ def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, 
 
 
 READERS = (History.load, read_measured, read_record, load_scene, read_toml)
+#: What may lie where a file should, and what is said of it.
+NO_FILES = {
+    # A pipe would be waited for without end, a device read without end.
+    "a pipe": (os.mkfifo, "cannot be read: not a file"),
+    "a folder": (Path.mkdir, "cannot be read: not a file"),
+    "a link to a device": (lambda path: path.symlink_to("/dev/zero"), "cannot be read: not a file"),
+    "nothing": (lambda path: None, "cannot be read: No such file"),
+    "bytes": (lambda path: path.write_bytes(bytes(range(256))), "not a (text file|CSV table)"),
+}
 
 
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("read", READERS)
-@pytest.mark.parametrize("kind", ["a pipe", "a device", "a folder", "a link to a device"])
-def test_only_regular_files_are_read(tmp_path, read, kind):
-    """A pipe would be waited for without end, a device read without end."""
+@pytest.mark.parametrize("kind", NO_FILES)
+def test_only_regular_files_of_text_are_read(tmp_path, read, kind):
     path = tmp_path / ("a.toml" if read in (load_scene, read_toml) else "a.csv")
-    if kind == "a pipe":
-        os.mkfifo(path)
-    elif kind == "a folder":
-        path.mkdir()
-    else:
-        path.symlink_to("/dev/zero")
-    with pytest.raises(InputError, match="not a file"):
+    make, said = NO_FILES[kind]
+    make(path)
+    with pytest.raises(InputError, match=rf"{path.name}: {said}"):
         read(path)
 
 
@@ -151,17 +155,15 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
         "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig"
     )
     assert read_record(tmp_path / "a.csv").time_step == 0.5
-    for remark in ("", '"{""name"": ""kept"", ""outcome"": ""at rest""}"'):
-        path = tmp_path / "h.csv"
-        path.write_text(
-            f"t,theta,rockcheck_history\n0,0.5,{remark}\n1,0.25,\n"
-            if remark
-            else "t,theta\n0,0.5\n1,0.25\n",
-            encoding="utf-8-sig",
-        )
+    path = tmp_path / "h.csv"
+    for text, outcome in (
+        ("t,theta\n0,0.5\n1,0.25\n", "moving"),
+        ('t,theta,rockcheck_history\n0,0.5,"{""outcome"": ""at rest""}"\n1,0.25,\n', "at rest"),
+    ):
+        path.write_text(text, encoding="utf-8-sig")
         history = History.load(path)
         assert history.channels["theta"].tolist() == [0.5, 0.25]
-        assert history.outcome == ("at rest" if remark else "moving")
+        assert history.outcome == outcome
 
 
 @pytest.mark.parametrize(
@@ -189,12 +191,11 @@ def test_a_key_of_few_parts_is_read(tmp_path, line):
     assert read_toml(tmp_path / "a.toml")
 
 
-def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
-    path: Path = tmp_path / "a.toml"
-    with path.open("wb") as stream:
-        stream.truncate(10_000_001)
+def test_a_file_that_is_too_large_is_not_read(tmp_path):
+    (tmp_path / "a.toml").touch()
+    os.truncate(tmp_path / "a.toml", 10_000_001)
     with pytest.raises(InputError, match="larger than 10000000 bytes"):
-        read_toml(path)
+        read_toml(tmp_path / "a.toml")
 
 
 def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
@@ -203,13 +204,12 @@ def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
     path = tmp_path / "a.npz"
     np.savez_compressed(path, x=np.arange(3.0), y=np.zeros(100_000))
     assert read_arrays(path)["x"].tolist() == [0.0, 1.0, 2.0]
-    with pytest.raises(InputError, match="arrays are larger than 10000 bytes"):
-        read_arrays(path, most=10_000)
-    path.write_bytes(path.read_bytes()[:-60])
-    with pytest.raises(InputError, match="not a whole file of arrays"):
-        read_arrays(path)
-    np.savez(path, x=np.array([{"a": 1}], dtype=object))
-    with pytest.raises(InputError, match="not a whole file of arrays"):
-        read_arrays(path)
-    with pytest.raises(InputError, match="cannot be read"):
-        read_arrays(tmp_path / "none.npz")
+    for spoil, said in (
+        (Path.touch, "arrays are larger than 10000 bytes"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-60]), "not a whole file of arrays"),
+        (lambda path: np.savez(path, x=np.array([{"a": 1}])), "not a whole file of arrays"),
+        (Path.unlink, "cannot be read"),
+    ):
+        spoil(path)
+        with pytest.raises(InputError, match=said):
+            read_arrays(path, most=10_000)

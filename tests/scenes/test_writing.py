@@ -115,12 +115,17 @@ DOORS = {
 @pytest.mark.parametrize("calls", DOORS)
 def test_files_are_written_and_read_by_the_doors_alone(calls):
     home = Path(rockcheck.__file__).parent
-    found = set()
-    for folder in ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands"):
-        for path in (home / folder).rglob("*.py"):
-            text = path.read_text(encoding="utf-8").replace("os.open(os.devnull", "")
-            if re.search(calls, text):
-                found.add(path.relative_to(home).as_posix())
+    folders = ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands")
+    texts = {
+        path.relative_to(home).as_posix(): path.read_text(encoding="utf-8")
+        for folder in folders
+        for path in (home / folder).rglob("*.py")
+    }
+    found = {
+        name
+        for name, text in texts.items()
+        if re.search(calls, text.replace("os.open(os.devnull", ""))
+    }
     assert found == DOORS[calls]
 
 
