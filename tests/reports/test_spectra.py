@@ -1,6 +1,5 @@
 """Figures of the spectra."""
 
-import json
 import math
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 
 from rockcheck.ebm import Spectrum
 from rockcheck.reports.drawers import figure_of
-from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw, write_scripts
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
 from rockcheck.scenes import Sine, load_scene
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import plain
@@ -103,17 +102,6 @@ def test_the_pulse_of_ones_own_scene_is_marked():
     np.testing.assert_allclose(star.get_xydata(), [own])
     assert OWN_MARK["label"] in labels(figure)
     assert not any(axes.lines for axes in figure_of(plot_of(*paper_panels(8))).axes)
-
-
-def test_the_scripts_hold_every_node(tmp_path):
-    plot = plot_of(*paper_panels(8))
-    scripts = write_scripts(plot, tmp_path)
-    assert "figures/figure-8.nodes.js" in scripts
-    text = (tmp_path / "figure-8.nodes.js").read_text(encoding="utf-8")
-    data = json.loads(text.partition(" = ")[2].rstrip(";\n"))
-    assert [panel["outcomes"] for panel in data["panels"]] == [f"{SIZE**2}R"] * 7
-    assert len(data["pulse"]["amplitude"]) == len(data["amplitudes"]) == SIZE
-    assert "rockcheckHistories" in (tmp_path / "figure-8.histories.js").read_text(encoding="utf-8")
 
 
 def test_the_documentation_shows_the_kept_study():

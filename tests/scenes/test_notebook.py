@@ -66,23 +66,16 @@ def test_shows_itself_as_a_table_and_its_plot_as_a_picture(things, name, expecte
     assert all(axes.get_xlabel() or axes.get_ylabel() for axes in figure.axes)
 
 
-def test_the_lines_are_the_history(history):
+def test_lines_are_the_history_and_the_candidate_less_the_reference(things, history):
+    """One model twice has two colours."""
     rotation = history.plot().axes[0].lines[0]
     np.testing.assert_array_equal(rotation.get_xdata(), history.channels["t"])
     np.testing.assert_allclose(rotation.get_ydata() * history.alpha, history.channels["theta"])
-
-
-def test_the_difference_is_the_candidate_less_the_reference(things):
-    line = things["discrepancy"].plot().axes[1].lines[0]
-    rms = float(np.sqrt(np.mean(np.square(line.get_ydata()))))
-    assert rms == pytest.approx(
-        things["discrepancy"]["theta_rms"], rel=0.02
-    )  # the measure integrates in time
-
-
-def test_one_model_twice_has_two_colours(history):
-    lines = compare(history, history).plot().axes[0].lines
-    assert lines[0].get_color() != lines[1].get_color()
+    apart = things["discrepancy"].plot().axes[1].lines[0].get_ydata()
+    rms = np.sqrt(np.mean(np.square(apart)))  # the measure integrates in time
+    assert rms == pytest.approx(things["discrepancy"]["theta_rms"], rel=0.02)
+    one, same = compare(history, history).plot().axes[0].lines[:2]
+    assert one.get_color() != same.get_color()
 
 
 def test_of_a_fallen_block_the_way_to_the_balance_point_is_drawn_and_the_time():

@@ -121,28 +121,6 @@ def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
             read()
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("t,theta\n0,True\n1,False\n", "column 'theta' is not numeric"),
-        ("t,theta\n0,True\n1,0.5\n", "column 'theta' is not numeric"),
-        ("t,theta\n0,1_000\n1,0.5\n", "column 'theta' is not numeric"),
-        ("t,theta\n0,0x10\n1,0.5\n", "column 'theta' is not numeric"),
-        ("t,x,theta\n0,1,2\n0,,1\n", "column 'x', row 2: nan is not finite"),
-        ("", "empty|No columns"),
-        ("# a remark\n", "empty|No columns"),
-        ('t,"theta\nx"\n0,1\n', "line 1: a quotation mark that is not closed on its line"),
-        ("t,theta" + ",x" * 1000 + "\n", "line 1: more than 1000 columns"),
-    ],
-)
-def test_words_are_no_numbers_and_rows_are_lines(tmp_path, text, said):
-    path = tmp_path / "h.csv"
-    path.write_text(text)
-    for read in (History.load, read_measured):
-        with pytest.raises(InputError, match=said):
-            read(path)
-
-
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     """As some editors write it: scene, suite, record and history are read as without it."""
     scene = (
