@@ -2,6 +2,7 @@
 exactly: how they are distributed, what is refused, where they stand in a scene."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -33,13 +34,6 @@ def written(folder: Path, text: str, name: str = "bookcase.toml") -> Path:
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def fault_of(source: str | Path) -> str:
-    with pytest.raises(InputError) as fault:
-        load_scene(source)
-    assert "\n" not in str(fault.value)
-    return str(fault.value)
 
 
 def test_a_scene_file(tmp_path):
@@ -78,21 +72,21 @@ def test_a_scene_file(tmp_path):
         ('kind = "ricker"', 'kind = "record"\nfile = "none.AT2"', "none.AT2: cannot be read"),
         ("[floor]", "[floor", "not valid TOML"),
         ("[floor]", "[block]", "not valid TOML"),
+        ("duration = 8.0", "a = " + "[" * 20000, "not valid TOML"),
     ],
 )
 def test_faults_name_file_key_and_value(old, new, said, tmp_path):
-    fault = fault_of(written(tmp_path, TEXT.replace(old, new)))
-    assert "bookcase.toml: " in fault
-    assert said in fault
+    with pytest.raises(InputError, match=rf"^[^\n]*bookcase\.toml: [^\n]*{re.escape(said)}[^\n]*$"):
+        load_scene(written(tmp_path, TEXT.replace(old, new)))
 
 
-def test_files_that_cannot_be_read(tmp_path):
-    for source, said in (
-        ("fig4aa", "did you mean 'fig4a'?"),
-        ("scene.json", "or the path of a .toml file"),
-        (written(tmp_path, "a = " + "[" * 20000), "not valid TOML"),
-    ):
-        assert said in fault_of(source)
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [("fig4aa", "did you mean 'fig4a'?"), ("scene.json", "or the path of a .toml file")],
+)
+def test_what_is_no_scene_is_told(source, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        load_scene(source)
 
 
 def test_a_record_is_looked_up_beside_the_file_then_in_the_package(tmp_path):
@@ -107,7 +101,8 @@ def test_a_record_is_looked_up_beside_the_file_then_in_the_package(tmp_path):
     missing = written(
         tmp_path, text.replace("elcentro_1940_ns.csv", "../elcentro_1940_ns.csv"), "outside.toml"
     )
-    assert "cannot be read" in fault_of(missing)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_scene(missing)
 
 
 @pytest.mark.parametrize(

@@ -242,13 +242,11 @@ def test_pandas_reads_the_table_without_an_option(tmp_path):
 
 
 def test_hostile_events(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text(ROWS)
-    (tmp_path / "run.events.csv").write_text(
-        "t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n"
-    )
+    (tmp_path / "run.csv").write_text(ROWS)
+    events = "t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n"
+    (tmp_path / "run.events.csv").write_text(events)
     with pytest.raises(InputError, match=r"run\.events\.csv: not an events table"):
-        History.load(path)
+        History.load(tmp_path / "run.csv")
 
 
 def test_unknown_outcome_in_a_header_is_not_believed(tmp_path):

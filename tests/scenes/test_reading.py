@@ -114,24 +114,24 @@ def test_only_regular_files_of_text_are_read(tmp_path, read, kind):
 @pytest.mark.needs("POSIX")
 def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
     (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
-    os.mkfifo(tmp_path / "h.events.csv")
-    os.mkfifo(tmp_path / "run.json")
-    for read in (lambda: History.load(tmp_path / "h.csv"), lambda: Run.load(tmp_path)):
+    for read, beside in (
+        (lambda: History.load(tmp_path / "h.csv"), "h.events.csv"),
+        (lambda: Run.load(tmp_path), "run.json"),
+    ):
+        os.mkfifo(tmp_path / beside)
         with pytest.raises(InputError, match="not a file"):
             read()
 
 
 def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
     """As some editors write it: scene, suite, record and history are read as without it."""
-    scene = (
-        "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\n"
-        'floor = { friction = 0.4 }\nname = "a"\n'
-    )
-    (tmp_path / "a.toml").write_text(scene, encoding="utf-8-sig")
-    assert load_scene(tmp_path / "a.toml").name == "a"
-    (tmp_path / "a.csv").write_text(
-        "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", encoding="utf-8-sig"
-    )
+    for name, text in {
+        "a.toml": "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\n"
+        'floor = { friction = 0.4 }\nname = "b"\n',
+        "a.csv": "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n",
+    }.items():
+        (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    assert load_scene(tmp_path / "a.toml").name == "b"
     assert read_record(tmp_path / "a.csv").time_step == 0.5
     path = tmp_path / "h.csv"
     for text, outcome in (

@@ -49,17 +49,17 @@ def at2_plain(component: str) -> bytes:
 
 def _cosmos_channel(component: str) -> str:
     values = motion(component) * 100
-    integers, reals = [-999] * 100, [-999.0] * 100
+    integers, reals = np.full(100, -999), np.full(100, -999.0)
     integers[53] = {"N-S": 360, "E-W": 90, "U-D": 400}[component]
-    reals[33], reals[61] = 2 * STEP, 1000 * STEP  # of the raw record in s, of these samples in ms
-    reals[41] = 426212.0  # touches its neighbour
+    # The raw record's step in s, a number that touches its neighbour, these samples' step in ms.
+    reals[[33, 41, 61]] = 2 * STEP, 426212.0, 1000 * STEP
     return (
         "Corrected acceleration   (Format v01.20 with 13 text lines) Src: 052S7466.CE\n"
         + "".join(f"text line {n}\n" for n in range(2, 14))
         + " 100 Integer-header values follow on  10 lines, Format= (10I8)\n"
-        + _fixed(np.array(integers), 10, "8d")
+        + _fixed(integers, 10, "8d")
         + " 100 Real-header values follow on  17 lines, Format= (6F13.6)\n"
-        + _fixed(np.array(reals), 6, "13.6f")
+        + _fixed(reals, 6, "13.6f")
         + '   2 Comment lines follow, each starting with a "|":\n| a remark\n| accel of another\n'
         + f"    {len(values)} acceleration pts, approx    4 secs, units=cm/sec2 (04),"
         "Format=(8F10.5)\n"
@@ -205,8 +205,8 @@ def test_several_components_in_one_file(write, names, tmp_path, told):
         r" --read component=1 \(in a scene file: component = 1\)",
     ):
         Record.from_file(path)
-    assert Record.from_file(path, component=2).peak == pytest.approx(0.27, abs=1e-7)
-    assert Record.from_file(path, component=names[2]).peak == pytest.approx(0.15, abs=1e-7)
+    peaks = [Record.from_file(path, component=one).peak for one in (2, names[2])]
+    assert peaks == pytest.approx([0.27, 0.15], abs=1e-7)
     said = told("record", str(path), "--read", f"component={names[1]}")
     assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
     assert said["duration_s"] == pytest.approx(4.0)

@@ -49,8 +49,8 @@ def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
 
 
 def test_a_folder_of_results_is_no_link(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "run").mkdir()
+    for name in ("elsewhere", "run"):
+        (tmp_path / name).mkdir()
     (tmp_path / "run" / "pages").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(InputError, match="pages: a link"):
         made(tmp_path / "run", "pages", "data")
