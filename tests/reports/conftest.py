@@ -33,7 +33,6 @@ MODELS: Mapping[str, dict[str, Any]] = {
 
 
 def scene(name: str, wall: bool, duration: float = 12.0) -> Scene:
-    """The paper's block under a pulse."""
     return Scene(
         name=name,
         block=PAPER_BLOCK,
@@ -108,7 +107,6 @@ def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> An
 
 
 def figure(measure: str, value: float | None, unit: str = "alpha", **more: Any) -> Figure:
-    """A figure with its name as label."""
     return Figure(measure=measure, label=measure.replace("_", " "), unit=unit, value=value, **more)
 
 
@@ -309,7 +307,6 @@ def finished(tmp_path: Path, request: pytest.FixtureRequest) -> Run:
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a finished run and its pages."""
     from rockcheck.reports.site import write_site
 
     folder = tmp_path_factory.mktemp("site")
@@ -322,13 +319,11 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def run(site: Path) -> Run:
-    """The run of the site."""
     return Run.load(site)
 
 
 @pytest.fixture(scope="session")
 def index(site: Path) -> str:
-    """The first page of the site."""
     return (site / "index.html").read_text(encoding="utf-8")
 
 
@@ -359,7 +354,6 @@ def until(page: "Page", expression: str, seconds: float = 10.0) -> None:
 
 @pytest.fixture
 def eventually() -> Callable[..., None]:
-    """`eventually(page, expression)` waits for it to hold."""
     return until
 
 

@@ -25,7 +25,6 @@ Opened = Callable[..., playwright.Page]
 
 @pytest.fixture
 def visit(opened: Opened, site: Path) -> Opened:
-    """`visit(address, **settings)` is a page of the site, see `opened`."""
     return lambda address, **settings: opened(site / address, site, **settings)
 
 
@@ -155,8 +154,7 @@ def test_models_and_the_reference_of_the_differences_are_chosen(visit: Opened) -
     assert [words for words in ("difference from EBM;", "RMS so far") if words not in said] == []
 
 
-def test_animation_moves_the_block_with_the_cursor(visit: Opened, eventually) -> None:
-    """Slow motion is slow."""
+def test_animation_moves_the_block_and_slow_motion_is_slow(visit: Opened, eventually) -> None:
     page = visit(WALL)
     block = page.locator('#block [data-model="ebm-unilateral"]')
     start = block.get_attribute("transform")

@@ -164,7 +164,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def visit(opened: Opened, studies: Path) -> Opened:
-    """`visit(name, **settings)` is the page of a study, see `opened`."""
     return lambda name, **settings: opened(studies / name / "index.html", studies, **settings)
 
 
@@ -182,7 +181,6 @@ def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visit: Opened, name
 @pytest.mark.parametrize("name", STUDIES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_accessible(visit: Opened, barriers, name: str, scheme: str) -> None:
-    """Also while a node of a spectrum is played."""
     page = visit(name, color_scheme=scheme, bypass_csp=True)
     if name == "spectra":
         page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
@@ -190,8 +188,7 @@ def test_accessible(visit: Opened, barriers, name: str, scheme: str) -> None:
     assert barriers(page) == []
 
 
-def place(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
-    """Where a node is on the screen."""
+def place_of_node(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
     canvas = page.locator(".panel canvas").nth(panel)
     canvas.scroll_into_view_if_needed()
     box = canvas.bounding_box()
@@ -228,14 +225,14 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(visit: Opened) -> None
 
 def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit: Opened) -> None:
     page = visit("spectra")
-    page.mouse.move(*place(page, 3, 10, 7))
+    page.mouse.move(*place_of_node(page, 3, 10, 7))
     said = page.locator("output.node").inner_text()
     assert said.startswith(
         f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of "
     )
     told = page.locator(".panel .said")
     assert told.all_inner_texts() == ["overturned clockwise", *["overturned"] * 6]
-    page.mouse.move(*place(page, 3, 2, 7))
+    page.mouse.move(*place_of_node(page, 3, 2, 7))
     assert told.all_inner_texts() == ["safe"] * 7
     for key in ("ArrowUp", "ArrowRight"):
         page.locator(".panel canvas").nth(1).press(key)
@@ -263,7 +260,7 @@ def test_ones_own_block_is_told_in_hertz_and_g(opened: Opened, tmp_path: Path) -
 
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit: Opened, eventually) -> None:
     page = visit("spectra")
-    page.mouse.click(*place(page, 0, 7, 7))
+    page.mouse.click(*place_of_node(page, 0, 7, 7))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
     row, column = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
     assert 6 <= row <= 8
@@ -271,7 +268,7 @@ def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit: Opened, ev
     start = page.evaluate("rockcheckPlayer.store.time")
     eventually(page, f"rockcheckPlayer.store.time > {start + 0.2}")
     page.get_by_role("button", name="Pause").click()
-    page.mouse.click(*place(page, 4, 1, 1))
+    page.mouse.click(*place_of_node(page, 4, 1, 1))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("Gap 53 mm, e = 1")
     assert page.locator(".played").count() == 1
     assert page.locator(".played svg .solid").count() >= 2  # the floor and the wall

@@ -34,7 +34,6 @@ from rockcheck.validation.suite.results import Cell, Check, Run
 
 
 def payload_of(site: Path, slug: str) -> tuple[dict, np.ndarray]:
-    """The data of a page, and its lines of values."""
     text = (site / PAGES / "data" / f"{slug}.js").read_text(encoding="utf-8")
     data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
     return data, lines_of(data["lines"], data["rows"])
@@ -311,8 +310,7 @@ def test_models_can_be_seen_and_told_apart() -> None:
     ]
 
 
-def test_numbers_for_people() -> None:
-    """In sentences they do not break."""
+def test_numbers_for_people_do_not_break_in_sentences() -> None:
     assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == [
         "–",
         "0",

@@ -1,5 +1,6 @@
 """The cache of compiled code: what lies in it is unpickled and run, so it must be the user's own,
-and whole."""
+and whole. Threads that run kernels: what a call gives, what Ctrl-C leaves of it, what workers
+announce."""
 
 import gc
 import json
@@ -8,7 +9,9 @@ import runpy
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections import deque
 from pathlib import Path
 
 import numba
@@ -18,7 +21,8 @@ from rockcheck import ebm
 from rockcheck.commands.warm import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
-from rockcheck.scenes.progress import announcing
+from rockcheck.scenes.progress import announce, announcing, interruptible
+from rockcheck.validation.execute.pool import Call, Pool
 
 #: A package of one kernel. Played, it says whether the kernel was ready, how many functions were
 #: read from the cache, and how many compiled. The interpreter and the machine code that is taken
@@ -78,7 +82,6 @@ def replay(tmp_path, tiny, monkeypatch, capsys):
 
 
 def recorded(monkeypatch, owner, name, about):
-    """What is told about each call of a method."""
     plain, seen = getattr(owner, name), []
     monkeypatch.setattr(owner, name, lambda *given: (seen.append(about(*given)), plain(*given))[1])
     return seen
@@ -152,8 +155,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_a_damaged_file_is_compiled_again(tmp_path, replay, monkeypatch, damage):
-    """And what the planted pickle would do is not done."""
+def test_a_damaged_file_is_compiled_again_and_not_run(tmp_path, replay, monkeypatch, damage):
     monkeypatch.chdir(tmp_path)
     replay(COMPILED)
     for path in files(tmp_path):
@@ -202,7 +204,6 @@ def test_no_folder_that_could_be_foreseen(tmp_path, replay):
 
 
 def test_everything_can_be_imported_without_the_compiler():
-    """NUMBA_DISABLE_JIT=1, as for a debugger."""
     code = (
         "import rockcheck, rockcheck.ebm, rockcheck.cm, rockcheck.engines,"
         " rockcheck.ebm.core.bouc_wen;"
@@ -289,3 +290,43 @@ def test_what_is_compiled_ahead_is_not_compiled_again(typed):
         " len(march.play.signatures) <= 1)"
     )
     assert subprocess.check_output([sys.executable, "-c", code], text=True) == "0 True\n"
+
+
+def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
+    first = interruptible(threading.get_ident)
+    assert first != threading.get_ident()
+    with pytest.raises(ZeroDivisionError):
+        interruptible(lambda: 1 // 0)
+    assert interruptible(threading.get_ident) == first
+    if hasattr(os, "fork"):
+        child = os.fork()
+        if child == 0:
+            signal.alarm(60)
+            os._exit(interruptible(lambda: 7))
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+
+
+@pytest.mark.needs("POSIX")
+def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
+    released = threading.Event()
+    previous = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
+        assert interruptible(lambda: 3) == 3
+        assert not released.is_set()
+    finally:
+        released.set()
+        signal.signal(signal.SIGINT, previous)
+
+
+def test_a_worker_announces_on_the_runs_own_stderr(capfd):
+    """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of
+    it."""
+    calls = [Call(announce, ("compiling",)), Call(print, ("noise",))]
+    with announcing(lambda words: None), Pool(1) as pool:
+        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
+    assert capfd.readouterr() == ("", "rockcheck: compiling\n")
+    with Pool(1) as pool:
+        assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
+    assert capfd.readouterr() == ("", "")
