@@ -35,10 +35,9 @@ def _fixed(values: NDArray[np.float64], across: int, form: str) -> str:
 
 def at2(component: str, header: str = "NPTS=  {n}, DT= {dt:.4f} SEC,") -> bytes:
     values = motion(component) / G
-    head = header.format(n=len(values), dt=STEP)
     text = (
         f"PEER NGA STRONG MOTION DATABASE RECORD\nM\xe9xico, 9/19/1985, {component}\n"
-        f"ACCELERATION TIME SERIES IN UNITS OF G\n{head}\n"
+        "ACCELERATION TIME SERIES IN UNITS OF G\n" + header.format(n=len(values), dt=STEP) + "\n"
     )
     return (text + _fixed(values, 5, "15.7E")).encode("latin-1")
 
@@ -99,13 +98,13 @@ def csmip(*components: str) -> bytes:
 
 def esm(component: str) -> bytes:
     values = motion(component) * 100
-    stream = {"N-S": "HNN", "E-W": "HNE", "U-D": "HNZ"}[component]
-    text = (
+    return (
         "EVENT_NAME: GREECE\nSTATION_NAME: Town Hall,Argos\nSAMPLING_INTERVAL_S:"
         f" {STEP:.6f}\nNDATA: {len(values)}\nDURATION_S: 4.010\n"
-        f"STREAM: {stream}\nUNITS: cm/s^2\nPGA_CM/S^2: 304\nDATA_TYPE: ACCELERATION\nUSER5: \n"
-    )
-    return (text + _fixed(values, 1, ".6f")).encode()
+        f"STREAM: { {'N-S': 'HNN', 'E-W': 'HNE', 'U-D': 'HNZ'}[component] }\n"
+        "UNITS: cm/s^2\nPGA_CM/S^2: 304\nDATA_TYPE: ACCELERATION\nUSER5: \n"
+        + _fixed(values, 1, ".6f")
+    ).encode()
 
 
 def knet(component: str, direction: str = "") -> bytes:
