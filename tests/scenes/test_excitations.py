@@ -131,3 +131,9 @@ def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
     response = lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)])
     found = largest_response(samples, parts, tail, step, rate, damping)
     assert found == pytest.approx(np.max(np.abs(response)), rel=1e-9)
+
+
+def test_periods_of_a_spectrum_leave_no_wide_gap():
+    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
+    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert intensity.PERIODS[0] <= 0.1 < 4.0 <= intensity.PERIODS[-1]
