@@ -103,7 +103,6 @@ pytest_make_collect_report = pytest_runtest_makereport
 
 @pytest.fixture(scope="session")
 def block() -> Block:
-    """The paper's block, alpha = 0.25."""
     return PAPER_BLOCK
 
 
@@ -134,7 +133,6 @@ def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
 
 @pytest.fixture
 def told(typed: Callable[..., tuple[str, str]]) -> Callable[..., Any]:
-    """What a command says as JSON."""
     return lambda *words, code=0: json.loads(typed(*words, "--json", code=code)[0])
 
 
@@ -242,7 +240,6 @@ def synthetic(
 
 @pytest.fixture
 def made() -> Callable[..., History]:
-    """`synthetic`, for tests."""
     return synthetic
 
 

@@ -13,15 +13,14 @@ pytest is given, too.
 import argparse
 import ast
 import copy
-import importlib
 import os
 import random
+import resource
 import shutil
-import signal
+import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -50,33 +49,26 @@ SWAPS: dict[type, type] = {
 }
 
 
-def changed(node: ast.AST) -> Iterator[ast.AST]:
-    """The node with a fault, once for each that it can have."""
+def changed(node: ast.AST) -> ast.AST | None:
+    """The node with a fault, if it can have one."""
     fault = copy.deepcopy(node)
     if isinstance(fault, ast.Compare) and len(fault.ops) == 1 and type(fault.ops[0]) in SWAPS:
         fault.ops = [SWAPS[type(fault.ops[0])]()]
-        yield fault
-    elif (
-        isinstance(fault, ast.BinOp)
-        and isinstance(fault.right, ast.Name)
-        and fault.right.id in SIGNS
-    ):
-        return  # to divide by one is to multiply by it
     elif isinstance(fault, ast.BinOp | ast.AugAssign | ast.BoolOp) and type(fault.op) in SWAPS:
+        by = getattr(fault, "right", None)
+        if isinstance(by, ast.Name) and by.id in SIGNS:
+            return None  # to divide by one is to multiply by it
         fault.op = SWAPS[type(fault.op)]()
-        yield fault
     elif isinstance(fault, ast.UnaryOp) and isinstance(fault.op, ast.Not | ast.USub):
-        yield fault.operand
+        return fault.operand
     elif isinstance(fault, ast.If | ast.While | ast.IfExp):
         fault.test = ast.UnaryOp(ast.Not(), fault.test)
-        yield fault
     elif isinstance(fault, ast.Constant) and type(fault.value) in (int, float):
-        fault.value = (
-            fault.value * 100.0
-            if isinstance(fault.value, float) and fault.value
-            else fault.value + 1
-        )
-        yield fault
+        is_real = isinstance(fault.value, float) and fault.value
+        fault.value = fault.value * 100.0 if is_real else fault.value + 1
+    else:
+        return None
+    return fault
 
 
 class Plant(ast.NodeTransformer):
@@ -93,7 +85,7 @@ class Plant(ast.NodeTransformer):
             and not node.col_offset
         ):
             return node
-        for fault in changed(node):
+        if fault := changed(node):
             line = getattr(node, "lineno", 0)
             self.found.append((line, f"{shown(node)}  ->  {shown(fault)}", self._around(node)))
             if len(self.found) - 1 == self.index:
@@ -125,52 +117,41 @@ def is_told(one: dict[str, str], fault: tuple[int, str, str], lines: list[str]) 
     return one["fault"] == text and one["part"] in (around or lines[line - 1])
 
 
-class PlainCore:
-    """For pytest: what is compiled is that of the plain sources here, which no fault changes."""
+def pytest_configure() -> None:
+    """As a plugin, before tests are imported: what is compiled is that of the plain sources here,
+    which no fault changes."""
+    from rockcheck.scenes import compiled
 
-    def pytest_configure(self) -> None:
-        """Before tests are imported, and with them what is compiled."""
-        from rockcheck.scenes import compiled
-
-        kept = compiled._cache_folder
-        compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
+    kept = compiled._cache_folder
+    compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
 
 
 def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
-    """Whether all tests pass with this source; what hangs is noticed. In a process that begins with
-    the libraries loaded."""
+    """Whether all tests pass with this source; what hangs is noticed."""
     path = tree / "rockcheck" / name
     plain = path.read_text(encoding="utf-8")
-    child = os.fork()
-    if child == 0:
-        try:
-            signal.setitimer(signal.ITIMER_PROF, SECONDS)
-            signal.alarm(20 * SECONDS)
-            os.environ["NUMBA_DISABLE_JIT"] = str(int(name not in COMPILED))
-            sys.modules["numba"].config.reload_config()
-            path.write_text(source, encoding="utf-8")
-            quiet = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(quiet, 1)
-            os.dup2(quiet, 2)
-            import pytest
-
-            words = [
-                "-x",
-                "-q",
-                "-p",
-                "no:cacheprovider",
-                "-m",
-                "not slow and not browser",
-                *arguments,
-            ]
-            code = int(pytest.main(words, plugins=[PlainCore()] if name in COMPILED else []))
-        except BaseException:
-            code = 9
-        finally:
-            os._exit(code)
-    _, status = os.waitpid(child, 0)
-    path.write_text(plain, encoding="utf-8")
-    return status == 0
+    path.write_text(source, encoding="utf-8")
+    words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]
+    plugin = ["-p", "mutation"] if name in COMPILED else []
+    environment = {
+        "PYTHONPATH": os.pathsep.join((str(tree), str(ROOT / "tests"))),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "NUMBA_DISABLE_JIT": str(int(name not in COMPILED)),
+    }
+    try:
+        return not subprocess.run(
+            [sys.executable, "-P", "-m", "pytest", *plugin, *words],
+            cwd=ROOT,
+            env=os.environ | environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=20 * SECONDS,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
+        ).returncode
+    except subprocess.TimeoutExpired:
+        return False
+    finally:
+        path.write_text(plain, encoding="utf-8")
 
 
 def main() -> None:
@@ -181,19 +162,12 @@ def main() -> None:
     parser.add_argument("--file", action="append")
     parser.add_argument("pytest", nargs="*")
     asked = parser.parse_args()
-    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
-    sys.dont_write_bytecode = True
-    os.chdir(ROOT)
     killed = total = 0
     with tempfile.TemporaryDirectory() as folder:
         tree = Path(folder)
         shutil.copytree(
             ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__")
         )
-        sys.path.insert(0, folder)
-        os.environ["PYTHONPATH"] = folder
-        for library in ("numba", "pandas", "pydantic", "scipy.integrate", "scipy.stats"):
-            importlib.import_module(library)  # once for all children
         for target in DATA["target"]:
             name, tests = target["file"], target["tests"]
             if asked.file and not any(part in name for part in asked.file):

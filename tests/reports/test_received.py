@@ -3,7 +3,9 @@ anything but text."""
 
 import json
 import os
+import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,12 +18,12 @@ from rockcheck.validation.suite.results import RUN_FILE, Run
 
 
 @pytest.fixture
-def received(tmp_path: Path, run_folder: Path) -> Path:
+def received(tmp_path: Path, site: Path) -> Path:
     """The run as it was sent: run.json and the histories."""
     folder = tmp_path / "received"
     folder.mkdir()
-    shutil.copy(run_folder / RUN_FILE, folder)
-    shutil.copytree(run_folder / HISTORIES, folder / HISTORIES)
+    shutil.copy(site / RUN_FILE, folder)
+    shutil.copytree(site / HISTORIES, folder / HISTORIES)
     return folder
 
 
@@ -35,26 +37,14 @@ def published(folder: Path) -> None:
 def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> None:
     """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
     pipe."""
-    shutil.copytree(received, tmp_path / "whole")
-    published(tmp_path / "whole")
-    written = [
-        path.relative_to(tmp_path / "whole")
-        for path in (tmp_path / "whole").rglob("*")
-        if path.is_file()
-    ]
-    written = [name for name in written if name.parts[0] not in (HISTORIES, RUN_FILE, LOCK)]
+    whole = tmp_path / "whole"
+    shutil.copytree(received, whole)
+    published(whole)
+    names = [path.relative_to(whole) for path in whole.rglob("*") if path.is_file()]
+    written = [name for name in names if name.parts[0] not in (HISTORIES, RUN_FILE, LOCK)]
     assert len(written) > 40
-    assert {name.suffix for name in written} >= {
-        ".csv",
-        ".xml",
-        ".md",
-        ".html",
-        ".js",
-        ".svg",
-        ".css",
-        ".toml",
-        ".json",
-    }
+    suffixes = {".csv", ".xml", ".md", ".html", ".js", ".svg", ".css", ".toml", ".json"}
+    assert {name.suffix for name in written} >= suffixes
     victim = tmp_path / "victim"
     victim.write_text("mine")
     for number, name in enumerate(written):
@@ -69,46 +59,46 @@ def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> 
     ]
 
 
+PARTS = ("pages", "pages/assets", "pages/figures", "pages/data", "pages/scene-files", LOCK)
+
+
 @pytest.mark.parametrize(
-    "part", ["pages", "pages/assets", "pages/figures", "pages/data", "pages/scene-files", LOCK]
+    ("part", "write"),
+    [*((part, published) for part in PARTS), ("histories", Store), ("comparisons", Store)],
 )
-def test_no_folder_of_a_run_is_written_through(tmp_path: Path, received: Path, part: str) -> None:
+def test_no_folder_of_a_run_is_written_through(
+    tmp_path: Path, received: Path, part: str, write: Callable[[Path], object]
+) -> None:
     (tmp_path / "elsewhere").mkdir()
-    (received / part).parent.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(received / part, ignore_errors=True)
+    (received / part).parent.mkdir(exist_ok=True)
     (received / part).symlink_to(tmp_path / "elsewhere")
     with pytest.raises(InputError, match=f"{part}: a link"):
-        published(received)
+        write(received)
     assert not list((tmp_path / "elsewhere").iterdir())
 
 
-@pytest.mark.parametrize("part", ["histories", "comparisons"])
-def test_no_folder_of_kept_results_is_a_link(tmp_path: Path, part: str) -> None:
-    (tmp_path / "elsewhere").mkdir()
-    folder = tmp_path / "run"
-    folder.mkdir()
-    (folder / part).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match=f"{part}: a link"):
-        Store(folder)
+TRAPS = {
+    "a pipe": lambda path, kept: os.mkfifo(path),
+    "a link out": lambda path, kept: path.symlink_to(kept),
+    "a folder": lambda path, kept: path.mkdir(),
+}
 
 
 @pytest.mark.needs("POSIX")
-@pytest.mark.parametrize("trap", ["a pipe", "a link out", "a folder"])
+@pytest.mark.parametrize("trap", TRAPS)
 @pytest.mark.parametrize("suffix", [".json", ".csv.gz", ".events.csv.gz"])
 def test_a_kept_result_that_is_no_file_of_the_folder_is_none(
     tmp_path: Path, trap: str, suffix: str
 ) -> None:
     """It is neither read nor waited for; what takes its place is written beside, not through it."""
-    store = Store(tmp_path / "run")
+    store, kept = Store(tmp_path / "run"), tmp_path / "kept"
     files = {".csv.gz": b"1", ".events.csv.gz": b"2"}
     store.put("a", files, {"n": 1})
-    assert store.get("a") == {"n": 1}
     path = tmp_path / "run" / HISTORIES / f"a{suffix}"
-    kept = tmp_path / "kept"
     path.rename(kept)
     before = kept.read_bytes(), kept.stat().st_mtime_ns
-    {"a pipe": os.mkfifo, "a link out": lambda one: one.symlink_to(kept), "a folder": Path.mkdir}[
-        trap
-    ](path)
+    TRAPS[trap](path, kept)
     assert store.get("a") is None
     if trap != "a folder":
         store.put("a", files, {"n": 1})
@@ -136,10 +126,7 @@ def test_a_run_that_names_what_it_has_not_is_bad_input(
     received: Path, change: dict[str, object], said: str, refused
 ) -> None:
     changed(received, **change)
-    told = refused("report", str(received))
-    assert len(told.splitlines()) == 1
-    assert RUN_FILE in told
-    assert said in told
+    assert re.search(f"{RUN_FILE}.*{said}", refused("report", str(received)))
 
 
 @pytest.mark.parametrize("signs", ["\u202e\u2067\x9b", "\ud800"])

@@ -1,13 +1,13 @@
 """Pages of a finished run: complete, escaped, offline; the scene file plays the same scene; figures
 are reproducible."""
 
+import html
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from rockcheck.commands.cli import main
@@ -16,131 +16,84 @@ from rockcheck.reports.show.words import number
 from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, overrun, worst_first
 from rockcheck.reports.view import slugs_of
-from rockcheck.scenes import (
-    History,
-    InputError,
-)
+from rockcheck.scenes import History, InputError
 from rockcheck.validation.suite.results import Run
 
 
-class Addresses(HTMLParser):
-    """All addresses that a page asks for or links to, and its visible words."""
+def addresses(text: str) -> list[str]:
+    """All that a page asks for or links to, but for what it holds itself."""
+    found = map(html.unescape, re.findall(r'\b(?:href|src)="([^"]+)"', text))
+    return [address for address in found if not address.startswith(("#", "data:"))]
 
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.found: list[str] = []
-        self.words: list[str] = []
-        self.feed(text)
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found += [value for name, value in attrs if name in ("href", "src") and value]
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
+def text_of(page: str) -> str:
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page)).split())
 
 
 def pages_of(site: Path) -> list[Path]:
     return [site / "index.html", *sorted((site / PAGES).glob("*.html"))]
 
 
-def test_every_scene_has_a_page(site: Path) -> None:
-    assert [page.stem for page in pages_of(site)] == [
-        "index",
-        "Free-2",
-        "beside-a-wall",
-        "crowd",
-        "free",
-    ]
-
-
-def test_every_address_is_a_file_of_the_folder(site: Path) -> None:
-    for name in ("checks.csv", "figures.csv"):  # validation writes them beside the pages
-        (site / name).touch()
-    for page in pages_of(site):
-        for address in Addresses(page.read_text(encoding="utf-8")).found:
-            if address.startswith(("#", "data:")):
-                continue
-            parts = urlsplit(address)
-            assert not parts.scheme, f"{page.name} asks for {address}"
-            assert not parts.netloc, f"{page.name} asks for {address}"
-            target = (page.parent / parts.path).resolve()
-            assert target.is_relative_to(site.resolve()), address
-            assert target.exists(), f"{page.name} asks for {address}"
+def test_every_scene_has_a_page_and_every_address_is_a_file_of_the_folder(site: Path) -> None:
+    pages = pages_of(site)
+    assert [page.stem for page in pages] == ["index", "Free-2", "beside-a-wall", "crowd", "free"]
+    for page in pages:
+        for address in addresses(page.read_text(encoding="utf-8")):
+            target = (page.parent / address.partition("#")[0]).resolve()
+            assert target.is_relative_to(site.resolve()), f"{page.name} asks for {address}"
+            assert target.is_file(), f"{page.name} asks for {address}"
 
 
 def test_hostile_text_stays_text(site: Path) -> None:
     for page in pages_of(site):
-        read = Addresses(page.read_text(encoding="utf-8"))
-        assert "x" not in read.found
-        assert any("<img src=x onerror=alert(1)>&\"'</script>" in words for words in read.words), (
-            page.name
-        )
+        text = page.read_text(encoding="utf-8")
+        assert "<img src=x" not in text
+        assert "<img src=x onerror=alert(1)>&\"'</script>" in text_of(text), page.name
     for script in (site / PAGES / "data").glob("*.js"):
         assert "<" not in script.read_text(encoding="utf-8")
 
 
-def test_index_lists_what_is_wrong_worst_first(site: Path) -> None:
-    run = Run.load(site)
-    order = [
-        ("error", cell.model) if check is None else (check.verdict, overrun(check))
-        for cell, check in worst_first(run)
-    ]
-    assert order[0] == ("error", "mujoco")
-    failing = [value for verdict, value in order if verdict == "fail"]
-    assert failing == sorted(failing, reverse=True)
-    assert len(failing) == sum(check.verdict == "fail" for _, check in run.checks()) > 0
-    assert [verdict for verdict, _ in order] == sorted(
-        (v for v, _ in order), key=["error", "fail", "changed"].index
-    )
-    index = (site / "index.html").read_text(encoding="utf-8")
+def test_index_lists_what_is_wrong_worst_first(run: Run, index: str) -> None:
+    first, second, *rest = worst_first(run)
+    assert [(cell.model, check) for cell, check in (first, second)] == [("mujoco", None)] * 2
+    order = [(check.verdict != "fail", -overrun(check)) for _, check in rest]
+    assert order == sorted(order)
+    wrong = [check.verdict for _, check in run.checks() if check.verdict in ("fail", "changed")]
+    assert sorted(check.verdict for _, check in rest) == sorted(wrong)
+    assert {*wrong} == {"fail", "changed"}
     assert "A model failed" in index
     assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
 
 
-def test_index_says_how_far_each_model_is(site: Path) -> None:
-    run = Run.load(site)
+def test_index_says_how_far_each_model_is(run: Run, index: str) -> None:
     rows = {scene: dict(zip(run.models, row, strict=True)) for scene, row in matrix(run).items()}
     assert set(rows) == set(run.scenes)
-    late = rows["beside a wall"]["mine:Model"]
+    late, falling = rows["beside a wall"]["mine:Model"], rows["Free"]["ebm"]
     assert (late["rms"].window, late["rms"].value) == ("8s", pytest.approx(0.006))
     assert late["used"] == pytest.approx(3.0)
     assert rows["free"]["mine:Model"] is None
-    falling = rows["Free"]["ebm"]
-    assert not falling["why_apart"]
-    assert falling["apart"] == (
-        run.cell("Free", "ebm").outcome != run.cell("Free", "ebm-unilateral").outcome
-    )
-    index = (site / "index.html").read_text(encoding="utf-8")
+    outcomes = {run.cell("Free", model).outcome for model in ("ebm", "ebm-unilateral")}
+    assert (falling["why_apart"], falling["apart"]) == ("", len(outcomes) > 1)
     assert '<tr data-scene="beside a wall" data-worst="3">' in index
     assert '<tr data-scene="Free" data-worst="1e+09">' in index, "a model has no history of it"
 
 
-def test_index_answers_three_questions_first(site: Path) -> None:
-    run = Run.load(site)
+def test_index_answers_three_questions_first(run: Run, index: str) -> None:
     found = glance(run, matrix(run))
     farthest = found["farthest"]["cell"]
     assert (farthest.scene, farthest.model) == ("beside a wall", "mine:Model")
     assert [scene for scene, _ in found["apart"]] == [
         scene for scene, row in matrix(run).items() if any(one and one["apart"] for one in row)
     ]
-    accepted = [check for _, check in run.checks() if check.expected is not None]
-    assert found["judged"] == len(accepted)
-    assert len(found["changed"]) == sum(check.verdict != "pass" for check in accepted) > 0
+    verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
     shares = [overrun(check) for _, check in found["changed"]]
     assert shares == sorted(shares, reverse=True)
-    index = (site / "index.html").read_text(encoding="utf-8")
-    told = " ".join(
-        " ".join(
-            Addresses(index.partition('<dl class="glance"')[2].partition("</dl>")[0]).words
-        ).split()
-    )
-    assert (
-        "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at" in told
-    )
-    assert f"{len(found['changed'])} of {found['judged']} figures" in told
-    assert (
-        index.index('<dl class="glance"') < index.index("Not within") < index.index('id="matrix"')
-    )
+    assert (found["judged"], len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
+    at_a_glance, after = re.search('<dl class="glance"(.*?)</dl>(.*)', index, re.DOTALL).groups()
+    far = "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at"
+    assert far in text_of(at_a_glance)
+    assert f"{len(shares)} of {len(verdicts)} figures" in text_of(at_a_glance)
+    assert after.index("Not within") < after.index('id="matrix"')
 
 
 def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished: Run) -> None:
@@ -165,13 +118,16 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished:
     }
     finished.model_copy(update=alone).save(tmp_path)
     index = write_site(tmp_path).read_text(encoding="utf-8")
-    assert "No tolerance yet" in index
-    assert f"{sum(len(cell.checks) for cell in cells)} figures have no tolerance yet" in index
-    assert "rockcheck accept" in index
-    assert "out of tolerance</span>" not in index, "what waits for a tolerance has not failed"
+    for said in (
+        "No tolerance yet",
+        f"{sum(len(cell.checks) for cell in cells)} figures have no tolerance yet",
+        "rockcheck accept",
+        'data-verdict="no-tolerance"',
+        'class="banner changed"',  # it has a state of its own, and is not red
+    ):
+        assert said in index
     assert index.count("no tolerance yet</span>") >= len(cells) - 1
-    assert 'data-verdict="no-tolerance"' in index
-    assert 'class="banner changed"' in index, "it has a state of its own, and is not red"
+    assert "out of tolerance</span>" not in index, "what waits for a tolerance has not failed"
     assert "Not within tolerance" not in index, "what waits is counted, not listed"
 
 
@@ -202,6 +158,13 @@ def files_of(site: Path) -> dict[str, tuple[int, bytes]]:
 def test_only_what_would_show_something_else_is_written_again(
     tmp_path: Path, site: Path, finished: Run
 ) -> None:
+    """And the pages of scenes that are gone go."""
+
+    def again(**change: object) -> dict[str, tuple[int, bytes]]:
+        finished.model_copy(update=change).save(tmp_path)
+        write_site(tmp_path, afresh=False)
+        return files_of(tmp_path)
+
     write_site(tmp_path, jobs=2)
     first = files_of(tmp_path)
     assert {name: content for name, (_, content) in first.items()} == {
@@ -209,22 +172,30 @@ def test_only_what_would_show_something_else_is_written_again(
     }
 
     cells = tuple(cell.model_copy(update={"read_back": True}) for cell in finished.cells)
-    finished.model_copy(
-        update={"created": "2026-01-02T00:00:00+00:00", "wall_seconds": 1.0, "cells": cells}
-    ).save(tmp_path)
-    write_site(tmp_path, afresh=False)
-    assert files_of(tmp_path) == first
+    assert again(created="2026-01-02T00:00:00+00:00", wall_seconds=1.0, cells=cells) == first
     assert "2026-01-02" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
     slower = finished.cells[0].model_copy(
         update={"cost": replace(finished.cells[0].cost, wall_seconds=9.0)}
     )
-    finished.model_copy(update={"cells": (slower, *finished.cells[1:])}).save(tmp_path)
-    write_site(tmp_path, afresh=False)
-    again = files_of(tmp_path)
-    assert again.keys() == first.keys()
-    assert {name for name in first if again[name][1] != first[name][1]} == {"free.html"}
-    assert all(again[name] == first[name] for name in first if "beside-a-wall" in name)
+    second = again(cells=(slower, *finished.cells[1:]))
+    assert second.keys() == first.keys()
+    assert {name for name in first if second[name][1] != first[name][1]} == {"free.html"}
+    assert all(second[name] == first[name] for name in first if "beside-a-wall" in name)
+
+    (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
+    left = again(
+        scenes={"free": finished.scenes["free"]}, cells=finished.of_scene("free"), ensembles=()
+    )
+    assert sorted(left) == [
+        "data/free.js",
+        *(
+            f"figures/{name}"
+            for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")
+        ),
+        "free.html",
+        "scene-files/free.toml",
+    ]
 
 
 @pytest.mark.long
@@ -235,10 +206,10 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
     pages."""
     monkeypatch.setattr("rockcheck.reports.site.shown", lambda run: ("free",))
     index = write_site(tmp_path).read_text(encoding="utf-8")
-    assert f"1 of {len(finished.scenes)} scenes have a page" in index
+    assert "1 of 3 scenes have a page" in index
     assert "rockcheck report DIR --scene NAME" in index
     scenes = {f"pages/{slug}.html": name for name, slug in slugs_of(finished.scenes).items()}
-    linked = set(Addresses(index).found) & scenes.keys()
+    linked = set(addresses(index)) & scenes.keys()
     assert {scenes[one] for one in linked} == {"free"}
     assert re.findall('data-scene="(.*?)"', index) == ["free"]
 
@@ -250,16 +221,9 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
 
 def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) -> None:
     """No suite makes such a run, but a file may say so."""
-    finished.model_copy(
-        update={
-            "scenes": {
-                **finished.scenes,
-                "nobody's": {**finished.scenes["free"], "name": "nobody's"},
-            }
-        }
-    ).save(tmp_path)
-    index = write_site(tmp_path).read_text(encoding="utf-8")
-    assert f"{len(finished.scenes)} of {len(finished.scenes) + 1} scenes have a page" in index
+    nobodys = {"nobody's": {**finished.scenes["free"], "name": "nobody's"}}
+    finished.model_copy(update={"scenes": finished.scenes | nobodys}).save(tmp_path)
+    assert "3 of 4 scenes have a page" in write_site(tmp_path).read_text(encoding="utf-8")
     assert not (tmp_path / PAGES / "nobody-s.html").exists()
 
 
@@ -276,20 +240,19 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     assert not list((tmp_path / PAGES / "figures").glob("free.*"))
     assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
     assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
-    assert "rockcheck report DIR --scene free -o free.pdf" in (
-        tmp_path / PAGES / "free.html"
-    ).read_text(encoding="utf-8")
-    for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
-        assert (
-            main(["report", str(tmp_path), "--scene", "free", "-o", str(tmp_path / f"one{ending}")])
-            == 0
-        )
-        assert (tmp_path / f"one{ending}").read_bytes().startswith(begins)
-    assert (tmp_path / "one.svg").read_bytes() == drawn
-    assert (
-        main(["report", str(tmp_path), "--scene", "crowd", "-o", str(tmp_path / "crowd.svg")]) == 0
-    )
-    for words, said in (
+    page = (tmp_path / PAGES / "free.html").read_text(encoding="utf-8")
+    assert "rockcheck report DIR --scene free -o free.pdf" in page
+    for name, ending, begins in (
+        ("free", ".svg", b"<?xml"),
+        ("free", ".png", b"\x89PNG"),
+        ("free", ".pdf", b"%PDF"),
+        ("crowd", ".svg", b"<?xml"),
+    ):
+        path = tmp_path / f"{name}{ending}"
+        assert main(["report", str(tmp_path), "--scene", name, "-o", str(path)]) == 0
+        assert path.read_bytes().startswith(begins)
+    assert (tmp_path / "free.svg").read_bytes() == drawn
+    for asked, said in (
         (
             ["--scene", "nowhere", "-o", "one.pdf"],
             "unknown scene of the run 'nowhere'; allowed: Free, beside a wall, crowd, free",
@@ -300,51 +263,34 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
         ),
         (["--scene", "free", "-o", "none/free.svg"], "--output: none: no such folder"),
     ):
-        assert said in refused("report", str(tmp_path), *words)
+        assert said in refused("report", str(tmp_path), *asked)
 
 
-def test_an_ensemble_is_shown_by_its_distributions(site: Path) -> None:
-    run = Run.load(site)
+def test_an_ensemble_is_shown_by_its_distributions(site: Path, run: Run) -> None:
     (record,) = run.ensembles
-    found = EnsembleView(run, "crowd", "crowd", record).page()
-    (row,) = found.table("data/crowd-against-ebm-unilateral").records()
+    view = EnsembleView(run, "crowd", "crowd", record)
+    (row,) = view.page().table("data/crowd-against-ebm-unilateral").records()
     reference, other = (np.array(record.peaks[m]) > 1.0 for m in ("ebm-unilateral", "cm"))
-    falls = [row[f"{who} fall{s}"] for who, s in (("both", ""), ("only the reference", "s"))]
-    assert falls == [np.sum(reference & other), np.sum(reference & ~other)]
-    assert sum(falls) + row["only the model falls"] + row["both stay"] == 40
+    counts = {
+        "both fall": reference & other,
+        "only the reference falls": reference & ~other,
+        "only the model falls": ~reference & other,
+        "both stay": ~reference & ~other,
+    }
+    assert {name: row[name] for name in counts} == {k: np.sum(v) for k, v in counts.items()}
     figures = {f.measure: f.value for f in run.cell("crowd", "cm").figures}
     assert row["peak_bias"] == figures["peak_bias"]
-    words = " ".join(Addresses((site / PAGES / "crowd.html").read_text(encoding="utf-8")).words)
-    for said in (
-        "uniform 0.3 to 0.8",
-        "lognormal, median 6, σ 0.4",
-        "p = ",
-        number(row["peak_scatter"]),
-    ):
-        assert said in words, said
-    rows = (site / PAGES / "data" / "crowd.csv").read_text(encoding="utf-8").splitlines()
+    page = text_of((site / PAGES / "crowd.html").read_text(encoding="utf-8"))
+    drawn = ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "p = ")
+    assert [said for said in (*drawn, number(row["peak_scatter"])) if said not in page] == []
+    rows = pd.read_csv(site / PAGES / "data" / "crowd.csv")
     names = [f"{what} {m}" for m in record.peaks for what in ("peak_rotation_alpha", "outcome")]
-    assert rows[0] == ",".join(["scene", *names])
-    assert len(rows) == 41
-    assert float(rows[1].split(",")[1]) == record.peaks["ebm-unilateral"][0]
-
-
-def test_pages_of_scenes_that_are_gone_go(tmp_path: Path, finished: Run) -> None:
-    write_site(tmp_path)
-    (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
-    left = {
-        "scenes": {"free": finished.scenes["free"]},
-        "cells": finished.of_scene("free"),
-        "ensembles": (),
-    }
-    finished.model_copy(update=left).save(tmp_path)
-    write_site(tmp_path, afresh=False)
-    assert sorted(files_of(tmp_path)) == [
-        "data/free.js",
-        *(
-            f"figures/{name}"
-            for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")
-        ),
-        "free.html",
-        "scene-files/free.toml",
-    ]
+    assert list(rows.columns) == ["scene", *names]
+    expected = np.array(record.peaks["ebm-unilateral"])
+    np.testing.assert_array_equal(rows["peak_rotation_alpha ebm-unilateral"], expected)
+    above, below = view.distributions().panels
+    curve = next(one for one in above.series if one.label == "CM")
+    sample = view.samples["cm"]
+    shares = [np.mean((sample.peaks <= peak) & ~sample.fallen) for peak in curve.x]
+    np.testing.assert_allclose(curve.y, shares, atol=1e-12)
+    assert np.max(np.abs(below.series[0].y)) == pytest.approx(figures["ks_distance"], abs=1e-12)

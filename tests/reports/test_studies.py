@@ -1,33 +1,50 @@
-"""The pages of the studies, made of made-up figures, in a real browser."""
+"""The pages of the studies, made of made-up figures, in a real browser: hover, click, keys,
+accessibility, a phone."""
 
+import re
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
+from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
+from rockcheck.reports.show.spectrum import COLOURS
 from rockcheck.validation.execute.pool import Failure as Lost
 from rockcheck.validation.finding import (
     Axis,
+    Block,
     Column,
     Finding,
+    Made,
     Mark,
-    Panel,
+    Panel as Curves,
     Plot,
     Series,
     Table,
     Text,
     text,
 )
+from rockcheck.validation.paper import Panel, paper_panels
+from rockcheck.validation.studies.population.study import blocks_of, lines_of
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
 from rockcheck.validation.studies.work_precision.timings import Saving
+from rockcheck.validation.uncertainty.population import curve_of
 
 pytestmark = pytest.mark.browser
-
+SIZE = 20
+MADE = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
+FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
 PHONE = {"viewport": {"width": 390, "height": 800}}
+Opened = Callable[..., playwright.Page]
 
 
-def benchmark_page(folder: Path) -> Path:
+def benchmark() -> Finding:
     lines = (
         ("ebm", 1e-6, 1e-6, 1e-5),
         ("ebm", 1e-8, 1e-8, 2e-5),
@@ -61,10 +78,10 @@ def benchmark_page(folder: Path) -> Path:
     }
     done[Play("free", 0, "pybullet", 1e-2)] = Lost("it blew up")
     done[Measure("saving", "made")] = [Saving("cm", "wall", "ms", 2.0, 1.0)]
-    return publish(WorkPrecision().gather(done), folder)
+    return WorkPrecision().gather(done)
 
 
-def marked_page(folder: Path) -> Path:
+def marked() -> Finding:
     """What the benchmark's page has none of: verdicts, links, folded blocks, failures, a curve to
     be read."""
     rows = [
@@ -72,7 +89,7 @@ def marked_page(folder: Path) -> Path:
         ["b", "cm", Mark(2.0, "fail", "too long", link="run.json")],
     ]
     columns = [text("name"), Column("model", kind="model"), Column("x", "length", "m")]
-    curve = Panel(
+    curve = Curves(
         "",
         [
             Series("a", [1.0, 2.0], [3.0, None], [2.0, None], [4.0, None]),
@@ -84,33 +101,76 @@ def marked_page(folder: Path) -> Path:
         Table("rows", columns, rows, "Rows", "A note.", folded=True),
         Plot("curve", "Curves", panels=[curve], x=Axis("t, s"), y=Axis("x, m"), live=True),
     ]
-    return publish(
-        Finding(
-            "made", "Made up", "It fails.", blocks, verdict="fail", failures={"a": "it blew up"}
-        ),
-        folder,
-    )
+    lost = {"a": "it blew up"}
+    return Finding("made", "Made up", "It fails.", blocks, verdict="fail", failures=lost)
 
 
+def found(blocks: list[Block]) -> Finding:
+    return Finding("made", "Made up", "20 records.", blocks, made=MADE)
+
+
+def fragility() -> Finding:
+    level = np.linspace(0.5, 5.0, 10)
+    fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
+    curves = [
+        curve_of(label, fell, np.zeros_like(fell), level)
+        for label in ("with the wall", "without a wall")
+    ]
+    other = {"per_unit": 0.2, "other_unit": "g", "other_label": "peak acceleration, g"}
+    return found(blocks_of(curves, Column("intensity", "peak acceleration / (g tan α)"), other))
+
+
+def ida() -> Finding:
+    level = np.linspace(0.1, 1.0, 10)
+    peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
+    peaks[peaks > 0.7] = np.inf
+    records = [f"r{k}" for k in range(4)]
+    return found(lines_of(records, peaks, level, Column("intensity", "PGA", "g")))
+
+
+def spectra(letters: str, *panels: Panel) -> Finding:
+    """Spectra whose outcomes are made up; their histories are the model's own."""
+    study = Spectra(panels, Request(SIZE))
+    done = {
+        task: Played(letters) if task.what == "outcomes" else study.play(task)
+        for task in study.tasks({})
+    }
+    return replace(study.gather(done), made=MADE)
+
+
+def figure_8() -> Finding:
+    """Safe up to the sixth amplitude, overturned right from there on; one node is undecided."""
+    return spectra("U" + "S" * (6 * SIZE - 1) + "R" * (SIZE - 6) * SIZE, *paper_panels(8))
+
+
+#: What makes a study's finding, and words of its page.
 STUDIES = {
-    "benchmark": (benchmark_page, "What does not converge"),
-    "marked": (marked_page, "no mode is consistent"),
+    "benchmark": (benchmark, "What does not converge"),
+    "marked": (marked, "no mode is consistent"),
+    "spectra": (figure_8, "no wall: overturned clockwise"),
+    "fragility": (fragility, "with the wall"),
+    "ida": (ida, "PGA"),
 }
 
 
 @pytest.fixture(scope="module")
 def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("studies")
-    for name, (write, _) in STUDIES.items():
+    for name, (make, _) in STUDIES.items():
         (folder / name).mkdir()
-        write(folder / name).rename(folder / name / "index.html")
+        publish(make(), folder / name).rename(folder / name / "index.html")
     return folder
 
 
+@pytest.fixture
+def visit(opened: Opened, studies: Path) -> Opened:
+    return lambda name, **settings: opened(studies / name / "index.html", studies, **settings)
+
+
 @pytest.mark.parametrize("name", STUDIES)
-def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(opened, studies, name):
+def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visit: Opened, name: str) -> None:
     for settings in ({}, PHONE, PHONE | {"color_scheme": "dark"}):
-        page = opened(studies / name / "index.html", studies, **settings)
+        page = visit(name, **settings)
         assert page.locator("h1").count() == 1
         assert STUDIES[name][1] in page.locator("main").inner_text()
         page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
@@ -120,6 +180,121 @@ def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(opened, studies, na
 @pytest.mark.long
 @pytest.mark.parametrize("name", STUDIES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_accessible(opened, barriers, studies, name, scheme):
-    address = studies / name / "index.html"
-    assert barriers(opened(address, color_scheme=scheme, bypass_csp=True)) == []
+def test_accessible(visit: Opened, barriers, name: str, scheme: str) -> None:
+    page = visit(name, color_scheme=scheme, bypass_csp=True)
+    if name == "spectra":
+        page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
+        playwright.expect(page.locator(".played")).to_be_visible()
+    assert barriers(page) == []
+
+
+def place_of_node(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
+    canvas = page.locator(".panel canvas").nth(panel)
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    across = (column + 0.5) / SIZE * (box["width"] - 48.0)
+    down = (1.0 - (row + 0.5) / SIZE) * (box["height"] - 30.0)
+    return box["x"] + 42.0 + across, box["y"] + 4.0 + down
+
+
+def test_the_panels_stand_as_in_the_paper_and_are_painted(visit: Opened) -> None:
+    page = visit("spectra")
+    assert page.locator(".panel h3").all_inner_texts() == [panel.title for panel in paper_panels(8)]
+    outcomes = [
+        "safe",
+        "no wall: overturned clockwise",
+        "overturned; no wall: counterclockwise",
+        "undecided",
+    ]
+    assert page.locator(".key.outcomes span").all_inner_texts() == outcomes
+    colours = """([panel, nodes]) => {
+        const c = document.querySelectorAll('.panel canvas')[panel], r = devicePixelRatio;
+        const w = c.clientWidth - 48, h = c.clientHeight - 30;
+        const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        return nodes.map(([i, j]) => {
+            const place = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h];
+            const [x, y] = place.map(pixels => Math.round(r * pixels));
+            const hex = k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0');
+            return '#' + [0, 1, 2].map(hex).join('');
+        });
+    }"""
+    free = page.evaluate(colours, [0, [[3, 9], [9, 9], [0, 0]]])
+    assert free == [COLOURS["safe"], COLOURS["clockwise"], COLOURS["undecided"]]
+    assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [COLOURS["safe"], COLOURS["overturned"]]
+
+
+def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit: Opened) -> None:
+    page = visit("spectra")
+    page.mouse.move(*place_of_node(page, 3, 10, 7))
+    said = page.locator("output.node").inner_text()
+    assert said.startswith(
+        f"ωₚ/p {FREQUENCIES[7]:.3g}, aₚ / (g tan α) {AMPLITUDES[10]:.3g}: a pulse of "
+    )
+    told = page.locator(".panel .said")
+    assert told.all_inner_texts() == ["overturned clockwise", *["overturned"] * 6]
+    page.mouse.move(*place_of_node(page, 3, 2, 7))
+    assert told.all_inner_texts() == ["safe"] * 7
+    for key in ("ArrowUp", "ArrowRight"):
+        page.locator(".panel canvas").nth(1).press(key)
+    assert page.evaluate("rockcheckFigures['figure-8'].store.node") == [3, 8]
+    page.keyboard.press("Enter")
+    playwright.expect(page.locator(".played")).to_be_visible()
+
+
+def test_ones_own_block_is_told_in_hertz_and_g(opened: Opened, tmp_path: Path) -> None:
+    panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
+    page = opened(publish(spectra("S" * SIZE**2, panel), tmp_path))
+    assert page.locator(".key.outcomes span").all_inner_texts() == [
+        "safe",
+        "overturned",
+        "undecided",
+        "★ the scene's own pulse",
+    ]  # it is beside a wall
+    page.evaluate("Object.values(rockcheckFigures)[0].point([4, 7])")
+    said = page.locator("output.node").inner_text()
+    shown = map(float, re.search(r"a pulse of ([\d.]+) g .*, ([\d.]+) Hz", said).groups())
+    g = AMPLITUDES[4] * panel.scene.gravity / 9.80665 * panel.scene.block.slope
+    hertz = FREQUENCIES[7] * panel.scene.frequency_parameter / (2.0 * np.pi)
+    assert list(shown) == pytest.approx([g, hertz], rel=0.01)
+
+
+def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit: Opened, eventually) -> None:
+    page = visit("spectra")
+    page.mouse.click(*place_of_node(page, 0, 7, 7))
+    playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
+    row, column = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
+    assert 6 <= row <= 8
+    assert 6 <= column <= 8
+    start = page.evaluate("rockcheckPlayer.store.time")
+    eventually(page, f"rockcheckPlayer.store.time > {start + 0.2}")
+    page.get_by_role("button", name="Pause").click()
+    page.mouse.click(*place_of_node(page, 4, 1, 1))
+    playwright.expect(page.locator(".played figcaption")).to_contain_text("Gap 53 mm, e = 1")
+    assert page.locator(".played").count() == 1
+    assert page.locator(".played svg .solid").count() >= 2  # the floor and the wall
+
+
+def test_fragility_is_read_under_the_pointer(visit: Opened) -> None:
+    page = visit("fragility")
+    assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
+    page.locator("[data-curves] .u-over").hover()
+    said = page.locator("[data-curves] output").inner_text()
+    across, in_g = re.fullmatch(
+        r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*",
+        said,
+        re.DOTALL,
+    ).groups()
+    cells = page.locator("table tbody tr").first.locator("td")
+    for plain, other in ((across, in_g), (cells.first.inner_text(), cells.last.inner_text())):
+        assert float(other) == pytest.approx(0.2 * float(plain), rel=0.01)
+    axes = page.evaluate("rockcheckCharts.fragility.axes.map(axis => [axis.scale, axis.label])")
+    assert axes[2] == ["x", "peak acceleration, g"]
+
+
+def test_the_lines_of_an_ida_are_named_under_the_pointer(visit: Opened) -> None:
+    page = visit("ida")
+    page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
+    said = page.locator('[data-curves="lines"] output').inner_text()
+    assert said.startswith("PGA, g ")
+    assert any(f"r{k} 0." in said or f"r{k}, reversed 0." in said for k in range(4))
+    assert "50 % " in said

@@ -1,6 +1,7 @@
 """Sets of recorded motions: which files are meant, which components shake a block, and which
 vertical one goes with them."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -32,14 +33,13 @@ def table(path, gain=1.0):
 
 def channels(path, **gains):
     """A file of several channels (CSMIP), each with its largest acceleration in m/s^2."""
-    text = ""
-    for name, gain in gains.items():
-        values = "".join(f"{100 * gain * a:10.4f}" for a in (0, 1, -1, 0, 0, 0, 0, 0))
-        text += (
-            f"Corrected data\nChan  1: {name}\n"
-            "    8 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n"
-            f"{values}\n"
-        )
+    text = "".join(
+        f"Corrected data\nChan  1: {name}\n"
+        "    8 points of accel data equally spaced at   .020 sec, in cm/sec2. (8f10.4)\n"
+        + "".join(f"{100 * gain * a:10.4f}" for a in (0, 1, -1, 0, 0, 0, 0, 0))
+        + "\n"
+        for name, gain in gains.items()
+    )
     path.write_text(text, encoding="utf-8")
     return path
 
@@ -69,13 +69,9 @@ def test_a_folder_means_its_files_and_a_pattern_those_that_fit(folder):
     ):
         with pytest.raises(InputError, match=said):
             files_of([word])
-
-
-def test_a_name_that_could_be_a_pattern_is_that_of_a_file_where_there_is_one(folder):
-    table(folder / "a1.csv")
-    assert list(files_of(["a[1].csv"])) == [Path("a1.csv")]
-    table(folder / "a[1].csv")
-    assert list(files_of(["a[1].csv"])) == [Path("a[1].csv")]
+    for name in ("a1.csv", "a[1].csv"):  # a name that could be a pattern
+        table(folder / name)
+        assert list(files_of(["a[1].csv"])) == [Path(name)]
 
 
 def test_vertical_components_are_left_out_unless_they_are_asked_for(folder):
@@ -265,10 +261,8 @@ def test_tables(text, options, samples, step, tmp_path):
 def test_what_is_not_known_is_asked_for(text, options, said, tmp_path):
     path = tmp_path / "motion.txt"
     path.write_text(text)
-    with pytest.raises(InputError) as fault:
+    with pytest.raises(InputError, match=re.escape(said)):
         read_record(path, Reading(**options))
-    assert said in str(fault.value)
-    assert str(fault.value).isprintable()
 
 
 @pytest.mark.parametrize(
@@ -280,22 +274,13 @@ def test_times_are_judged_by_their_digits(rate, decimals, tmp_path):
     path.write_text(
         "time_s,acceleration_g\n" + "".join(f"{n / rate:.{decimals}f},0.1\n" for n in range(1000))
     )
-    if 10.0**-decimals <= 0.5 / rate or rate in (100, 200):
-        assert read_record(path).time_step == pytest.approx(1 / rate, rel=1e-12)
-    else:
-        with pytest.raises(
-            InputError,
-            match=r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step",
-        ):
+    hidden = 10.0**-decimals > 0.5 / rate and rate not in (100, 200)
+    if hidden:
+        match = r"is off the uniform step .*; times of 0.01 s may hide it: --read time_step"
+        with pytest.raises(InputError, match=match):
             read_record(path)
-        assert read_record(path, Reading(time_step=1 / rate)).time_step == 1 / rate
-
-
-def test_a_missing_sample_is_not_taken_for_rounding(tmp_path):
-    rows = "".join(f"{n / 300:.3f},0.1\n" for n in range(1000) if n != 500)
-    (tmp_path / "a.csv").write_text("time_s,acceleration_g\n" + rows)
-    with pytest.raises(InputError, match="is off the uniform step"):
-        read_record(tmp_path / "a.csv")
+    reading = Reading(time_step=1 / rate) if hidden else Reading()
+    assert read_record(path, reading).time_step == pytest.approx(1 / rate, rel=1e-12)
 
 
 def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(tmp_path):

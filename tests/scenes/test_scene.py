@@ -27,7 +27,6 @@ def scene(**change: object) -> Scene:
 
 
 def block(**change: object) -> dict[str, object]:
-    """The table of a block with a change."""
     return {"block": BOX | change}
 
 
@@ -228,16 +227,13 @@ def least_jam(block):
     floor an effect (Painleve).
 
     A push N lifts the corner by (1/m + x (x - mu z)/I) N, with x and z the corner's distances from
-    the mass's centre; all tilts.
+    the mass's centre; all tilts, both corners.
     """
     tilts = np.linspace(0.0, math.pi / 2, 100_001)
-    found = []
-    for side in ("left", "right"):
-        radius = block.pivot(side).radius
-        x, z = radius * np.sin(tilts), radius * np.cos(tilts)
-        with np.errstate(divide="ignore"):
-            found.append(np.min((block.gyration_squared + x * x) / (x * z)))
-    return min(found)
+    radius = np.array([[block.pivot(side).radius] for side in ("left", "right")])
+    x, z = radius * np.sin(tilts), radius * np.cos(tilts)
+    with np.errstate(divide="ignore"):
+        return np.min((block.gyration_squared + x * x) / (x * z))
 
 
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (0.1, -0.2), (-0.15, 0.3)])
@@ -277,9 +273,9 @@ def test_the_centres_of_mass_and_box():
     states, small = rng.normal(size=(20, 6)), 1e-6
     placed = kinematics.of_mass(LOADED, states)
     np.testing.assert_allclose(kinematics.of_box(LOADED, placed), states, atol=1e-15)
-    for row, (x, y, theta, *_) in zip(placed, states, strict=True):
-        turned = np.exp(1j * theta) * (0.1 - 0.2j)
-        assert row[:2] == pytest.approx([x + turned.real, y + turned.imag], abs=1e-15)
+    np.testing.assert_allclose(
+        (placed - states)[:, :2] @ [1.0, 1j], np.exp(1j * states[:, 2]) * (0.1 - 0.2j), atol=1e-15
+    )
     later = states.copy()
     later[:, :3] += small * states[:, 3:]
     np.testing.assert_allclose(
@@ -313,10 +309,7 @@ def test_derived_quantities():
 )
 def test_output_times(duration, step, rows):
     times = scene(duration=duration, output_step=step).output_times
-    assert len(times) == rows
-    assert times[0] == 0.0
-    assert times[-1] <= duration * (1.0 + 1e-9)
-    np.testing.assert_allclose(np.diff(times), step, rtol=1e-9)
+    np.testing.assert_allclose(times, step * np.arange(rows), rtol=1e-9)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.04, -0.2])
@@ -326,21 +319,20 @@ def test_initial_state_stands_on_its_pivot(tilt):
     )
     x, y, theta, x_dot, y_dot, theta_dot = made.initial_state
     assert (theta, theta_dot) == (tilt, 0.3)
-    assert kinematics.slip(made.block, x, theta) == pytest.approx(0.0, abs=1e-15)
-    assert kinematics.slip_rate(made.block, theta, x_dot, theta_dot) == pytest.approx(
-        0.2, abs=1e-15
+    found = (
+        kinematics.slip(made.block, x, theta),
+        kinematics.slip_rate(made.block, theta, x_dot, theta_dot),
+        kinematics.pivot_height(made.block, y, theta),
     )
-    assert kinematics.pivot_height(made.block, y, theta) == pytest.approx(0.0, abs=1e-15)
+    assert found == pytest.approx((0.0, 0.2, 0.0), abs=1e-15)
     step = 1e-7  # the centroid's vertical velocity is that of a turn about the pivot
-    lever = made.block.radius
-    height = [lever * math.cos(made.block.alpha - abs(tilt + 0.3 * s)) for s in (0.0, step)]
+    height = [
+        made.block.radius * math.cos(made.block.alpha - abs(tilt + 0.3 * s)) for s in (0, step)
+    ]
     assert y_dot == pytest.approx((height[1] - height[0]) / step, abs=1e-6)
 
 
 def test_a_change_is_a_new_scene_that_is_validated():
-    for one, key in ((scene(), "duration"), (scene().block, "half_width")):
-        with pytest.raises(ValueError, match="frozen"):
-            setattr(one, key, 3.0)
     assert scene().replace(duration=2.0).duration == 2.0
     with pytest.raises(InputError, match=r"^duration: -1.0 is not allowed"):
         scene().replace(duration=-1.0)

@@ -1,16 +1,21 @@
 """What is written goes through one door, which follows no link; text in a table is no formula and
-steers nothing."""
+steers nothing. Reading is bounded: whatever a file holds, and whatever it is, it is read or refused
+within seconds and with little memory."""
 
 import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import rockcheck
-from rockcheck.scenes import InputError
+from rockcheck.scenes import History, InputError, load_scene
 from rockcheck.scenes.errors import inert
+from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.reading import (
     head_of,
     open_regular,
@@ -21,7 +26,10 @@ from rockcheck.scenes.reading import (
     read_text,
     within,
 )
+from rockcheck.scenes.recordings import read_record
 from rockcheck.scenes.writing import columns_text, made, table_text, write_together, write_whole
+from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.suite.results import Run
 
 #: What may stand where a result is to be written, in a folder that somebody sent.
 TRAPS: dict[str, Callable[[Path, Path], None]] = {
@@ -49,8 +57,8 @@ def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
 
 
 def test_a_folder_of_results_is_no_link(tmp_path):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "run").mkdir()
+    for name in ("elsewhere", "run"):
+        (tmp_path / name).mkdir()
     (tmp_path / "run" / "pages").symlink_to(tmp_path / "elsewhere")
     with pytest.raises(InputError, match="pages: a link"):
         made(tmp_path / "run", "pages", "data")
@@ -115,12 +123,17 @@ DOORS = {
 @pytest.mark.parametrize("calls", DOORS)
 def test_files_are_written_and_read_by_the_doors_alone(calls):
     home = Path(rockcheck.__file__).parent
-    found = set()
-    for folder in ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands"):
-        for path in (home / folder).rglob("*.py"):
-            text = path.read_text(encoding="utf-8").replace("os.open(os.devnull", "")
-            if re.search(calls, text):
-                found.add(path.relative_to(home).as_posix())
+    folders = ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands")
+    texts = {
+        path.relative_to(home).as_posix(): path.read_text(encoding="utf-8")
+        for folder in folders
+        for path in (home / folder).rglob("*.py")
+    }
+    found = {
+        name
+        for name, text in texts.items()
+        if re.search(calls, text.replace("os.open(os.devnull", ""))
+    }
     assert found == DOORS[calls]
 
 
@@ -161,3 +174,180 @@ def test_text_neither_turns_around_nor_steers(tmp_path, sign):
     path = tmp_path / "a.json"
     path.write_text(f'{{"a\\u{ord(sign):04x}b": ["a\\u{ord(sign):04x}b"]}}')
     assert read_json(path) == {"a?b": ["a?b"]}
+
+
+#: Files of 100 kB and more that took over a minute each, by the square of a repetition.
+LONG = {
+    "digits.AT2": "UNITS OF G\nNPTS= 1, DT= .01\n" + "1" * 100_000 + "x",
+    "units.AT2": "UNITS" + " " * 100_000 + "\nNPTS= 1, DT= .01\n1",
+    "npts.AT2": "UNITS OF G\nNPTS=1" + " " * 100_000 + "\n1",
+    "plain.AT2": "UNITS OF G\n1" + " " * 100_000 + "1\n1",
+    "step.AT2": "UNITS OF G\nNPTS=1 DT=" + "1" * 100_000 + "\n1",
+    "digits.csv": "time_s,acceleration_g\n0,1\n0.1," + "1" * 100_000 + "x\n",
+    "field.csv": 'time_s,acceleration_g\n0,1\n0.1,"' + "1" * 200_000 + '"\n',
+    "count.V2": "1 points of accel data equally spaced at " + "1" * 100_000 + " sec\n1",
+    "blanks.V2": "1 points of accel data equally spaced at .01 sec"
+    + " " * 100_000
+    + "\n"
+    + " " * 100_000,
+    "blocks.V2": "1 points of accel data equally spaced at .01 sec, in g\n1\n" * 20_000,
+    "wide.V2": "9 Real-header values follow on 9 lines, Format= (999F999.1)\n" * 20_000,
+    "keys.ASC": "SAMPLING_INTERVAL_S: 1\n" + "A" * 1_000_000,
+    "lines.ASC": "SAMPLING_INTERVAL_S: 1\n" * 50_000,
+    "scale.NS": "Origin Time\nScale Factor      "
+    + "1" * 1_000_000
+    + "\nSampling Freq(Hz) 1\nMemo.\n1",
+    "commas.txt": "1," * 500_000,
+    "digits.txt": "1" * 1_000_000 + "," + "1" * 1_000_000,
+    "words.txt": "a " * 500_000,
+    "brackets.txt": "time_s acc" + "[" * 500_000 + "\n1 2\n",
+    "word.toml": "a" * 1_000_000,
+    "blanks.toml": "a = 1\n" + " " * 1_000_000 + "\n",
+    "dots.toml": "a = '" + "x. " * 300_000 + "'",
+    "quotes.toml": "a = 1 #" + "\"'" * 500_000,
+    "quoted.toml": '" "' + '." "' * 100_000 + " = 1",
+    "columns.csv": "t,theta" + ",x" * 1_000_000 + "\n0,1" + ",1" * 1_000_000 + "\n",
+    "row.csv": "t,theta\n0,1" + ",1" * 1_000_000 + "\n",
+    "lines.csv": 't,theta,"' + "\n" * 300_000 + '"\n0,0,0\n',
+    "line.csv": "t,theta\n0," + "1" * 2_000_000 + "\n",
+}
+
+_READ = """
+import resource, sys
+from pathlib import Path
+import pandas
+from rockcheck.scenes import History, InputError
+from rockcheck.scenes.files import read_toml
+from rockcheck.scenes.recordings import read_record
+from rockcheck.validation.discrepancy.measured import read_measured
+used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+resource.setrlimit(resource.RLIMIT_CPU, (int(used) + 10,) * 2)
+path = Path(sys.argv[1])
+for read in {".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}\
+.get(path.suffix, [read_record]):
+    try:
+        read(path)
+    except InputError as error:
+        assert len(str(error)) < 600 and str(error).isprintable(), error
+print("read or refused")
+"""
+
+
+@pytest.mark.needs("POSIX")
+@pytest.mark.parametrize("name", LONG)
+def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, name):
+    (tmp_path / name).write_text(LONG[name])
+    done = subprocess.run(
+        [sys.executable, "-c", _READ, str(tmp_path / name)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout == "read or refused\n"
+
+
+READERS = (History.load, read_measured, read_record, load_scene, read_toml)
+#: What may lie where a file should, and what is said of it.
+NO_FILES = {
+    # A pipe would be waited for without end, a device read without end.
+    "a pipe": (os.mkfifo, "cannot be read: not a file"),
+    "a folder": (Path.mkdir, "cannot be read: not a file"),
+    "a link to a device": (lambda path: path.symlink_to("/dev/zero"), "cannot be read: not a file"),
+    "nothing": (lambda path: None, "cannot be read: No such file"),
+    "bytes": (lambda path: path.write_bytes(bytes(range(256))), "not a (text file|CSV table)"),
+}
+
+
+@pytest.mark.needs("POSIX")
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("kind", NO_FILES)
+def test_only_regular_files_of_text_are_read(tmp_path, read, kind):
+    path = tmp_path / ("a.toml" if read in (load_scene, read_toml) else "a.csv")
+    make, said = NO_FILES[kind]
+    make(path)
+    with pytest.raises(InputError, match=rf"{path.name}: {said}"):
+        read(path)
+
+
+@pytest.mark.needs("POSIX")
+def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
+    (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
+    for read, beside in (
+        (lambda: History.load(tmp_path / "h.csv"), "h.events.csv"),
+        (lambda: Run.load(tmp_path), "run.json"),
+    ):
+        os.mkfifo(tmp_path / beside)
+        with pytest.raises(InputError, match="not a file"):
+            read()
+
+
+def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
+    """As some editors write it: scene, suite, record and history are read as without it."""
+    for name, text in {
+        "a.toml": "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\n"
+        'floor = { friction = 0.4 }\nname = "b"\n',
+        "a.csv": "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n",
+    }.items():
+        (tmp_path / name).write_text(text, encoding="utf-8-sig")
+    assert load_scene(tmp_path / "a.toml").name == "b"
+    assert read_record(tmp_path / "a.csv").time_step == 0.5
+    path = tmp_path / "h.csv"
+    for text, outcome in (
+        ("t,theta\n0,0.5\n1,0.25\n", "moving"),
+        ('t,theta,rockcheck_history\n0,0.5,"{""outcome"": ""at rest""}"\n1,0.25,\n', "at rest"),
+    ):
+        path.write_text(text, encoding="utf-8-sig")
+        history = History.load(path)
+        assert history.channels["theta"].tolist() == [0.5, 0.25]
+        assert history.outcome == outcome
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "a" + ".a" * 50,
+        "a" + " . a" * 50,
+        '" "' + '." "' * 50,
+        "[a" + ".a" * 50 + "]",
+        '"a."' + ".'.'" * 50,
+    ],
+)
+def test_a_key_of_many_parts_is_refused(tmp_path, key):
+    (tmp_path / "a.toml").write_text(key if key.startswith("[") else f"{key} = 1")
+    with pytest.raises(InputError, match="a key of more than 50 parts"):
+        read_toml(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'],
+)
+def test_a_key_of_few_parts_is_read(tmp_path, line):
+    (tmp_path / "a.toml").write_text(line)
+    assert read_toml(tmp_path / "a.toml")
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path):
+    (tmp_path / "a.toml").touch()
+    os.truncate(tmp_path / "a.toml", 10_000_001)
+    with pytest.raises(InputError, match="larger than 10000000 bytes"):
+        read_toml(tmp_path / "a.toml")
+
+
+def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
+    """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file
+    and a bomb are one line each."""
+    path = tmp_path / "a.npz"
+    np.savez_compressed(path, x=np.arange(3.0), y=np.zeros(100_000))
+    assert read_arrays(path)["x"].tolist() == [0.0, 1.0, 2.0]
+    for spoil, said in (
+        (Path.touch, "arrays are larger than 10000 bytes"),
+        (lambda path: path.write_bytes(path.read_bytes()[:-60]), "not a whole file of arrays"),
+        (lambda path: np.savez(path, x=np.array([{"a": 1}])), "not a whole file of arrays"),
+        (Path.unlink, "cannot be read"),
+    ):
+        spoil(path)
+        with pytest.raises(InputError, match=said):
+            read_arrays(path, most=10_000)

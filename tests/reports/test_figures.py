@@ -1,0 +1,216 @@
+"""Figures: of the spectra, and a study's for print, drawn anew from the data beside them."""
+
+import json
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+
+from rockcheck.commands.cli import main
+from rockcheck.ebm import Spectrum
+from rockcheck.reports.document import FIGURES, publish
+from rockcheck.reports.drawers import figure_of
+from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
+from rockcheck.scenes import Sine, load_scene
+from rockcheck.scenes.reading import read_json
+from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
+from rockcheck.validation.paper import KEPT, Panel as Case, kept_spectra, paper_panels
+from rockcheck.validation.paper.measures import Paper, beyond, findings_of
+from rockcheck.validation.studies.spectrum.agreement import (
+    CANDIDATES,
+    PLAYED_SHARE,
+    blocks,
+    mapped,
+)
+from rockcheck.validation.studies.spectrum.study import Spectra
+from rockcheck.validation.studies.spectrum.tiles import Played, Request
+
+SIZE = 12
+REQUEST = Request(SIZE)
+
+
+def plot_of(*panels, letter="R", request=REQUEST):
+    """The plot of spectra whose nodes were all played to one outcome."""
+    study = Spectra(panels, request)
+    done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
+    return next(study.gather(done).plots())
+
+
+def labels(figure):
+    (legend,) = figure.legends
+    return [text.get_text() for text in legend.texts]
+
+
+@pytest.mark.parametrize(("panel", "overturned"), [(0, "clockwise"), (1, "overturned")])
+def test_the_papers_colours(panel, overturned):
+    outcomes = np.repeat([0, 1, -1], [6, 3, 3]).astype(np.int8)[:, None] * np.ones(SIZE, np.int8)
+    spectrum = Spectrum(
+        outcomes=outcomes,
+        frequency_ratios=np.linspace(0.5, 8.0, SIZE),
+        amplitude_ratios=np.linspace(1.0, 12.0, SIZE),
+        evaluations=SIZE * SIZE,
+        undecided=np.zeros((0, 2), dtype=np.int64),
+        scene=paper_panels(8)[panel].scene,
+        model=None,
+    )
+    axes = Figure().subplots()
+    draw(spectrum, axes)
+    (mesh,) = axes.collections
+    axes.figure.draw_without_rendering()
+    colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)[[0, 7, 11], 0]
+    expected = [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
+    np.testing.assert_allclose(colours, expected)
+
+
+def test_a_figure_has_the_papers_panels():
+    figure = figure_of(plot_of(*paper_panels(9)))
+    assert [axes.get_title(loc="left") for axes in figure.axes] == [
+        panel.title for panel in paper_panels(9)
+    ]
+    assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
+    assert labels(figure) == [
+        "safe",
+        "no wall: overturned clockwise",
+        "overturned; no wall: counterclockwise",
+    ]
+
+
+def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
+    plot = plot_of(*paper_panels(9), letter="U")
+    plot.data["panels"][1]["law"] = [[2, 3]]
+    figure = figure_of(plot)
+    assert {"undecided", "depends on the impact law"} <= {*labels(figure)}
+    (ring,) = figure.axes[1].lines
+    assert ring.get_marker() == LAW_MARK["marker"]
+    assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
+
+
+def test_the_pulse_of_ones_own_scene_is_marked():
+    """At its ratios; none is marked in the paper's figures."""
+    scene = load_scene("rack").replace(excitation=Sine(amplitude=6.0, period=0.8))
+    own = [
+        2.0 * math.pi / 0.8 / scene.frequency_parameter,
+        6.0 / (scene.gravity * scene.block.slope),
+    ]
+    request = Request(SIZE, (1.0, 8.0), (1.0, 4.0))
+    figure = figure_of(plot_of(Case("rack", "Rack", scene), request=request))
+    (star,) = figure.axes[0].lines
+    np.testing.assert_allclose(star.get_xydata(), [own])
+    assert OWN_MARK["label"] in labels(figure)
+    assert not any(axes.lines for axes in figure_of(plot_of(*paper_panels(8))).axes)
+
+
+def test_the_documentation_shows_the_kept_study():
+    kept = read_json(Path(__file__).parents[2] / "docs" / "runs" / "spectrum.json")
+    (shown,) = (block for block in kept["blocks"] if block.get("name") == "agreement")
+    found = read_json(KEPT / "agreement.json")
+    panels = mapped(paper_panels())
+    _, table, by_spectrum, plot = blocks(found, panels, came=True)
+    assert [list(map(plain, row)) for row in table.rows] == shown["rows"]
+    assert len({row[0] for row in by_spectrum.rows}) == 28
+    assert all(
+        share["nodes"] == 100 for share in found["shares"] if share["model"] not in PLAYED_SHARE
+    )
+    assert {share["model"] for share in found["shares"]} == set(CANDIDATES)
+    figure = figure_of(plot)
+    assert len(figure.axes) == len(panels) * len(found["maps"])
+
+
+def test_a_map_of_each_finding():
+    paper = Paper(kept_spectra())
+    found = findings_of(paper)
+    _, plot, rows = beyond(paper, found)
+    for panel, one in zip(plot.data["panels"], found, strict=True):
+        assert panel["outcomes"].count("G") == one.gained.sum()
+        assert panel["outcomes"].count("X") == one.lost.sum()
+    assert len(figure_of(plot).axes) == 3
+    assert len(rows.rows) == sum(len(one.rows) for one in found)
+
+
+PLOTS = [
+    Plot(
+        "curves",
+        panels=[Panel("peak", [Series("ebm", [1.0, 2.0], [0.1, None], look="ebm")])],
+        x=Axis("gap, m", log=True, ticks={1.0: "one", 2.0: "two"}),
+        y=Axis("theta, alpha", limits=(0.0, 1.0)),
+        played=["much that only the page shows"],
+    ),
+    Plot("strips", kind="strips", data=[{"label": "slip, m", "values": [0.1, 0.2, 0.4]}]),
+]
+
+
+@pytest.fixture
+def study(tmp_path):
+    folder = tmp_path / "study"
+    folder.mkdir()
+    return publish(Finding("made", "Made up", "Two figures.", PLOTS), folder).parent
+
+
+@pytest.mark.parametrize("name", ["curves", "strips"])
+def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, name):
+    assert {path.suffix for path in (study / FIGURES).iterdir()} == {".svg", ".json"}
+    assert b"only the page" not in (study / FIGURES / f"{name}.json").read_bytes()
+    for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
+        path = tmp_path / f"one{ending}"
+        assert main(["report", str(study), "--scene", name, "-o", str(path)]) == 0
+        assert path.read_bytes().startswith(begins)
+    shown = (study / FIGURES / f"{name}.svg").read_bytes()
+    unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)
+    assert (tmp_path / "one.svg").read_bytes() == unstamped != shown
+    page = (study / "index.html").read_text(encoding="utf-8")
+    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in page
+
+
+@pytest.mark.parametrize(
+    ("data", "said"),
+    [
+        ([], "curves.json: no data of a figure: ValidationError"),
+        ({"name": "a", "panels": "b"}, "curves.json: no data of a figure: ValidationError"),
+        ({"name": "a", "kind": "spectra"}, "curves.json: no data of a figure: TypeError"),
+    ],
+)
+def test_data_that_is_no_figure_is_refused_in_one_line(study, refused, data, said):
+    (study / FIGURES / "curves.json").write_text(json.dumps(data), encoding="utf-8")
+    assert said in refused("report", str(study), "--scene", "curves", "-o", "a.svg")
+
+
+def test_an_unknown_figure_is_named(study, refused):
+    said = refused("report", str(study), "--scene", "curve", "-o", "a.svg")
+    assert "unknown figure 'curve'; did you mean 'curves'? allowed: curves, strips" in said
+    assert "--output: needs one --scene NAME" in refused("report", str(study), "-o", "a.svg")
+
+
+def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
+    monkeypatch.setattr("rockcheck.reports.document.DRAWING", 1e-3)
+    said = refused("report", str(study), "--scene", "curves", "-o", "a.svg")
+    assert "did not end within 0.001 s" in said
+
+
+def test_the_folder_holds_one_run(tmp_path):
+    """Tables and figures of the run before are gone; files of the user's stay."""
+    (tmp_path / "mine.csv").write_text("a\n", encoding="utf-8")
+    first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
+    publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)
+    publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs"}
+    assert {path.stem for path in (tmp_path / FIGURES).iterdir()} == {"strips"}
+
+
+def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
+    """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
+    folder = tmp_path / "sub"
+    (folder / FIGURES).mkdir(parents=True)
+    rows = [{"a": 1.0}]
+    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
+    (folder / "run.json").write_text(json.dumps(said), encoding="utf-8")
+    mine = [tmp_path / "mine.csv", *(folder / f"{name}.csv" for name in ("empty", "odd"))]
+    mine += [folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")]
+    for path in mine:
+        path.write_text("a\n", encoding="utf-8")
+    (folder / "own.csv").write_text("b,a\n", encoding="utf-8")
+    publish(Finding("made", "Made up", ""), folder)
+    assert all(path.exists() for path in (*mine, folder / "own.csv"))
