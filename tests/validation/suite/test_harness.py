@@ -2,10 +2,12 @@
 again, and two runs at once. Minutes, not seconds."""
 
 import os
+import random
 import re
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -176,7 +178,50 @@ def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, un
 
 
 @pytest.mark.slow
+def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
+    def tables(folder: Path) -> list[bytes]:
+        return [(folder / name).read_bytes() for name in ("checks.csv", "figures.csv")]
+
+    began = time.perf_counter()
+    project.run("validate", "smoke", "--out", str(tmp_path / "undisturbed"))
+    length = time.perf_counter() - began
+    expected = tables(tmp_path / "undisturbed")
+    chance = random.Random(20)
+    killed = 0
+    for attempt in range(20):
+        out = tmp_path / f"killed-{attempt}"
+        process = project.start("validate", "smoke", "--out", str(out))
+        time.sleep(chance.uniform(0.0, 1.1) * length)
+        killed += process.poll() is None
+        process.kill()
+        process.communicate()
+        code, text = project.run("validate", "smoke", "--out", str(out))
+        assert code == 0, text
+        assert tables(out) == expected
+        assert not _alive(process.pid), "its workers outlive a killed run"
+        shutil.rmtree(out)
+    assert killed >= 10
+
+
+@pytest.mark.slow
 def test_two_runs_on_one_folder(project, tmp_path):
     both = [project.start("--out", str(tmp_path / "shared")) for _ in range(2)]
     texts = [process.communicate(timeout=900)[0] for process in both]
     assert [process.returncode for process in both] == [0, 0], texts
+
+
+def _alive(group: int) -> list[str]:
+    """Processes of a process group, after half a minute's grace."""
+    listed: list[str] = []
+    for _ in range(60):
+        done = subprocess.run(
+            ["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        listed = [line for line in done.stdout.splitlines() if "<defunct>" not in line]
+        if not listed:
+            break
+        time.sleep(0.5)
+    return listed

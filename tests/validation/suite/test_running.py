@@ -2,8 +2,11 @@
 back."""
 
 import json
+import math
 import shutil
+import subprocess
 import sys
+from collections import deque
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,8 +14,9 @@ import pytest
 
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import FAMILIES
+from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.runner import SuiteStudy, run_suite
+from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import junit, verdict_lines
 
@@ -244,6 +248,45 @@ def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
     schema = json.loads((out / "run.schema.json").read_text())
     assert set(json.loads((out / "run.json").read_text())) == set(schema["properties"])
     assert not list(out.glob("**/*.part"))
+
+
+#: Ends when a file is there; fails after a minute.
+WAITS = """
+import pathlib, sys, time
+for _ in range(600):
+    if pathlib.Path(sys.argv[1]).exists():
+        sys.exit(0)
+    time.sleep(0.1)
+sys.exit(1)
+"""
+
+
+def test_only_calls_that_compile_wait_for_each_other(tmp_path):
+    """The second call can end only while the third one runs, which begins as the first one ends."""
+    there = str(tmp_path / "there")
+    plain = [
+        [sys.executable, "-c", WAITS, there],
+        [sys.executable, "-c", "import pathlib, sys; pathlib.Path(sys.argv[1]).touch()", there],
+    ]
+    calls = [
+        Call(math.sqrt, (4.0,), compiles="a package"),
+        *(Call(subprocess.run, (command,)) for command in plain),
+    ]
+    with Pool(2) as pool:
+        found = [ended.result for ended in pool.run(deque(calls))]
+    assert [one.returncode for one in found if one != 2.0] == [0, 0]
+
+
+def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
+    """One cell of each code that is compiled, and the engines before the quick models; walls take
+    longer."""
+    study = SuiteStudy(load_suite("paper"), tmp_path)
+    begun = [(cell.variant.label, cell.place) for cell in in_order(study.items)]
+    first = ("mujoco", "ebm-unilateral", "cm")
+    assert begun[:3] == [(model, "fig4a") for model in first]
+    engines = begun[3:10]
+    assert {model for model, _ in engines} == {"mujoco", "pybullet"}
+    assert [scene[:4] for _, scene in engines] == 4 * ["fig5"] + 3 * ["fig4"]
 
 
 @pytest.mark.parametrize("name", sorted(FAMILIES))
