@@ -283,9 +283,9 @@ def test_the_interval_in_the_remark_covers(name, truth):
 
 
 @pytest.mark.parametrize("friction", [0.5, 0.0])
-def test_static_friction_keeps_its_ratio_to_the_friction_that_is_drawn(suite_file, friction):
+def test_static_friction_keeps_its_ratio_to_the_friction_that_is_drawn(loaded, friction):
     """Above a frictionless floor there is no ratio: it is the drawn friction at least."""
-    ensemble, base = load_suite(suite_file, allow_code=OWN).ensembles["crowd"]
+    ensemble, base = loaded().ensembles["crowd"]
     floor = base.floor.replace(friction=friction, static_friction=0.6)
     for number in range(3):
         drawn = ensemble.drawn(base.replace(floor=floor), number).floor
