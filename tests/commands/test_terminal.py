@@ -16,6 +16,7 @@ import pytest
 
 from rockcheck import commands
 from rockcheck.commands.cli import COMMANDS, HIDDEN, main
+from rockcheck.engines import MuJoCo
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, load_scene
 from rockcheck.scenes.progress import listening, tell
 
@@ -135,13 +136,6 @@ def test_settings_shown_as_remarks_are_the_defaults():
     ).replace(**same)
 
 
-def test_new_overwrites_nothing(refused):
-    Path("mine.toml").write_text("precious")
-    assert "is there already" in refused("new", "mine.toml")
-    assert Path("mine.toml").read_text() == "precious"
-    assert [main(["new", name]) for name in ("mine.txt", "no/such/mine.toml")] == [2, 2]
-
-
 def test_quiet_says_nothing_but_errors(typed):
     main(["new", "mine.toml"])
     lean = "--set", "offset=0.001", "-o", "a.csv"
@@ -251,23 +245,14 @@ def test_on_a_terminal_colour_progress_and_its_width():
         assert max(len(line) for line in plain.replace("\r", "").splitlines()) <= columns
 
 
-def test_models_tell_how_far_they_are():
-    from rockcheck.engines import MuJoCo
-
-    scene = Scene(
-        name="short",
-        block=Block(half_width=0.4, half_height=1.5),
-        floor=Floor(friction=0.5),
-        duration=4.0,
-        initial_rotation=0.1,
-    )
+@pytest.mark.parametrize("step", [1e-3, "adaptive"])
+def test_models_tell_how_far_they_are(step):
+    scene = load_scene("bookcase").replace(duration=4.0)
     heard: list[float] = []
-    for step in (1e-3, "adaptive"):
-        heard.clear()
-        with listening(lambda done, total, what="": heard.append(done / total)):
-            MuJoCo(time_step=step).simulate(scene)
-        assert heard == sorted(heard)
-        assert 0.0 <= heard[0] <= heard[-1] < 1.0
+    with listening(lambda done, total, what="": heard.append(done / total)):
+        MuJoCo(time_step=step).simulate(scene)
+    assert heard == sorted(heard)
+    assert 0.0 <= heard[0] <= heard[-1] < 1.0
     tell(1, 2)  # nobody listens
 
 
