@@ -29,6 +29,7 @@ FILES = {
     "unit.toml": SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\nunit = "kg"\n',
     "wrong.toml": 'reference = "ebm"\nscenes = ["scene.toml"]\n[models.ebm]\n'
     '[[records]]\nfiles = ["one.AT2"]\nscenes = ["seen"]\n',
+    "run.json": '{"format": 99}',
     "short.AT2": AT2.format(3),
     "one.AT2": AT2.format(2),
     "one_V.AT2": AT2.format(2).replace("NAME", "Place, 1/1/2000, Station, UP"),
@@ -70,7 +71,13 @@ FILES = {
         (["spectrum", "fig8", "--force"], "--force: is gone: "),
         (["report", "out", "--against=ebm"], "--against: is gone: "),
         (["benchmark", "--minutes", "5"], "--minutes: is gone: "),
-        (["report", "."], "no finished run here"),
+        (["report", "gone"], "no finished run here"),
+        (["report", "."], "format 99; this version reads"),
+        *(
+            ([command, "--out", place], f"{place}: cannot be used as a folder")
+            for command in ("stress", "benchmark")
+            for place in ("scene.toml", "scene.toml/below")
+        ),
         ([], "Missing command"),
         (
             ["simulate", "walls.toml"],

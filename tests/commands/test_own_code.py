@@ -148,7 +148,7 @@ def test_an_allowed_model_is_imported_by_a_worker_only(folder, words, code):
     assert f"imported-{process}" not in traces(folder)
 
 
-OWN = "rockcheck: short, a: ZeroDivisionError: a bug.*traceback in rockcheck-report/faults/short--a-"
+OWN = "rockcheck: short, a: ZeroDivisionError: a bug.*traceback in rockcheck-report/faults/short"
 OURS = (
     "rockcheck: a fault of rockcheck itself, short, ebm: AttributeError"
     ".*rockcheck-report/faults/short--ebm--"

@@ -19,32 +19,32 @@ PULSES = (
 )  # amplitude in g tan(alpha), frequency in p
 
 
-def test_fixed_steps_are_of_first_order(double_engine, free_rocking, rotation_error):
+def median_error(model, scenes, rotation_error):
     """One run may be lucky by a factor of five: it is the median of several starts that falls with
     the step."""
-    errors = {}
-    for step in (2e-3, 2e-4):
-        histories = [
-            (double_engine(time_step=step).simulate(scene), scene)
-            for scene in map(free_rocking, TILTS)
-        ]
-        errors[step] = np.median(
-            [rotation_error(history.channels["theta"], scene) for history, scene in histories]
-        )
-    assert errors[2e-4] < 2e-3
-    assert 5.0 < errors[2e-3] / errors[2e-4] < 30.0
+    return np.median(
+        [rotation_error(model.simulate(scene).channels["theta"], scene) for scene in scenes]
+    )
+
+
+def test_fixed_steps_are_of_first_order(double_engine, free_rocking, rotation_error):
+    coarse, fine = (
+        median_error(double_engine(time_step=step), map(free_rocking, TILTS), rotation_error)
+        for step in (2e-3, 2e-4)
+    )
+    assert fine < 2e-3
+    assert 5.0 < coarse / fine < 30.0
 
 
 def test_adaptive_steps_are_of_third_order(varying_engine, pulse, rotation_error):
-    errors = {}
-    for step in (1.6e-2, 8e-3, 4e-3, 1e-3):
-        model = varying_engine(time_step="adaptive", largest_step=step)
-        errors[step] = np.median(
-            [
-                rotation_error(model.simulate(scene).channels["theta"], scene)
-                for scene in (pulse(*p) for p in PULSES)
-            ]
+    errors = {
+        step: median_error(
+            varying_engine(time_step="adaptive", largest_step=step),
+            (pulse(*p) for p in PULSES),
+            rotation_error,
         )
+        for step in (1.6e-2, 8e-3, 4e-3, 1e-3)
+    }
     assert errors[1.6e-2] / errors[8e-3] > 5.0
     assert errors[8e-3] < 1e-5
     assert errors[4e-3] < 3e-6
@@ -83,14 +83,16 @@ def test_adaptive_steps_resolve_each_impact(varying_engine, free_rocking, rotati
 def test_a_stock_engine_is_far_off(stock, free_rocking, rotation_error):
     """What "default" is there to show: contacts as they come do not get better with the step."""
     scene = free_rocking(0.7)
-    for step in (1e-3, 2e-4):
-        assert (
-            rotation_error(
-                stock(time_step=step, settings="default").simulate(scene).channels["theta"], scene
-            )
-            > 2e-3
+    coarse, fine, best = (
+        rotation_error(stock(**settings).simulate(scene).channels["theta"], scene)
+        for settings in (
+            {"time_step": 1e-3, "settings": "default"},
+            {"time_step": 2e-4, "settings": "default"},
+            {"time_step": 2e-4},
         )
-    assert rotation_error(stock(time_step=2e-4).simulate(scene).channels["theta"], scene) < 1e-3
+    )
+    assert min(coarse, fine) > 2e-3
+    assert best < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -107,23 +109,6 @@ def test_walls_and_slip(varying_engine, every, least, bounds):
     assert missed == []
     assert len(errors) >= least
     assert all(np.quantile(errors, share) < bound for share, bound in bounds.items())
-
-
-def test_the_engines_agree(pulse):
-    scenes = [
-        pulse(4.0, 4.5, friction=0.3),
-        pulse(3.0, 6.0, friction=0.6, walls=[Wall(side="left", gap=0.053, restitution=1.0)]),
-        pulse(2.0, 4.0, friction=0.3, walls=[Wall(side="right", gap=0.053, restitution=0.5)]),
-    ]
-    for scene in scenes:
-        one, other = (engine(time_step="adaptive").simulate(scene) for engine in (MuJoCo, PyBullet))
-        assert (
-            np.max(np.abs(one.channels["theta"] - other.channels["theta"]))
-            < 1e-4 * scene.block.alpha
-        )
-        assert [event.kind for event in one.event_list][:12] == [
-            event.kind for event in other.event_list
-        ][:12]
 
 
 @pytest.mark.parametrize("step", [1e-4, "adaptive"])
@@ -198,15 +183,3 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     assert asleep.peak_rotation < 1e-4 * scene.block.alpha
     assert reference.peak_rotation > 0.2 * scene.block.alpha
     assert apart(awake, reference) < 2e-2 * scene.block.alpha
-
-
-@pytest.mark.slow
-@pytest.mark.needs("drake")
-@pytest.mark.parametrize("settings", ["best", "default"])
-def test_drakes_plant_is_made_before_the_time_is_taken(settings, free_rocking):
-    """It takes as long as some ten to a hundred steps."""
-    scene = free_rocking(0.5).replace(duration=0.1)
-    model = engines.Drake(time_step=1e-2, settings=settings)
-    world = (model.rigid_world if settings == "best" else model.stock_world)(scene)
-    model.steps.ready(world, scene)
-    assert world.state()[2] == 0.0

@@ -94,12 +94,10 @@ def test_sliding_distance(model, speed, friction):
 
 
 def test_sliding_without_friction(model):
-    history = model.simulate(
-        Scene(
-            name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0
-        )
+    ice = Scene(
+        name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0
     )
-    assert history.channels["x"][-1] == pytest.approx(0.5, abs=1e-5)
+    assert model.simulate(ice).channels["x"][-1] == pytest.approx(0.5, abs=1e-5)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
@@ -248,7 +246,7 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
         apart = np.max(np.abs(history.channels[channel] + mirrored.channels[channel]))
-        assert apart < within(model, 2e-3, 1e-7), channel
+        assert apart < (1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)), channel
     assert history.peak_rotation > 0.2 * block.alpha
     assert "wall impact" in [event.kind for event in history.event_list]
     assert [event.kind for event in history.event_list][:4] == [
@@ -274,6 +272,9 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
     found = [(event.kind, event.t) for event in history.event_list][: len(expected)]
     assert [kind for kind, _ in found] == [kind for kind, _ in expected]
     assert [t for _, t in found] == pytest.approx([t for _, t in expected], abs=2e-5)
+    reference = EventBasedModel(pivot="unilateral").simulate(scene)
+    apart = np.max(np.abs(history.channels["theta"] - reference.channels["theta"]))
+    assert apart < 1e-4 * scene.block.alpha
     hit = history.event_list[1]
     assert (hit.mode_before, hit.mode_after) == ("rock", "flight")
     assert hit.impulse == pytest.approx(0.407101, abs=1e-4)

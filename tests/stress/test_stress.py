@@ -5,7 +5,6 @@ import csv
 from collections import Counter
 
 import numpy as np
-import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
@@ -231,10 +230,3 @@ def test_the_command(tmp_path, told):
     assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
     assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
     assert "| ebm | " in (tmp_path / "summary.md").read_text()
-
-
-@pytest.mark.slow
-def test_quick_run(tmp_path):
-    found = run(Stress("runs", quick=True, seed=11), tmp_path)
-    assert found.complete
-    assert found.exit_code == 0

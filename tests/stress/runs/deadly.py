@@ -13,19 +13,6 @@ from rockcheck.validation.studies.stress.study import Stress
 FAILING = (3, 4, 5, 13)
 
 
-class Deadly(Stress):
-    """Run 3 kills its process, run 13 hangs."""
-
-    @staticmethod
-    def play(task: Any) -> Any:
-        runs = range(task.first, task.first + task.count)
-        if 3 in runs:
-            os._exit(9)
-        if 13 in runs:
-            time.sleep(600.0)
-        return RunTotals(model=task.model, counts=Counter(runs=task.count))
-
-
 class Stubborn(Stress):
     """Every scene fails. As they shrink, run 13 kills its process, run 4 takes its time, run 3
     never ends once it has no walls."""
