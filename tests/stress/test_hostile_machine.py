@@ -16,14 +16,6 @@ import pytest
 from hostile import LIMITED, ROCKCHECK
 
 from rockcheck.commands.cli import main
-from rockcheck.reports.document import publish
-from rockcheck.scenes import load_scene
-from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.execute import pool, store as stores
-from rockcheck.validation.execute.store import HISTORIES, Store
-from rockcheck.validation.studies.stress import runs, study
-from rockcheck.validation.studies.stress.runs import PLAYERS
-from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
@@ -117,68 +109,6 @@ def test_what_is_no_file_is_written_as_it_is(tmp_path):
     assert Path("/dev/stdout").is_symlink()
 
 
-def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
-    """A crash between writing and naming leaves the old content."""
-    path = write_whole(tmp_path / "a.json", "old")
-
-    def crash(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", crash)
-    with pytest.raises(OSError, match="No space"):
-        write_whole(path, "new")
-    assert path.read_text() == "old"
-    assert not leavings(tmp_path)
-
-
-@pytest.mark.parametrize("years", [0.0, 10.0, -10.0])
-def test_clock_that_jumps(tmp_path, monkeypatch, years):
-    """What a run has used is kept, and read back."""
-    store, now = Store(tmp_path), time.time() + years * 365 * 86400.0
-    monkeypatch.setattr(stores.time, "time", lambda: now)
-    store.put("a", {".csv.gz": b"t,theta\n0,0\n", ".events.csv.gz": b""}, {"outcome": "at rest"})
-    for path in (tmp_path / HISTORIES).iterdir():
-        os.utime(path, (now, now))
-    store.prune()
-    assert store.get("a") == {"outcome": "at rest"}
-
-
-@pytest.fixture
-def deadly(monkeypatch):
-    """Studies whose workers fail, and little patience with them."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
-    for module, name, value in (
-        (pool, "COMPILING", 0.0),
-        (runs, "A_RUN", 0.0),
-        (runs, "PATIENCE", 4.0),
-        (study, "SHRINKING", 12.0),
-        (study, "HANGING", 1.0),
-    ):
-        monkeypatch.setattr(module, name, value)
-    import deadly
-
-    return deadly
-
-
-def test_shrinking_that_hangs(tmp_path, deadly):
-    """However long the trials of a failing scene take: shrinking ends, and each scene is as small
-    as trials that end make it."""
-    began = time.monotonic()
-    found = run(deadly.Stubborn("runs", models=("ebm",), runs=20), tmp_path, jobs=2)
-    assert time.monotonic() - began < 90.0
-    publish(found, tmp_path)
-    names = {number: f"failures/ebm-mirror-1-{number}.toml" for number in deadly.FAILING}
-    small = {number: load_scene(tmp_path / name) for number, name in names.items()}
-    before = {number: PLAYERS["ebm"].scene(1, number) for number in names}
-    assert small[3].walls  # the trial without one is the one that hangs
-    assert small[3].excitation.kind == "rest" != before[3].excitation.kind
-    assert small[4].excitation != before[4].excitation
-    assert small[5].duration < 0.1 * before[5].duration
-    assert small[13].excitation == before[13].excitation
-    for remark, numbers in (("not the smallest", {3, 4}), ("not shrunk", {13})):
-        assert {n for n, name in names.items() if remark in found.files[name]} == numbers
-
-
 @pytest.fixture
 def interruptible():
     """What is started here hears SIGINT, also where these tests run in the background of a shell,
@@ -227,22 +157,3 @@ def test_interrupted(tmp_path, later):
     assert sum(batch["counts"]["runs"] for batch in data["batches"].values()) < 60000
     assert (tmp_path / "index.html").is_file()
     assert not leavings(tmp_path)
-
-
-@pytest.mark.needs("Linux")
-def test_killed(tmp_path):
-    """A run that is killed leaves no worker behind, however busy, and the next run in its folder is
-    whole."""
-    running = started(tmp_path)
-    try:
-        children = workers(running)
-    finally:
-        running.kill()
-        running.communicate()
-    assert len(children) >= 2
-    until = time.monotonic() + 30.0
-    while any(Path(f"/proc/{child}").exists() for child in children) and time.monotonic() < until:
-        time.sleep(0.2)
-    assert not any(Path(f"/proc/{child}").exists() for child in children)
-    assert main([*SMALL_RUN, "--out", str(tmp_path), "--quiet"]) in (0, 1)
-    assert json.loads((tmp_path / "run.json").read_text())["complete"] is True
