@@ -188,23 +188,6 @@ def test_a_no_that_is_accepted_may_be_either(typed):
     typed(*validate, holds=["better than expected", said])
 
 
-def test_accept_writes_nothing_that_validate_refuses(typed):
-    t = np.linspace(0.5, 2.0, 151)
-    Path("table.csv").write_text("t,theta\n" + "\n".join(f"{x:.3f},0.0" for x in t) + "\n")
-    text = SUITE.format(other="measured").replace(
-        "[require]", 'files = { short = "table.csv" }\n[require]'
-    )
-    words = (suite(), *CODE, "--jobs", "1")
-    Path("mine.toml").write_text(text)
-    said = "theta_rms: other starts only at 0.5 s; `offset` of the measured model"
-    typed("accept", *words, code=1, holds=[f"not accepted: [short.other.still] {said}"])
-    assert not Path("mine.tolerances.toml").exists()
-    aligned = text.replace("[require]", "offset = -0.5\n[require]")
-    Path("mine.toml").write_text(aligned.replace('"theta_rms", "outcome_agrees"', '"theta_rms@1s"'))
-    typed("accept", *words)
-    typed("validate", *words, "--no-report", "--strict")
-
-
 def test_a_model_of_ones_own_that_returns_no_history_is_told_so(typed):
     said = ("faulty:Nothing returned NoneType",)
     simulated(typed, "Nothing", "a.csv", code=3, holds=said)

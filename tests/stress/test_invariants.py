@@ -11,8 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, History, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck import (
+    Block,
+    EventBasedModel,
+    Floor,
+    History,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+)
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.studies.stress import invariants, runs
 from rockcheck.validation.studies.stress.invariants import (

@@ -126,7 +126,7 @@ def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     assert [(half.first, half.count) for half in halves] == [(0, 2), (2, 3)]
     assert halves[1].seconds < whole.seconds
     assert parts(Chunk("ebm", 1, 2, 1)) == []
-    shrinking = Shrinking(Broken("ebm", "mirror", 1, 3, 1.0))
+    shrinking = Shrinking(Broken("ebm", "mirror", 1, 3, 1.0), 10.0)
     assert [part.trials for part in parts(shrinking)] == [shrinking.trials // 4]
     assert parts(dataclasses.replace(shrinking, trials=1)) == []
 
