@@ -57,18 +57,6 @@ def test_every_data_file_is_in_the_wheel():
                 assert any(path.match(pattern) for pattern in named), path
 
 
-def test_the_command_the_plugin_and_the_views_are_there():
-    points = PROJECT["project"]["entry-points"]
-    for point in (
-        PROJECT["project"]["scripts"]["rockcheck"],
-        points["pytest11"]["rockcheck"],
-        points["rockcheck.views"]["rockcheck"],
-    ):
-        module, _, name = point.partition(":")
-        assert not name or hasattr(importlib.import_module(module), name)
-        importlib.import_module(module)
-
-
 def imported(nodes: Iterable[ast.AST]) -> set[str]:
     """Top-level names of modules that these statements import."""
     return {

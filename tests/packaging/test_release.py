@@ -17,6 +17,7 @@ import yaml
 from rockcheck.commands.cli import main
 
 ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
 SUITE = """
 reference = "ebm-unilateral"
@@ -152,27 +153,26 @@ def test_a_user_s_script_is_checked(tmp_path, marked, code):
 
 def test_a_release_says_where_it_comes_from(tmp_path):
     """The address is written in where a release is built, and nowhere else."""
+    (tmp_path / ".ci").mkdir()
     for name in ("pyproject.toml", "CITATION.cff", ".ci/project_urls.py"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
-
-    def write(address):
+    for address, code in (
+        ("ftp://example.org/a/b", 1),
+        ("https://example.org/a/b/", 0),
+        ("https://example.org/c/d", 0),
+    ):
         command = [sys.executable, tmp_path / ".ci" / "project_urls.py", address]
-        return subprocess.run(command, capture_output=True, cwd=tmp_path).returncode
-
-    asked = ("ftp://example.org/a/b", "https://example.org/a/b/", "https://example.org/c/d")
-    assert [write(address) for address in asked] == [1, 0, 0]
+        assert subprocess.run(command, capture_output=True, cwd=tmp_path).returncode == code
     project = tomllib.loads((tmp_path / "pyproject.toml").read_text(encoding="utf-8"))
-    own = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     urls = project["project"].pop("urls")
-    assert (urls["Issues"], project) == ("https://example.org/c/d/issues", own)
+    assert (urls["Issues"], project) == ("https://example.org/c/d/issues", PROJECT)
     citation = yaml.safe_load((tmp_path / "CITATION.cff").read_text(encoding="utf-8"))
     assert citation["repository-code"] == "https://example.org/c/d"
 
 
 def test_the_citation_and_the_changelog_are_of_this_version():
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = PROJECT["project"]
     for key in ("version", "license", "authors"):
         assert citation[key] == project[key]
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
@@ -208,7 +208,7 @@ def test_all_that_ci_installs_is_locked_by_hash():
     assert all("--hash=sha256:" in entry for entry in entries)
     assert "://" not in lock
     locked = {entry.partition("==")[0] for entry in entries}
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = PROJECT["project"]
     extras = (project["optional-dependencies"][name] for name in ("test", "docs", "lint"))
     asked = sum(extras, ["setuptools", *project["dependencies"]])
     names = {re.split(r"[\[<>=!~; ]", text)[0].lower().replace("_", "-") for text in asked}
@@ -218,15 +218,13 @@ def test_all_that_ci_installs_is_locked_by_hash():
 def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path):
     """A part that fails fails the night, after all others; what cannot be run is told as such, and
     never as passed."""
-    python = sys.executable
     parts = [
-        nightly.Part(
-            "broken", (python, "-c", "print('1 failed'); raise SystemExit(3)"), nightly.last_line
-        ),
-        nightly.Part(
-            "absent", (python, "-c", "print()"), nightly.last_line, "a_module_that_nobody_has"
-        ),
-        nightly.Part("fine", (python, "-c", "print('=== 5 passed in 2 s ===')"), nightly.last_line),
+        nightly.Part(name, (sys.executable, "-c", code), nightly.last_line, needs)
+        for name, code, needs in (
+            ("broken", "print('1 failed'); raise SystemExit(3)", ""),
+            ("absent", "print()", "a_module_that_nobody_has"),
+            ("fine", "print('=== 5 passed in 2 s ===')", ""),
+        )
     ]
     monkeypatch.setattr(nightly, "parts", lambda *_: parts)
     monkeypatch.setenv("NIGHTLY_QUICK", "1")
