@@ -17,7 +17,7 @@ reference = "still"
 [models.still]
 model = "faulty:Still"
 [models.near]
-model = "faulty:{model}"
+model = "faulty:Still"
 offset = {offset}
 [[scene]]
 name = "short"
@@ -36,16 +36,14 @@ def folder(in_an_empty_folder):
     ran("a", 0.001)
 
 
-def ran(out: str, offset: float, *words: str, model: str = "Still", code: int = 0) -> None:
-    text = SUITE.format(offset=offset, model=model)
+def ran(out: str, offset: float, *words: str, code: int = 0) -> None:
+    text = SUITE.format(offset=offset)
     Path("mine.toml").write_text(text, encoding="utf-8")
     assert main(["validate", "mine.toml", *CODE, "--no-report", "--out", out, *words]) == code
 
 
 @pytest.fixture
 def diff(told):
-    """The changes between two folders, of which the command ends with that code."""
-
     def asked(a: str, b: str, code: int) -> list[dict]:
         found = told("compare", a, b, code=code)
         assert found["exit_code"] == code
@@ -94,7 +92,6 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
 
 
 def changed(**change: object) -> None:
-    """The run of `a` in `b`, with a change."""
     Path("b").mkdir()
     Run.load("a").model_copy(update=change).save(Path("b"))
 

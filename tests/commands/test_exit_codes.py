@@ -18,8 +18,6 @@ ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 
 @pytest.fixture
 def broken(monkeypatch):
-    """A command line with a fault inside."""
-
     def fault(**_: object) -> None:
         raise ZeroDivisionError("a fault\nof two lines")
 

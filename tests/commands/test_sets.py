@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.scenes import Record, load_scene
 from rockcheck.validation.execute.models import FAMILIES, not_installed
 from rockcheck.validation.suite.results import Run
@@ -58,7 +57,6 @@ ODD = "README.txt"
 
 
 def names(left_out: list[str]) -> list[str]:
-    """The names of the files that are left out, without the reasons."""
     return [Path(text.partition(",")[0]).name for text in left_out]
 
 
@@ -158,15 +156,15 @@ scenes = ["rack"]
 """
 
 
-def test_a_suite_has_tables_of_records():
+def test_a_suite_has_tables_of_records(typed):
     Path("other.toml").write_text(SCENE, encoding="utf-8")
     Path("mine.toml").write_text(SUITE, encoding="utf-8")
     suite = load_suite("mine.toml", allow_code=("faulty:Still",))
     assert list(suite.scenes) == ["other", "rack, RSN1_H1", "rack, RSN1_H2"]
     assert suite.left_out == ("RSN1_V.AT2",)
     assert suite.scenes["rack, RSN1_H2"].excitation.scale == 2.0
-    assert main(["accept", "mine.toml", *CODE, "--jobs", "1"]) == 0
-    assert main(["validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict"]) == 0
+    typed("accept", "mine.toml", *CODE, "--jobs", "1")
+    typed("validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict")
 
 
 def test_a_population_takes_the_same_sets(told):

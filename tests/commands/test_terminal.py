@@ -34,7 +34,6 @@ floor = { friction = 0.5 }
 
 
 def rockcheck(*words, **environment):
-    """The command in a process of its own, without a terminal."""
     line = [sys.executable, "-m", "rockcheck", *words]
     return subprocess.run(
         line,

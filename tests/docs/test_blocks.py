@@ -58,7 +58,6 @@ def blocks_of(page: Path) -> Iterator[Block]:
 
 
 def commands_of(text: str) -> list[str]:
-    """The commands of a shell block, without their remarks."""
     lines = (line.split(" #")[0].rstrip() for line in text.splitlines())
     return [line for line in lines if line and not line.startswith("#")]
 
@@ -75,7 +74,6 @@ def is_long(command: str) -> bool:
 
 
 def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a command; the interpreter of the tests is the first on the path."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-c", command],
@@ -104,7 +102,6 @@ def run_session(text: str, folder: Path) -> None:
 
 
 def show_file(block: Block, folder: Path) -> None:
-    """Write the file that a block shows, and read or run it as what it is."""
     path = folder / block.file
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(block.text, encoding="utf-8")
@@ -184,5 +181,4 @@ def test_long_commands_are_understood(command, tmp_path):
     ),
 )
 def test_long_commands_run(command, tmp_path):
-    """In the form that takes the least time."""
     run_shell(command, tmp_path)

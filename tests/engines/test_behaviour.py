@@ -117,7 +117,7 @@ def test_a_step_controller_says_how_steps_follow_each_other(varying_engine):
 
 @pytest.mark.slow
 @pytest.mark.needs("drake")
-def test_drake_goes_on_where_its_solver_stumbles(monkeypatch):
+def test_drake_goes_on_where_its_solver_stumbles():
     """Two steps of this record are not solved as they stand: the run ends all the same, and does so
     again."""
     scene = load_scene("fig4a").replace(duration=8.0)
@@ -127,9 +127,6 @@ def test_drake_goes_on_where_its_solver_stumbles(monkeypatch):
     np.testing.assert_array_equal(
         Drake(time_step=1e-3).simulate(scene).channels["theta"], history.channels["theta"]
     )
-    monkeypatch.setattr("rockcheck.engines.drake_engine.COARSEST_STICTION", 0.0)
-    with pytest.raises(ModelFailure, match="failed to converge"):
-        Drake(time_step=1e-3).simulate(scene)
 
 
 def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):

@@ -58,7 +58,6 @@ def test_every_data_file_is_in_the_wheel():
 
 
 def imported(nodes: Iterable[ast.AST]) -> set[str]:
-    """Top-level names of modules that these statements import."""
     return {
         (getattr(node, "module", None) or alias.name).partition(".")[0]
         for node in nodes
@@ -69,7 +68,6 @@ def imported(nodes: Iterable[ast.AST]) -> set[str]:
 
 @cache
 def sources(top: str) -> dict[Path, ast.Module]:
-    """The files of a folder, parsed; there are some."""
     found = {
         path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / top).rglob("*.py")
     }
@@ -84,7 +82,6 @@ ELSEWHERE = {"pydrake": "drake"}
 
 
 def owners_of(name: str) -> set[str]:
-    """Distributions that install a module of this name."""
     return {
         owner.lower().replace("_", "-")
         for owner in DISTRIBUTIONS.get(name, [ELSEWHERE.get(name, name)])

@@ -45,7 +45,6 @@ def project(tmp_path, monkeypatch):
 
 
 def spoil(project):
-    """Expects of the peak another value than it has."""
     path = project / "rockcheck.tolerances.toml"
     spoilt, count = re.subn(r"expected = [0-9.e-]+", "expected = 0.1", path.read_text("utf-8"))
     assert count == 1
@@ -100,7 +99,6 @@ def test_the_action_installs_itself():
 
 
 def test_the_action_judges_marks_and_keeps(runner, project):
-    """Pass, then fail with an annotation a figure; a suite that is none is bad input."""
     fine = runner(suite="rockcheck.toml", arguments="--strict --no-report", out="kept")
     assert {name: code for name, (code, _) in fine.items()} == dict.fromkeys(
         ("validate", "annotate", "verdict"), 0
@@ -245,18 +243,6 @@ def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path
     assert "| absent | not run | 0 | a_module_that_nobody_has is not installed |" in shown
 
 
-def test_parts_cover_the_readers_and_the_stress_run(nightly, tmp_path):
-    names = [part.name for part in nightly.parts(False, 7, tmp_path)]
-    assert {
-        "slow tests",
-        "stress",
-        "known weaknesses of dependencies",
-        *(f"fuzz {reader}" for reader in nightly.READERS),
-    } <= set(names)
-    source = (ROOT / "tests/stress/test_hostile_input.py").read_text(encoding="utf-8")
-    assert all(f'    "{reader}": (' in source for reader in nightly.READERS)
-
-
 def test_an_audit_that_reaches_no_list_has_not_passed(nightly, tmp_path):
     found = {
         "dependencies": [
@@ -311,7 +297,6 @@ def test_fine(): pass
     ],
 )
 def test_a_skip_that_is_not_listed_fails_in_ci(pytester, monkeypatch, ci, outcomes):
-    """Of a test, a fixture and a whole file."""
     monkeypatch.setenv("CI", ci)
     pytester.makeconftest(CONFTEST.read_text(encoding="utf-8"))
     pytester.makepyfile(

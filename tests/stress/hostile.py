@@ -146,7 +146,6 @@ class Case:
 
 
 def cases() -> Iterator[Case]:
-    """All cases, always in the same order."""
     for reader, (file, valid, words) in READERS.items():
         for kind, spoil in WHOLE.items():
             yield Case(
@@ -208,17 +207,18 @@ def try_case(case: Case) -> str:
             env={**os.environ, **case.environment},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
         )
         try:
             if case.signal_after is not None:
                 time.sleep(case.signal_after)
                 running.send_signal(signal.SIGINT)
-            _, said = running.communicate(timeout=SECONDS)
+            _, text = running.communicate(timeout=SECONDS)
         except subprocess.TimeoutExpired:
             running.kill()
             running.communicate()
             return f"did not end within {SECONDS:g} s"
-        text = said.decode("utf-8", "replace")
         lines = [
             line for line in text.splitlines() if "no private folder for compiled code" not in line
         ]
@@ -235,18 +235,17 @@ def try_case(case: Case) -> str:
 
 
 def main() -> int:
-    """Try all; exit 1 where one is not as it should be."""
     signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # a shell's background jobs, and all that they start, ignore Ctrl-C
-    wrong = 0
     tried = list(cases())
+    faults = 0
     for case in tried:
         if fault := try_case(case):
-            wrong += 1
+            faults += 1
             print(f"{case.name}: {fault}", flush=True)
-    print(f"{len(tried)} hostile cases, {wrong} not as they should be")
-    return int(bool(wrong))
+    print(f"{len(tried)} hostile cases, {faults} not as they should be")
+    return int(faults > 0)
 
 
 if __name__ == "__main__":

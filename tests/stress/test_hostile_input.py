@@ -75,7 +75,6 @@ def feed_file(
     reads: Sequence[Callable[[Path], Any]],
     check: Callable[[Any], object] = lambda found: None,
 ) -> None:
-    """What can be read of a file of that name passes the check."""
     path = folder / name
     path.write_bytes(content)
     for read in reads:
@@ -136,7 +135,6 @@ def stored_files() -> dict[str, bytes]:
 
 
 def feed_stored_record(content: bytes, folder: Path) -> None:
-    """A damaged record is as good as none."""
     store = Store(folder)
     for suffix in SUFFIXES:
         (folder / "histories" / f"a{suffix}").write_bytes(stored_files()[suffix])
@@ -296,7 +294,6 @@ def test_names_are_told_from_paths_and_from_markup(tmp_path, name):
 
 
 def test_a_stored_path_does_not_leave_the_run(tmp_path, refused):
-    """A run's file whose history lies elsewhere is refused, before any page is written."""
     data = json.loads(stored_files()["run.json"])
     (tmp_path / "secret.csv").write_bytes(gzip.decompress(stored_files()[TABLE]))
     run = tmp_path / "run"

@@ -48,20 +48,19 @@ def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.needs("POSIX")
-def test_disk_full(tmp_path):
+@pytest.mark.parametrize("old", [False, True])
+def test_disk_full(tmp_path, old):
     """A history that does not fit: one line that names the file, exit 2, and the old history with
     its events as they were."""
-    out, events = tmp_path / "out.csv", tmp_path / "out.events.csv"
-    words = ("simulate", "fig4a", "--model", "ebm", "-o", str(out))
-    for old in ({}, {out, events}):
-        if old:
-            assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
-        before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-        assert before.keys() == set(old)
-        done = limited(4096, *words)
-        assert done.returncode == 2
-        assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
-        assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    out = tmp_path / "out.csv"
+    if old:
+        assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert before.keys() == ({out, tmp_path / "out.events.csv"} if old else set())
+    done = limited(4096, "simulate", "fig4a", "--model", "ebm", "-o", str(out))
+    assert done.returncode == 2
+    assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 @pytest.mark.needs("POSIX")
@@ -131,7 +130,6 @@ def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
 
 
 def started(folder: Path) -> subprocess.Popen:
-    """A long study in a process group of its own."""
     words = ("stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out")
     pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
     return subprocess.Popen([*ROCKCHECK, *words, str(folder)], start_new_session=True, **pipes)

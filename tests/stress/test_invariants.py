@@ -69,25 +69,21 @@ def test_a_run_that_keeps_all_invariants(label, scene):
     assert {"energy", "mirror", "similarity", "tolerance", "penetration"} <= played.figures.keys()
 
 
-def test_similar_and_disturbed_scenes():
-    """A similar one has the same accelerations, and its block the same load."""
+def test_a_similar_scene_has_another_size():
+    """That it moves alike is an invariant of each run."""
+    ratio = similar(LOADED, 3).block.half_width / LOADED.block.half_width
+    assert ratio != pytest.approx(1.0)
+
+
+def test_disturbed_scenes_differ_a_little():
     (x, z), block = LOADED.block.offset, LOADED.block
-    other = similar(LOADED, 3)
-    k = other.block.half_width / block.half_width
-    assert k != pytest.approx(1.0)
-    assert other.block.offset == pytest.approx((k * x, k * z))
-    assert other.block.moment_of_inertia == pytest.approx(k * k * block.moment_of_inertia)
-    assert other.walls[0].gap == pytest.approx(k * 0.05)
-    pulse = other.excitation
-    assert (pulse.amplitude, pulse.period) == pytest.approx((8.0, math.sqrt(k) * 1.2))
     changed = [scene.block for scene in invariants._disturbed(LOADED, 1)]
     assert len(changed) == invariants.DISTURBED
     news = [(*one.offset, one.moment_of_inertia) for one in changed]
     off = np.abs(np.array(news) / (x, z, block.moment_of_inertia) - 1.0)
     assert 0.0 < off.min() < off.max() <= 1.01 * invariants.DISTURBANCE
-    full = LOADED.replace(
-        block=block.replace(moment_of_inertia=0.4**2 + 1.2**2 - x * x - z * z)
-    )  # as much as there can be
+    most = 0.4**2 + 1.2**2 - x * x - z * z  # as much as there can be
+    full = LOADED.replace(block=block.replace(moment_of_inertia=most))
     assert 0 < len(list(invariants._disturbed(full, 1))) < invariants.DISTURBED
 
 
@@ -130,7 +126,6 @@ def test_rules_of_integration():
 
 
 def spoilt(history: History, outcome: str = "", **change: Callable[..., Any]) -> History:
-    """A history with one thing changed."""
     channels = {
         name: change.get(name, np.copy)(column) for name, column in history.channels.items()
     }

@@ -41,8 +41,6 @@ from rockcheck.validation.study import run
 
 
 def test_a_load_is_dropped_only_if_it_does_not_matter():
-    """Shrinking tries a block without its load, or with it in the middle, and none that may not
-    be."""
     loaded = random_scene(1, 0).replace(
         block=Block(
             half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
