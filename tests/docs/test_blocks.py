@@ -52,6 +52,10 @@ def blocks_of(page: Path) -> Iterator[Block]:
             language, _, rest = token.info.strip().partition(" ")
             title = re.fullmatch(r'title="([^"]+)"', rest)
             assert bool(title) == bool(rest), f"{page.name}, line {line}: {token.info}"
+            assert language in LANGUAGES, f"{page.name}, line {line}: {language!r}"
+            assert title or language in ("python", "bash", "text"), (
+                f"{page.name}, line {line}: a file without a name is not run"
+            )
             yield Block(language, title[1] if title else "", token.content, line)
         elif token.type == "code_block":
             yield Block("bash", "", token.content, line)
@@ -114,15 +118,6 @@ def show_file(block: Block, folder: Path) -> None:
         for step in (step.get("run", "") for job in jobs.values() for step in job["steps"]):
             if step.startswith("rockcheck"):
                 run_shell(step, folder)
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_block_has_a_language(page):
-    for block in blocks_of(page):
-        assert block.language in LANGUAGES, f"{page.name}, line {block.line}: {block.language!r}"
-        assert block.file or block.language in ("python", "bash", "text"), (
-            f"{page.name}, line {block.line}: a file without a name is not run"
-        )
 
 
 @pytest.mark.long

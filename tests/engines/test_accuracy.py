@@ -118,8 +118,7 @@ def test_cone_correction(pulse, step):
     assert plain.peak_rotation / scene.block.alpha == pytest.approx(0.400, abs=3e-3)
 
 
-def apart(one, other) -> float:
-    """RMS of the difference of theta, rad."""
+def theta_rms(one, other) -> float:
     return float(np.sqrt(np.mean((one.channels["theta"] - other.channels["theta"]) ** 2)))
 
 
@@ -128,7 +127,7 @@ def test_a_shorter_step_comes_nearer(single_engine, free_rocking, tilt):
     scene = free_rocking(tilt)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     coarse, fine = (
-        apart(single_engine(time_step=step).simulate(scene), reference) / scene.block.alpha
+        theta_rms(single_engine(time_step=step).simulate(scene), reference) / scene.block.alpha
         for step in (1e-3, 1e-4)
     )
     assert coarse < 3e-2
@@ -155,7 +154,7 @@ def test_where_the_mass_lies_is_known_or_refused(single_engine):
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     for settings in ("best", "default"):
         found = single_engine(time_step=1e-4, settings=settings).simulate(scene)
-        assert apart(found, reference) < 3e-2 * rack.alpha
+        assert theta_rms(found, reference) < 3e-2 * rack.alpha
 
 
 @pytest.mark.parametrize("settings", ["best", "default"])
@@ -176,4 +175,4 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     )
     assert asleep.peak_rotation < 1e-4 * scene.block.alpha
     assert reference.peak_rotation > 0.2 * scene.block.alpha
-    assert apart(awake, reference) < 2e-2 * scene.block.alpha
+    assert theta_rms(awake, reference) < 2e-2 * scene.block.alpha

@@ -228,7 +228,6 @@ def test_small_and_large_blocks_move_alike(pulse, stock):
 
 
 def impacts(history):
-    """The first impacts by kind."""
     return [event.kind for event in history.event_list if "impact" in event.kind][:6]
 
 
