@@ -2,13 +2,11 @@
 files, nearest names."""
 
 import os
-import pty
 import re
 import subprocess
 import sys
 import time
 import tomllib
-from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
@@ -43,36 +41,6 @@ def rockcheck(*words, **environment):
         timeout=300,
         check=False,
     )
-
-
-def on_a_terminal(*words, columns=80):
-    """What the command writes to a terminal of that width: stdout and stderr together."""
-    code = (
-        "import fcntl, struct, sys, termios; from rockcheck.commands.cli import main;"
-        f"fcntl.ioctl(1, termios.TIOCSWINSZ, struct.pack('HHHH', 40, {columns}, 0, 0));"
-        " sys.exit(main(sys.argv[1:]))"
-    )
-    terminal, inside = pty.openpty()
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in ("NO_COLOR", "COLUMNS", "CI")
-    }
-    with subprocess.Popen(
-        [sys.executable, "-c", code, *words],
-        stdin=inside,
-        stdout=inside,
-        stderr=inside,
-        env={**environment, "TERM": "xterm-256color"},
-    ) as process:
-        os.close(inside)
-        said = b""
-        with suppress(OSError):  # how Linux says that nobody holds the other end any more
-            while part := os.read(terminal, 65536):
-                said += part
-    os.close(terminal)
-    assert process.returncode == 0, said
-    return said.decode()
 
 
 def test_a_first_simulation_does_not_wait_for_the_compiler(tmp_path):
@@ -215,16 +183,16 @@ def test_a_long_work_tells_a_log_how_far_it_is(
     assert all(re.fullmatch(f"rockcheck: {said}", line) for line in err.splitlines())
 
 
-def test_on_a_terminal_colour_progress_and_its_width():
+@pytest.mark.parametrize("columns", [60, 80])
+def test_on_a_terminal_colour_progress_and_its_width(columns):
     main(["new", "mine.toml", "-q"])
-    said = on_a_terminal(
-        "simulate", "mine.toml", "--model", "mujoco", "--set", "time_step=1e-3", "-o", "a.csv"
-    )
-    assert [part for part in ("left", "mine, mujoco", "\x1b[") if part not in said] == []
+    terminal = {"TTY_COMPATIBLE": "1", "TERM": "xterm-256color", "COLUMNS": str(columns)}
+    words = "--model", "mujoco", "--set", "time_step=1e-3", "-o", "a.csv"
+    done = rockcheck("simulate", "mine.toml", *words, **terminal)
+    assert [part for part in ("left", "mine, mujoco", "\x1b[") if part not in done.stderr] == []
     assert not list(Path().glob("*--*")), "only what was asked for"
-    for columns in (60, 80):
-        plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", on_a_terminal("scenes", columns=columns))
-        assert max(len(line) for line in plain.replace("\r", "").splitlines()) <= columns
+    plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", rockcheck("scenes", **terminal).stdout)
+    assert max(map(len, plain.splitlines())) <= columns
 
 
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])

@@ -1,10 +1,11 @@
 """What others use of the repository: the action, the pre-commit hook, the types, the citation; and
 what CI does: the lock file, `.ci/nightly.py`, and the page that shows its last results."""
 
-import importlib.util
+import importlib
 import json
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -180,17 +181,11 @@ def test_the_citation_and_the_changelog_are_of_this_version():
 # --- what CI installs and what a night tells
 
 
-def loaded(path: str):
-    spec = importlib.util.spec_from_file_location(Path(path).stem, ROOT / path)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
 def nightly(tmp_path, monkeypatch):
-    module = loaded(".ci/nightly.py")
+    monkeypatch.syspath_prepend(ROOT / ".ci")
+    monkeypatch.delitem(sys.modules, "nightly", raising=False)
+    module = importlib.import_module("nightly")
     monkeypatch.setattr(module, "KEPT", module.ROOT / "build" / tmp_path.name / "nightly.json")
     module.KEPT.parent.mkdir(parents=True, exist_ok=True)
     monkeypatch.setenv("NIGHTLY_OUT", str(tmp_path))
@@ -238,7 +233,7 @@ def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path
     ]
     assert kept["whole"]["parts"][1]["figures"] == "5 passed in 2 s"
     assert kept["whole"]["seed"] == 7
-    shown = loaded("docs/site_tools/nightly.py").tables(kept)
+    shown = runpy.run_path(str(ROOT / "docs/site_tools/nightly.py"))["tables"](kept)
     assert "| broken | failed |" in shown
     assert "| absent | not run | 0 | a_module_that_nobody_has is not installed |" in shown
 

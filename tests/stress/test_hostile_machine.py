@@ -31,10 +31,6 @@ def one_line(stderr: str) -> str:
     return line
 
 
-def leavings(folder: Path) -> list[Path]:
-    return list(folder.rglob("*.part"))
-
-
 def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
     """rockcheck where no file can be larger than `size` bytes; without coverage.py and
     Python's own caches (-B), which would be cut off at that size."""
@@ -154,4 +150,4 @@ def test_interrupted(tmp_path, later):
     assert data["complete"] is False
     assert sum(batch["counts"]["runs"] for batch in data["batches"].values()) < 60000
     assert (tmp_path / "index.html").is_file()
-    assert not leavings(tmp_path)
+    assert not list(tmp_path.rglob("*.part"))
