@@ -189,6 +189,7 @@ def test_validate_keeps_the_run_before_it_tells(typed):
     kept = {path.name for path in folder.iterdir()}
     assert kept >= {"run.json", "checks.csv", "figures.csv", "junit.xml", "summary.md"}
     assert 'failures="1"' in (folder / "junit.xml").read_text()
+    assert "\nshort,near,still,theta_peak,," in (folder / "checks.csv").read_text()
     said = "theta_peak against still: 0.003837 is more than 0.001"
     assert said in (folder / "summary.md").read_text()
     Path("mine.toml").write_text(SUITE.replace("1e-3", "1.2e-3") + LINE.format("0.01"))
