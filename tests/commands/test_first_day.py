@@ -64,23 +64,24 @@ def test_without_a_model_the_reference_plays(typed):
     assert Path("fig5a--ebm-unilateral.csv").exists()
 
 
-#: Each format: its channels, its outcome, and what happened.
+#: Of each format: what reads it, and from that the channels, the outcome and what happened.
 FORMATS = {
-    "a.json": lambda: [
-        (found := json.loads(Path("a.json").read_text()))["channels"],
-        found["outcome"],
-        found["events"]["kind"],
-    ],
-    "a.mat": lambda: [
-        (found := loadmat("a.mat", simplify_cells=True))["channels"],
-        found["about"]["outcome"],
-        [found["events"]["kind"]],  # of one event
-    ],
-    "a.parquet": lambda: [
-        (found := pd.read_parquet("a.parquet")),
-        found.attrs["rockcheck_history"]["outcome"],
-        list(pd.read_parquet("a.events.parquet")["kind"]),
-    ],
+    "a.json": (
+        lambda: json.loads(Path("a.json").read_text()),
+        lambda found: (found["channels"], found["outcome"], found["events"]["kind"]),
+    ),
+    "a.mat": (
+        lambda: loadmat("a.mat", simplify_cells=True),  # which makes no list of one event
+        lambda found: (found["channels"], found["about"]["outcome"], [found["events"]["kind"]]),
+    ),
+    "a.parquet": (
+        lambda: (pd.read_parquet("a.parquet"), pd.read_parquet("a.events.parquet")),
+        lambda found: (
+            found[0],
+            found[0].attrs["rockcheck_history"]["outcome"],
+            list(found[1]["kind"]),
+        ),
+    ),
 }
 
 
@@ -90,7 +91,8 @@ FORMATS = {
 def test_a_history_in_another_format_is_that_of_the_csv(typed, file):
     simulated(typed, "Falls", "a.csv", "-o", file)
     table = History.load("a.csv")
-    channels, outcome, kinds = FORMATS[file]()
+    read, parts = FORMATS[file]
+    channels, outcome, kinds = parts(read())
     assert (outcome, kinds) == (table.outcome, [event.kind for event in table.event_list])
     assert list(channels) == list(table.channels)
     for name, column in table.channels.items():

@@ -397,8 +397,6 @@ def test_an_impact_before_the_block_arrives_is_an_impact(rebound):
 
 
 def test_a_bounce_does_not_turn_the_slip_round(varying_engine):
-    if varying_engine.name == "drake":  # has no restitution
-        return
     floor, tilt = Floor(friction=0.5, restitution=0.3), {"initial_rotation": -0.1, "duration": 0.2}
     scene = Scene(name="a", block=PAPER_BLOCK, floor=floor, initial_height=0.02, **tilt)
     for slip in (-1.0, -0.1):
