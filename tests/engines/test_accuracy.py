@@ -15,6 +15,8 @@ from rockcheck import (
     Wall,
     engines,
 )
+from rockcheck.engines.events import events_of
+from rockcheck.scenes.scene import PAPER_BLOCK
 
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
 PULSES = (
@@ -176,3 +178,21 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes(pulse):
     assert asleep.peak_rotation < 1e-4 * scene.block.alpha
     assert reference.peak_rotation > 0.2 * scene.block.alpha
     assert theta_rms(awake, reference) < 2e-2 * scene.block.alpha
+
+
+@pytest.mark.parametrize("rebound", [0.5, 0.0])
+def test_an_impact_before_the_block_arrives_is_an_impact(rebound):
+    scene = Scene(name="a", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=0.4)
+    t, turn = 1e-3 * np.arange(400), 200
+    states = np.zeros((400, 6))
+    after = rebound * 9.81 * 0.2 - (9.81 * (t - 0.2) if rebound else 0.0)
+    states[:, 4] = np.where(np.arange(400) <= turn, -9.81 * t, after)
+    fallen = np.concatenate([[0.0], np.cumsum(1e-3 * states[1:, 4])])
+    states[:, 1] = PAPER_BLOCK.half_height + fallen - fallen[turn] + 1e-3  # by half a step early
+    felt = np.tile([0.0, -9.81], (399, 1))
+    found = events_of(scene, t, states, felt)
+    impacts = [event for event in found if event.kind == "floor impact"]
+    assert [event.t for event in impacts] == pytest.approx([0.2, 0.2], abs=2e-3)
+    assert sum(event.impulse for event in impacts) == pytest.approx(
+        (1.0 + rebound) * 9.81 * 0.2, rel=0.02
+    )
