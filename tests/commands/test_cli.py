@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
+from rockcheck.scenes import history
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -14,9 +15,25 @@ SCENE = (
 )
 
 
-def write(name, text):
-    Path(name).write_text(text, encoding="utf-8")
-    return name
+AT2 = "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= {}, DT= .01 SEC\n 0.1 0.2\n"
+#: Files with a slip each, and what is right beside them.
+FILES = {
+    "scene.toml": SCENE,
+    "negative.toml": SCENE.replace("0.4", "-0.4"),
+    "unknown.toml": "colour = 1\n" + SCENE,
+    "within.toml": SCENE.replace("half_width", "halfwidth"),
+    "table.toml": SCENE.replace("block", "blok"),
+    "slippery.toml": SCENE.replace("0.5", "1.4"),
+    "walls.toml": SCENE + '[walls]\nside = "left"\ngap = 0.1\n',
+    "record.toml": SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\n',
+    "unit.toml": SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\nunit = "kg"\n',
+    "wrong.toml": 'reference = "ebm"\nscenes = ["scene.toml"]\n[models.ebm]\n'
+    '[[records]]\nfiles = ["one.AT2"]\nscenes = ["seen"]\n',
+    "run.json": '{"format": 99}',
+    "short.AT2": AT2.format(3),
+    "one.AT2": AT2.format(2),
+    "one_V.AT2": AT2.format(2).replace("NAME", "Place, 1/1/2000, Station, UP"),
+}
 
 
 @pytest.mark.parametrize(
@@ -54,58 +71,84 @@ def write(name, text):
         (["spectrum", "fig8", "--force"], "--force: is gone: "),
         (["report", "out", "--against=ebm"], "--against: is gone: "),
         (["benchmark", "--minutes", "5"], "--minutes: is gone: "),
-        (["report", "."], "no finished run here"),
+        (["report", "gone"], "no finished run here"),
+        (["report", "."], "format 99; this version reads"),
+        *(
+            ([command, "--out", place], f"{place}: cannot be used as a folder")
+            for command in ("stress", "benchmark")
+            for place in ("scene.toml", "scene.toml/below")
+        ),
         ([], "Missing command"),
+        (
+            ["simulate", "walls.toml"],
+            "walls.toml: walls: must be a list of tables: write [[walls]]",
+        ),
+        (["simulate", "within.toml"], "block.halfwidth: unknown key; did you mean 'half_width'"),
+        (["simulate", "table.toml"], "table.toml: blok: unknown key; did you mean 'block'"),
+        (["simulate", "unit.toml"], "unit.toml: excitation.unit"),
+        (["simulate", "fig5a", "--model", "ebm", "--model", "cm"], "--model: is given twice"),
+        (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),
+        (
+            ["simulate", "fig5a", "-o", "x.xlsx"],
+            "x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx;"
+            " its figure as .svg, .png, .pdf",
+        ),
+        (["simulate", "fig5a", "-o", "x.parquet"], "needs the package pyarrow: pip install"),
+        (["simulate", "fig5a", "-o", "no/a.png"], "--output: no: no such folder"),
+        (["accept", "scene.toml"], "scene.toml: is a scene, not a suite; `rockcheck validate`"),
+        (["validate", "scene.toml", "--strict"], "--strict: scene.toml is a scene, and nothing"),
+        (["validate", "scene.toml", "--history", "r"], "--history: scene.toml is a scene, and"),
+        (["validate", "nothere"], "nothere"),
+        (["validate", "scen.toml"], "scen.toml: cannot be read"),
+        (["validate", "scene.toml", "--models", "ebm,mujcoo"], "did you mean 'mujoco'"),
+        (["validate", "scene.toml", "--models", "measured"], "'measured' is not allowed"),
+        (
+            ["validate", "scene.toml", "--models", "ebm", "--set", "cm.tolerance=1"],
+            "--set: 'cm.tolerance=1': write MODEL.key=value, with MODEL one of ebm",
+        ),
+        (
+            ["validate", "scene.toml", "--models", "ebm", "--set", "ebm.tol=1"],
+            "ebm.tol: unknown key",
+        ),
+        (["validate", "scene.toml", "--read", "unit=g"], "--read: needs records"),
+        (["validate", "scene.toml", "--records", "X*.AT2"], "X*.AT2: no such files"),
+        (
+            ["validate", "scene.toml", "--records", "one.AT2", "--read", "vertical=true"],
+            "one.AT2: 0 vertical components in it or in a file of the set that is named alike",
+        ),
+        (
+            ["validate", "scene.toml", "--records", "one_V.AT2"],
+            "one_V.AT2: a vertical component, and no horizontal one is given",
+        ),
+        (["validate", "wrong.toml"], "records.scenes: unknown scene 'seen'; did you mean 'scene'"),
+        (["new", "scene.toml"], "scene.toml: is there already"),
+        (["new", "mine.txt"], "mine.txt"),
+        (["new", "no/such/mine.toml"], "no/such"),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(words, said, refused):
-    write("scene.toml", SCENE)
-    write("negative.toml", SCENE.replace("0.4", "-0.4"))
-    write("unknown.toml", "colour = 1\n" + SCENE)
-    write("slippery.toml", SCENE.replace("0.5", "1.4"))
-    write("record.toml", SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\n')
-    write(
-        "short.AT2",
-        "PEER\nNAME\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 3, DT= .01 SEC\n 0.1 0.2\n",
-    )
+def test_bad_input_is_one_line_and_exit_2(words, said, refused, monkeypatch):
+    """Before anything is played or written."""
+    monkeypatch.setattr(history, "find_spec", lambda name: None)  # as without pyarrow
+    for name, text in FILES.items():
+        Path(name).write_text(text, encoding="utf-8")
     assert said in refused(*words)
+    left = {path.name: path.read_text("utf-8") for path in Path().rglob("*") if path.is_file()}
+    assert {name: left.get(name) for name in left.keys() - {"faulty.py"}} == FILES
 
 
 def test_histories_of_two_blocks_are_not_compared_unless_a_scene_says_how(refused):
     for name, width in (("one", "0.4"), ("same", "0.4000000001"), ("other", "0.5")):
-        write(f"{name}.toml", SCENE.replace("0.4", width))
+        Path(f"{name}.toml").write_text(SCENE.replace("0.4", width))
         assert main(["simulate", f"{name}.toml", "--model", *STILL, "-o", f"{name}.csv", "-q"]) == 0
-    assert main(["compare", "one.csv", "same.csv", "-q"]) == 0
+    rows = "".join(f"{0.005 * k},0\n" for k in range(41))
+    Path("plain.csv").write_text("t,theta\n" + rows)  # of a block that nothing is known of
+    for words in (["same.csv"], ["other.csv", "--scene", "one.toml"], ["plain.csv"]):
+        assert main(["compare", "one.csv", *words, "-q"]) == 0
     said = refused("compare", "one.csv", "other.csv")
     assert re.match("rockcheck: scene: .*half_width = 0.4,.*half_width = 0.5,", said)
-    assert main(["compare", "one.csv", "other.csv", "--scene", "one.toml", "-q"]) == 0
-    write(
-        "plain.csv", "t,theta\n" + "".join(f"{0.005 * k},0\n" for k in range(41))
-    )  # of a block that nothing is known of
-    assert main(["compare", "one.csv", "plain.csv", "-q"]) == 0
 
 
-def test_a_run_without_a_verdict_overwrites_none_with_one(refused):
-    suite = (
-        'reference = "still"\n[models.still]\nmodel = "faulty:Still"\n[[scene]]\nname = "short"\n'
-    )
-    write("suite.toml", suite + SCENE)
-    write("scene.toml", SCENE)
-    alone = ["validate", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
-    assert main(alone) == 0
-    assert main(alone) == 0  # over what nobody judged
-    assert main(["validate", "suite.toml", *STILL[1:], "--jobs", "1", "-q"]) == 1  # no tolerance
-    before = {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")}
-    assert Path("rockcheck-report/index.html") in before
-    assert refused(*alone).startswith(
-        "rockcheck: --out: rockcheck-report holds the judged run of suite 'suite'"
-    )
-    assert {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")} == before
-    assert main([*alone, "--out", "other"]) == 0
-
-
-def test_validate_keeps_the_run_before_it_tells(typed):
-    suite = """
+SUITE = f"""
 reference = "still"
 [models.still]
 model = "faulty:Still"
@@ -114,29 +157,44 @@ model = "faulty:Still"
 offset = 1e-3
 [[scene]]
 name = "short"
-duration = 0.2
-block = { half_width = 0.4, half_height = 1.5 }
-floor = { friction = 0.5 }
+{SCENE}"""
+LINE = """[tolerances.short.near.still]
+theta_peak = {{ expected = 0.0038, limit = {}, drift = 0.0001, why = "a test" }}
 """
-    line = (
-        "[tolerances.short.near.still]\n"
-        "theta_peak = { expected = 0.0038, limit = %s, drift = 0.0001, why = 'a test' }\n"
+OWN = ["mine.toml", *STILL[1:], "--jobs", "1"]
+
+
+def test_a_run_without_a_verdict_overwrites_none_with_one(refused):
+    Path("mine.toml").write_text(SUITE)
+    Path("scene.toml").write_text(SCENE)
+    alone = ["validate", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
+    # The second over what nobody judged; then the suite, without a tolerance.
+    assert [main(words) for words in (alone, alone, ["validate", *OWN, "-q"])] == [0, 0, 1]
+    before = {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")}
+    assert Path("rockcheck-report/index.html") in before
+    assert refused(*alone).startswith(
+        "rockcheck: --out: rockcheck-report holds the judged run of suite 'mine'"
     )
-    own = ["mine.toml", "--allow-code", "faulty:Still", "--jobs", "1"]
-    validate, accept = ["validate", *own, "--no-report"], ["accept", *own]
-    for limit, code in {"0.01": 0, "0.001": 1}.items():
-        write("mine.toml", suite + line % limit)
-        out = typed(*validate, code=code)[0]
+    assert {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")} == before
+    assert main([*alone, "--out", "other"]) == 0
+
+
+def test_validate_keeps_the_run_before_it_tells(typed):
+    validate, accept = ["validate", *OWN, "--no-report"], ["accept", *OWN]
+    for limit, code, verdict in (("0.01", 0, "pass"), ("0.001", 1, "fail")):
+        Path("mine.toml").write_text(SUITE + LINE.format(limit))
+        out = typed(*validate, code=code, holds=[f"verdict: {verdict}"])[0]
         assert max(map(len, out.splitlines())) <= 80
-        assert f"verdict: {'pass' if code == 0 else 'fail'}" in out
-    kept = {path.name for path in Path("rockcheck-report").iterdir()}
+    folder = Path("rockcheck-report")
+    kept = {path.name for path in folder.iterdir()}
     assert kept >= {"run.json", "checks.csv", "figures.csv", "junit.xml", "summary.md"}
-    assert 'failures="1"' in Path("rockcheck-report/junit.xml").read_text()
-    summary = Path("rockcheck-report/summary.md").read_text()
-    assert "theta_peak against still: 0.003837 is more than 0.001" in summary
-    write("mine.toml", suite.replace("offset = 1e-3", "offset = 1.2e-3") + line % "0.01")
-    assert main(validate) == 0
-    assert "verdict: changed" in typed(*validate, "--strict", code=1)[0]
-    assert main(accept) == 1
-    assert main([*accept, "--reason", "it leans more"]) == 0
-    assert main([*validate, "--strict"]) == 0
+    assert 'failures="1"' in (folder / "junit.xml").read_text()
+    assert "\nshort,near,still,theta_peak,," in (folder / "checks.csv").read_text()
+    said = "theta_peak against still: 0.003837 is more than 0.001"
+    assert said in (folder / "summary.md").read_text()
+    Path("mine.toml").write_text(SUITE.replace("1e-3", "1.2e-3") + LINE.format("0.01"))
+    typed(*validate)
+    typed(*validate, "--strict", code=1, holds=["verdict: changed"])
+    typed(*accept, code=1)
+    typed(*accept, "--reason", "it leans more")
+    typed(*validate, "--strict")

@@ -1,7 +1,8 @@
 """The pytest plugin, in a pytest of its own."""
 
-import shutil
 from pathlib import Path
+
+import pytest
 
 pytest_plugins = ["pytester"]
 
@@ -39,12 +40,16 @@ def test_unknown(rockcheck_check):
 """
 
 
+@pytest.fixture
+def pytester(pytester):
+    """A project with a suite in its root."""
+    faulty = Path(__file__).parents[1] / "validation" / "models" / "faulty.py"
+    pytester.makepyfile(faulty=faulty.read_text("utf-8"))
+    pytester.makefile(".toml", rockcheck=SUITE)
+    return pytester
+
+
 def test_check_holds_a_cell_against_its_suite(pytester):
-    shutil.copy(
-        Path(__file__).parents[1] / "validation" / "models" / "faulty.py",
-        pytester.path / "faulty.py",
-    )
-    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile(TESTS)
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
     result.assert_outcomes(failed=5)
@@ -77,11 +82,6 @@ def check():
 def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
     """`check` was its name; pytest-check has a fixture of that name, which is the one to have where
     it is installed."""
-    shutil.copy(
-        Path(__file__).parents[1] / "validation" / "models" / "faulty.py",
-        pytester.path / "faulty.py",
-    )
-    (pytester.path / "rockcheck.toml").write_text(SUITE, encoding="utf-8")
     pytester.makepyfile(
         'def test_old(check):\n    assert check("my-scene", model="near").figures\n'
     )
@@ -89,8 +89,7 @@ def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatc
     result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
     result.assert_outcomes(passed=1, warnings=1)
     result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])
-    (pytester.path / "elsewhere").mkdir()
-    (pytester.path / "elsewhere" / "pytest_check.py").write_text(PLUGIN, encoding="utf-8")
+    (pytester.mkdir("elsewhere") / "pytest_check.py").write_text(PLUGIN, encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(pytester.path / "elsewhere"))
     pytester.makepyfile('def test_theirs(check):\n    assert check == "of another plugin"\n')
     pytester.runpytest_subprocess("-p", "pytest_check").assert_outcomes(passed=1)

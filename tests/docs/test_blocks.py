@@ -52,13 +52,16 @@ def blocks_of(page: Path) -> Iterator[Block]:
             language, _, rest = token.info.strip().partition(" ")
             title = re.fullmatch(r'title="([^"]+)"', rest)
             assert bool(title) == bool(rest), f"{page.name}, line {line}: {token.info}"
+            assert language in LANGUAGES, f"{page.name}, line {line}: {language!r}"
+            assert title or language in ("python", "bash", "text"), (
+                f"{page.name}, line {line}: a file without a name is not run"
+            )
             yield Block(language, title[1] if title else "", token.content, line)
         elif token.type == "code_block":
             yield Block("bash", "", token.content, line)
 
 
 def commands_of(text: str) -> list[str]:
-    """The commands of a shell block, without their remarks."""
     lines = (line.split(" #")[0].rstrip() for line in text.splitlines())
     return [line for line in lines if line and not line.startswith("#")]
 
@@ -66,16 +69,15 @@ def commands_of(text: str) -> list[str]:
 def is_long(command: str) -> bool:
     """Whether a command takes minutes: a study, or a named suite; a page's own suites and scenes
     are short."""
-    words = shlex.split(command)
+    _, name, *words = [*shlex.split(command), ""]
     return (
-        words[0] == "rockcheck"
-        and words[1] in LONG
+        command.startswith("rockcheck ")
+        and name in LONG
         and not any(word.endswith(".toml") for word in words)
     )
 
 
 def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run a command; the interpreter of the tests is the first on the path."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-c", command],
@@ -104,7 +106,6 @@ def run_session(text: str, folder: Path) -> None:
 
 
 def show_file(block: Block, folder: Path) -> None:
-    """Write the file that a block shows, and read or run it as what it is."""
     path = folder / block.file
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(block.text, encoding="utf-8")
@@ -114,18 +115,9 @@ def show_file(block: Block, folder: Path) -> None:
         run_shell(f"set -e; . ./{block.file}", folder)
     elif block.language == "yaml":
         jobs = yaml.safe_load(block.text)["jobs"]
-        for step in (step for job in jobs.values() for step in job["steps"] if "run" in step):
-            if step["run"].startswith("rockcheck"):
-                run_shell(step["run"], folder)
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_block_has_a_language(page):
-    for block in blocks_of(page):
-        assert block.language in LANGUAGES, f"{page.name}, line {block.line}: {block.language!r}"
-        assert block.file or block.language in ("python", "bash", "text"), (
-            f"{page.name}, line {block.line}: a file without a name is not run"
-        )
+        for step in (step.get("run", "") for job in jobs.values() for step in job["steps"]):
+            if step.startswith("rockcheck"):
+                run_shell(step, folder)
 
 
 @pytest.mark.long
@@ -173,13 +165,15 @@ def test_long_commands_are_understood(command, tmp_path):
     assert "--no-such-option" in done.stderr
 
 
-def shortest(command: str) -> str:
-    """The form of a long command that takes the least time."""
-    quick = LONG[shlex.split(command)[1]]
-    return command if quick in command else f"{command} {quick}"
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("command", sorted({shortest(command) for command in LONG_COMMANDS}))
+@pytest.mark.parametrize(
+    "command",
+    sorted(
+        {
+            command if (quick := LONG[command.split()[1]]) in command else f"{command} {quick}"
+            for command in LONG_COMMANDS
+        }
+    ),
+)
 def test_long_commands_run(command, tmp_path):
     run_shell(command, tmp_path)

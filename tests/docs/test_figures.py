@@ -155,12 +155,30 @@ def test_what_the_benchmark_says():
     assert (rounded(min(bad)), rounded(max(bad))) == (2e-3, 2e-1)
 
 
-def test_thresholds_that_the_limits_name():
-    assert (series.AHEAD, series.NOISE[Kind.POSITION], series.INSTANT) == (0.02, 1e-13, 1e-9)
-    assert (contacts.CLOSED, contacts.SLOW, block.LEAST_FRICTION) == (1e-10, 1e-9, 1e-9)
-    assert (settle.SETTLE, settle._QUIET, settle._FASTEST) == (5e-8, 0.025, 2.5e-3)
-    assert (settle._AT_ONCE, settle._IMPACTS, settle._TIMES) == (20, 100, 500)
-    assert (state.MODES, series.ORDER) == (128, 15)
+@pytest.mark.parametrize(
+    ("module", "name", "stated"),
+    [
+        (series, "AHEAD", 0.02),
+        (series, "INSTANT", 1e-9),
+        (series, "ORDER", 15),
+        (contacts, "CLOSED", 1e-10),
+        (contacts, "SLOW", 1e-9),
+        (block, "LEAST_FRICTION", 1e-9),
+        (settle, "SETTLE", 5e-8),
+        (settle, "_QUIET", 0.025),
+        (settle, "_FASTEST", 2.5e-3),
+        (settle, "_AT_ONCE", 20),
+        (settle, "_IMPACTS", 100),
+        (settle, "_TIMES", 500),
+        (state, "MODES", 128),
+    ],
+)
+def test_a_threshold_that_the_limits_name(module, name, stated):
+    assert getattr(module, name) == stated
+
+
+def test_what_counts_as_closed_and_each_choice_is_on_the_page_of_limits():
+    assert series.NOISE[Kind.POSITION] == 1e-13
     page = (DOCS / "limits.md").read_text(encoding="utf-8")
     assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(rules.NAMES)
 

@@ -9,9 +9,7 @@ from cases import ricker
 from numpy.typing import NDArray
 from paper_model import PaperModel
 
-from rockcheck import engines
-from rockcheck.cm import ContinuousModel
-from rockcheck.scenes import Floor, Scene, Wall
+from rockcheck import ContinuousModel, Floor, Scene, Wall, engines
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 ALL = [

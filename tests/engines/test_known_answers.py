@@ -7,12 +7,19 @@ import pytest
 from cases import RACK
 from scipy.integrate import quad
 
-from rockcheck import engines
-from rockcheck.cm import ContinuousModel
-from rockcheck.ebm import EventBasedModel
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    EventBasedModel,
+    Floor,
+    Record,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    engines,
+)
 from rockcheck.engines.base_motion import velocity_at, velocity_of
-from rockcheck.engines.events import events_of
-from rockcheck.scenes import Block, Floor, Record, Ricker, Scene, Sine, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 SQUAT = Block(half_width=1.0, half_height=0.5)
@@ -94,12 +101,10 @@ def test_sliding_distance(model, speed, friction):
 
 
 def test_sliding_without_friction(model):
-    history = model.simulate(
-        Scene(
-            name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0
-        )
+    ice = Scene(
+        name="ice", block=SQUAT, floor=Floor(friction=0.0), initial_velocity=0.5, duration=1.0
     )
-    assert history.channels["x"][-1] == pytest.approx(0.5, abs=1e-5)
+    assert model.simulate(ice).channels["x"][-1] == pytest.approx(0.5, abs=1e-5)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
@@ -248,7 +253,7 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
         apart = np.max(np.abs(history.channels[channel] + mirrored.channels[channel]))
-        assert apart < within(model, 2e-3, 1e-7), channel
+        assert apart < (1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)), channel
     assert history.peak_rotation > 0.2 * block.alpha
     assert "wall impact" in [event.kind for event in history.event_list]
     assert [event.kind for event in history.event_list][:4] == [
@@ -274,6 +279,9 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine, pulse):
     found = [(event.kind, event.t) for event in history.event_list][: len(expected)]
     assert [kind for kind, _ in found] == [kind for kind, _ in expected]
     assert [t for _, t in found] == pytest.approx([t for _, t in expected], abs=2e-5)
+    reference = EventBasedModel(pivot="unilateral").simulate(scene)
+    apart = np.max(np.abs(history.channels["theta"] - reference.channels["theta"]))
+    assert apart < 1e-4 * scene.block.alpha
     hit = history.event_list[1]
     assert (hit.mode_before, hit.mode_after) == ("rock", "flight")
     assert hit.impulse == pytest.approx(0.407101, abs=1e-4)
@@ -300,6 +308,7 @@ def test_a_rocking_block_comes_to_rest_once(varying_engine, block):
     )
     history = varying_engine(time_step="adaptive").simulate(scene)
     kinds = [event.kind for event in history.event_list]
+    assert history.cost.steps < 1.1 * scene.duration / 5e-4  # of the largest step
     assert kinds.count("settled") == 1
     assert kinds[-1] == "settled"
     assert history.outcome == "at rest"
@@ -368,27 +377,7 @@ def test_the_continuous_model_begins_at_rest():
         assert np.ptp(channels["theta"][1:]) * RACK.half_width < 1e-3 * model.penetration
 
 
-@pytest.mark.parametrize("rebound", [0.5, 0.0])
-def test_an_impact_before_the_block_arrives_is_an_impact(rebound):
-    scene = Scene(name="a", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=0.4)
-    t, turn = 1e-3 * np.arange(400), 200
-    states = np.zeros((400, 6))
-    after = rebound * 9.81 * 0.2 - (9.81 * (t - 0.2) if rebound else 0.0)
-    states[:, 4] = np.where(np.arange(400) <= turn, -9.81 * t, after)
-    fallen = np.concatenate([[0.0], np.cumsum(1e-3 * states[1:, 4])])
-    states[:, 1] = PAPER_BLOCK.half_height + fallen - fallen[turn] + 1e-3  # by half a step early
-    felt = np.tile([0.0, -9.81], (399, 1))
-    found = events_of(scene, t, states, felt)
-    impacts = [event for event in found if event.kind == "floor impact"]
-    assert [event.t for event in impacts] == pytest.approx([0.2, 0.2], abs=2e-3)
-    assert sum(event.impulse for event in impacts) == pytest.approx(
-        (1.0 + rebound) * 9.81 * 0.2, rel=0.02
-    )
-
-
 def test_a_bounce_does_not_turn_the_slip_round(varying_engine):
-    if varying_engine.name == "drake":  # has no restitution
-        return
     floor, tilt = Floor(friction=0.5, restitution=0.3), {"initial_rotation": -0.1, "duration": 0.2}
     scene = Scene(name="a", block=PAPER_BLOCK, floor=floor, initial_height=0.02, **tilt)
     for slip in (-1.0, -0.1):

@@ -7,8 +7,10 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import packages_distributions
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -29,7 +31,7 @@ FOLDERS = {
 } | {"rockcheck": "rockcheck"}
 
 
-def names_of(requirements: list[str]) -> set[str]:
+def names_of(requirements: Iterable[str]) -> set[str]:
     return {re.split(r"[\[<>=!~; ]", text)[0].lower().replace("_", "-") for text in requirements}
 
 
@@ -45,53 +47,27 @@ def test_every_package_is_in_the_wheel_and_none_but_rockchecks():
 def test_every_data_file_is_in_the_wheel():
     """Files that are not code lie in data/, or are those that package-data names."""
     for name, folder in FOLDERS.items():
-        others = [
-            path
-            for path in (ROOT / folder).rglob("*")
-            if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
-        ]
         named = PROJECT["tool"]["setuptools"]["package-data"].get(name, [])
-        if named == ["data/**/*"]:
-            assert all(path.relative_to(ROOT).parts[1] == "data" for path in others), others
-        else:
-            beside = [path for path in others if path.parent.name == folder]
-            assert all(any(path.match(pattern) for pattern in named) for path in beside), others
+        for path in (path for path in (ROOT / folder).rglob("*") if path.is_file()):
+            if path.suffix == ".py" or "__pycache__" in path.parts:
+                continue
+            elif named == ["data/**/*"]:
+                assert path.relative_to(ROOT).parts[1] == "data", path
+            elif path.parent.name == folder:
+                assert any(path.match(pattern) for pattern in named), path
 
 
-def test_the_command_the_plugin_and_the_views_are_there():
-    points = PROJECT["project"]["entry-points"]
-    for point in (
-        PROJECT["project"]["scripts"]["rockcheck"],
-        points["pytest11"]["rockcheck"],
-        points["rockcheck.views"]["rockcheck"],
-    ):
-        module, _, name = point.partition(":")
-        assert not name or hasattr(importlib.import_module(module), name)
-        importlib.import_module(module)
-
-
-def imported(tree: ast.AST) -> set[str]:
-    """Top-level names of modules that a file imports, wherever in it."""
-    found = {
-        name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names
+def imported(nodes: Iterable[ast.AST]) -> set[str]:
+    return {
+        (getattr(node, "module", None) or alias.name).partition(".")[0]
+        for node in nodes
+        if isinstance(node, ast.Import | ast.ImportFrom) and not getattr(node, "level", 0)
+        for alias in node.names
     }
-    found |= {
-        node.module
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and node.module and not node.level
-    }
-    return {name.partition(".")[0] for name in found}
-
-
-def imported_at_once(tree: ast.Module) -> set[str]:
-    """Those that it needs to be imported itself: not inside a function, nor for types only."""
-    kept = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    return imported(ast.Module(body=kept, type_ignores=[]))
 
 
 @cache
 def sources(top: str) -> dict[Path, ast.Module]:
-    """The files of a folder, parsed; there are some."""
     found = {
         path: ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / top).rglob("*.py")
     }
@@ -99,13 +75,13 @@ def sources(top: str) -> dict[Path, ast.Module]:
     return found
 
 
+ENGINES = importlib.import_module("rockcheck.engines").__all__
 DISTRIBUTIONS = packages_distributions()
 #: Distributions of modules called otherwise, for where they are not installed.
 ELSEWHERE = {"pydrake": "drake"}
 
 
 def owners_of(name: str) -> set[str]:
-    """Distributions that install a module of this name."""
     return {
         owner.lower().replace("_", "-")
         for owner in DISTRIBUTIONS.get(name, [ELSEWHERE.get(name, name)])
@@ -127,10 +103,10 @@ def test_every_import_is_a_declared_dependency(top):
     }
     for path, tree in sources(top).items():
         of_pytest = {"pytest"} if path.name == "plugin.py" else set()  # which pytest loads
-        for name in imported(tree) - {"rockcheck"} - set(sys.stdlib_module_names):
-            allowed = (
-                declared | of_pytest | (extras if name not in imported_at_once(tree) else set())
-            )
+        # Inside a function, or for types only, it is not needed to be imported itself.
+        at_once = imported(tree.body)
+        for name in imported(ast.walk(tree)) - {"rockcheck"} - set(sys.stdlib_module_names):
+            allowed = declared | of_pytest | (set() if name in at_once else extras)
             assert owners_of(name) & allowed, (
                 f"{path.relative_to(ROOT)} imports {name}, of {owners_of(name)}"
             )
@@ -149,17 +125,11 @@ def test_hints_name_packages_that_there_are():
         for path in texts
         if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text(encoding="utf-8"))
     ] == []
-    for engine in (
-        getattr(rockcheck, name) for name in importlib.import_module("rockcheck.engines").__all__
-    ):
+    declared = names_of(chain(*PROJECT["project"]["optional-dependencies"].values()))
+    for engine in (getattr(rockcheck, name) for name in ENGINES):
         if engine.module:
             package = engine.package or engine.module
-            assert package in names_of(
-                one
-                for extra in PROJECT["project"]["optional-dependencies"].values()
-                for one in extra
-            )
-            assert package in owners_of(engine.module)
+            assert package in declared & owners_of(engine.module)
 
 
 def test_every_package_has_its_layer():
@@ -189,7 +159,7 @@ def test_every_dependency_is_imported():
         owner
         for top in FOLDERS.values()
         for tree in sources(top).values()
-        for name in imported(tree)
+        for name in imported(ast.walk(tree))
         for owner in owners_of(name)
     }
     assert names_of(PROJECT["project"]["dependencies"]) <= used
@@ -228,7 +198,6 @@ def test_what_is_no_scene_or_history_is_named(call, key, wanted):
         call()
 
 
-ENGINES = importlib.import_module("rockcheck.engines").__all__
 # In order: the workers of a test run must collect the same names of tests.
 HEAVY = sorted(
     {"numba", "pandas", "matplotlib", "scipy", "mujoco", "pybullet"}

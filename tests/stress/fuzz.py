@@ -23,7 +23,6 @@ with atheris.instrument_imports(
 
 
 def quoted(word: str) -> str:
-    """As a line of libFuzzer's dictionary."""
     return (
         '"'
         + "".join(f"\\x{byte:02x}" for byte in word.encode("utf-8", "surrogatepass")[:64])

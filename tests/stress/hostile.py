@@ -53,18 +53,14 @@ WHOLE: dict[str, Callable[[Path, bytes], object]] = {
     "a folder": lambda path, _: path.mkdir(),
     "a link to itself": lambda path, _: path.symlink_to(path),
     "a link to nowhere": lambda path, _: path.symlink_to(path.with_name("nowhere")),
-    "a sparse terabyte": lambda path, _: _sparse(path),
+    "a sparse terabyte": lambda path, _: (path.touch(), os.truncate(path, 2**40)),
 }
 
 
-def _sparse(path: Path) -> None:
-    with path.open("wb") as stream:
-        stream.truncate(2**40)
-
-
+SIMULATE = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
 #: Of each reader: the file, what is valid there, and the command that reads it.
 READERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
-    "scene": ("a.toml", SCENE, ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")),
+    "scene": ("a.toml", SCENE, SIMULATE),
     "suite": (
         "s.toml",
         SUITE,
@@ -122,12 +118,17 @@ resource.setrlimit(getattr(resource, sys.argv[1]), (int(sys.argv[2]),) * 2)
 from rockcheck.commands.cli import main
 sys.exit(main(sys.argv[3:]))
 """
-ROCKCHECK = (sys.executable, "-m", "rockcheck")
-SPY = (
-    "from pathlib import Path\n"
+#: Valid files of every kind.
+FILES = {
+    **{file: valid for file, valid, _ in READERS.values()},
+    "good.csv": HISTORY,
+    "at2.toml": re.sub("{ kind.*", '{ kind = "record", file = "r.AT2" }', SCENE),
+    "record.toml": re.sub("{ kind.*", '{ kind = "record", file = "r.csv" }', SCENE),
+    "spy.py": "from pathlib import Path\n"
     "(Path(__file__).parent / 'imported').write_text('')\n"
-    "class Told: pass\n"
-)
+    "class Told: pass\n",
+}
+ROCKCHECK = (sys.executable, "-m", "rockcheck")
 
 
 @dataclass(frozen=True)
@@ -145,7 +146,6 @@ class Case:
 
 
 def cases() -> Iterator[Case]:
-    """All cases, always in the same order."""
     for reader, (file, valid, words) in READERS.items():
         for kind, spoil in WHOLE.items():
             yield Case(
@@ -156,33 +156,16 @@ def cases() -> Iterator[Case]:
     for key in KEYS:
         for value in VALUES:
             text = re.sub(rf"\b{key} = [^,}}\n]+", lambda _, k=key, v=value: f"{k} = {v}", SCENE)
-            words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
-            yield Case(
-                f"scene: {key} = {value[:12]}",
-                words,
-                lambda folder, t=text: (folder / "a.toml").write_text(t),
-            )
+            yield Case(f"scene: {key} = {value[:12]}", SIMULATE, _writes("a.toml", text))
     for name in CODE:
-        text = (
-            'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n'
-            f'[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
-        )
-        yield Case(
-            f"code: {name}",
-            ("validate", "s.toml"),
-            lambda folder, t=text: (folder / "s.toml").write_text(t),
-            (2,),
-        )
+        text = f'{SUITE}[models.x]\nmodel = "{name}"\ncommand = "touch imported"\n'
+        yield Case(f"code: {name}", ("validate", "s.toml"), _writes("s.toml", text), (2,))
     for environment in ENVIRONMENTS:
         yield Case(
             f"environment: {environment}", ("scenes",), environment=environment, codes=(0, 2)
         )
     for size in (0, 100, 3000):
-        yield Case(
-            f"disk: {size} bytes",
-            ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv"),
-            limit=("RLIMIT_FSIZE", str(size)),
-        )
+        yield Case(f"disk: {size} bytes", SIMULATE, limit=("RLIMIT_FSIZE", str(size)))
     for count in (12, 24):
         yield Case(
             f"files: {count}", ("scenes",), limit=("RLIMIT_NOFILE", str(count)), codes=(0, 1, 2, 70)
@@ -191,9 +174,9 @@ def cases() -> Iterator[Case]:
         "amplitude = 4.0, period = 0.7", "amplitude = 1e30, period = 1e-28"
     ).replace("ricker", "sine")
     for wait in (1.5, 4.0):
-        words = ("simulate", "a.toml", "--model", "ebm", "-o", "o.csv")
-        spoil = lambda folder: (folder / "a.toml").write_text(fast)  # noqa: E731
-        yield Case(f"Ctrl-C after {wait} s", words, spoil, (0, 2, 3, 130, -2), signal_after=wait)
+        codes = (0, 2, 3, 130, -2)
+        spoil = _writes("a.toml", fast)
+        yield Case(f"Ctrl-C after {wait} s", SIMULATE, spoil, codes, signal_after=wait)
 
 
 def _replaced(path: Path, valid: str, spoil: Callable[[Path, bytes], object]) -> None:
@@ -201,32 +184,17 @@ def _replaced(path: Path, valid: str, spoil: Callable[[Path, bytes], object]) ->
     spoil(path, valid.encode())
 
 
-def _folder(place: Path) -> Path:
-    """Valid files of every kind."""
-    (place / "run").mkdir()
-    for name, text in {
-        "a.toml": SCENE,
-        "s.toml": SUITE,
-        "h.csv": HISTORY,
-        "good.csv": HISTORY,
-        "r.AT2": AT2,
-        "r.csv": RECORD,
-        "spy.py": SPY,
-    }.items():
-        (place / name).write_text(text)
-    for name, file in {"at2.toml": "r.AT2", "record.toml": "r.csv"}.items():
-        (place / name).write_text(
-            re.sub(
-                r"excitation = .*", f'excitation = {{ kind = "record", file = "{file}" }}', SCENE
-            )
-        )
-    return place
+def _writes(name: str, text: str) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).write_text(text)
 
 
 def try_case(case: Case) -> str:
     """Why a case is not as it should be; empty where it is."""
     with tempfile.TemporaryDirectory() as inside:
-        folder = _folder(Path(inside))
+        folder = Path(inside)
+        (folder / "run").mkdir()
+        for name, text in FILES.items():
+            (folder / name).write_text(text)
         case.prepare(folder)
         command = (
             [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words]
@@ -239,17 +207,18 @@ def try_case(case: Case) -> str:
             env={**os.environ, **case.environment},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
         )
         try:
             if case.signal_after is not None:
                 time.sleep(case.signal_after)
                 running.send_signal(signal.SIGINT)
-            _, said = running.communicate(timeout=SECONDS)
+            _, text = running.communicate(timeout=SECONDS)
         except subprocess.TimeoutExpired:
             running.kill()
             running.communicate()
             return f"did not end within {SECONDS:g} s"
-        text = said.decode("utf-8", "replace")
         lines = [
             line for line in text.splitlines() if "no private folder for compiled code" not in line
         ]
@@ -266,18 +235,17 @@ def try_case(case: Case) -> str:
 
 
 def main() -> int:
-    """Try all; exit 1 where one is not as it should be."""
     signal.signal(
         signal.SIGINT, signal.default_int_handler
     )  # a shell's background jobs, and all that they start, ignore Ctrl-C
-    wrong = 0
     tried = list(cases())
+    faults = 0
     for case in tried:
         if fault := try_case(case):
-            wrong += 1
+            faults += 1
             print(f"{case.name}: {fault}", flush=True)
-    print(f"{len(tried)} hostile cases, {wrong} not as they should be")
-    return int(bool(wrong))
+    print(f"{len(tried)} hostile cases, {faults} not as they should be")
+    return int(faults > 0)
 
 
 if __name__ == "__main__":

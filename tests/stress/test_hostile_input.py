@@ -75,7 +75,6 @@ def feed_file(
     reads: Sequence[Callable[[Path], Any]],
     check: Callable[[Any], object] = lambda found: None,
 ) -> None:
-    """What can be read of a file of that name passes the check."""
     path = folder / name
     path.write_bytes(content)
     for read in reads:
@@ -116,27 +115,26 @@ def stored_files() -> dict[str, bytes]:
             {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}},
         )
         record = (folder / "histories" / "short--ebm--0.json").read_bytes()
-    scenes = {"short": scene.replace(excitation={"kind": "rest"}).model_dump(mode="json")}
-    cell = {
-        "scene": "short",
-        "model": "ebm",
-        "status": "done",
-        "history": "histories/short--ebm--0.csv.gz",
-        "outcome": history.outcome,
-    }
     run = Run(
         suite="s",
         created="2026-01-01T00:00:00",
         reference="ebm",
-        scenes=scenes,
+        scenes={"short": scene.replace(excitation={"kind": "rest"}).model_dump(mode="json")},
         models=("ebm",),
-        cells=(cell,),
+        cells=(
+            {
+                "scene": "short",
+                "model": "ebm",
+                "status": "done",
+                "history": "histories/short--ebm--0.csv.gz",
+                "outcome": history.outcome,
+            },
+        ),
     )
     return {"run.json": run.model_dump_json().encode(), "record": record, **files}
 
 
 def feed_stored_record(content: bytes, folder: Path) -> None:
-    """A damaged record is as good as none."""
     store = Store(folder)
     for suffix in SUFFIXES:
         (folder / "histories" / f"a{suffix}").write_bytes(stored_files()[suffix])
@@ -153,19 +151,12 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         inside.mkdir()
         (inside / "a.toml").write_text(nasty.SCENE)
         (inside / "h.csv").write_text(nasty.HISTORY)
-        for model in (
-            "ebm",
-            "ebm-unilateral",
-            "cm",
-        ):  # compiled now, not while an input has its time
+        for model in ("ebm", "ebm-unilateral", "cm"):  # compiled before an input has its time
             build(model, {}).simulate(load_scene(inside / "a.toml"))
-    words = [
-        word
-        for word in content.decode("utf-8", "replace").split(BETWEEN)
-        if word not in LONG or word == "accept"
-    ]
-    if "accept" in words:
-        words = ["accept", "no-such-suite", *[word for word in words if word != "accept"]]
+    given = content.decode("utf-8", "replace").split(BETWEEN)
+    words = [word for word in given if word not in LONG]
+    if "accept" in given:
+        words = ["accept", "no-such-suite", *words]
     out, err = io.StringIO(), io.StringIO()
     with contextlib.chdir(inside), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(words)
@@ -303,7 +294,6 @@ def test_names_are_told_from_paths_and_from_markup(tmp_path, name):
 
 
 def test_a_stored_path_does_not_leave_the_run(tmp_path, refused):
-    """A run's file whose history lies elsewhere is refused, before any page is written."""
     data = json.loads(stored_files()["run.json"])
     (tmp_path / "secret.csv").write_bytes(gzip.decompress(stored_files()[TABLE]))
     run = tmp_path / "run"
@@ -331,15 +321,13 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
     data["cells"][0] |= {"reason": evil, "notes": [evil]}
     data["scenes"]["short"]["description"] = evil
     (tmp_path / "run.json").write_text(json.dumps(data))
-    store = Store(tmp_path)
-    store.put("short--ebm--0", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
+    files = {suffix: stored_files()[suffix] for suffix in SUFFIXES}
+    Store(tmp_path).put("short--ebm--0", files, {})
     assert main(["report", str(tmp_path)]) == 0
     pages = [*tmp_path.glob("**/*.html"), *tmp_path.glob("**/data/*.js")]
-    assert pages
-    for page in pages:
-        text = page.read_text(encoding="utf-8")
-        assert "<script>alert" not in text, page
-        assert "<img src=x" not in text, page
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
+    assert "<script>alert" not in text
+    assert "<img src=x" not in text
     assert "&lt;script&gt;alert" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 

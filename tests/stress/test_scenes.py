@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import load_scene
+from rockcheck import EventBasedModel, load_scene
 from rockcheck.scenes.files import read_toml
 from rockcheck.validation.studies.stress.generator import (
     ALPHA,

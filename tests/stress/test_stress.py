@@ -2,10 +2,10 @@
 maps."""
 
 import csv
+import dataclasses
 from collections import Counter
 
 import numpy as np
-import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
@@ -20,6 +20,7 @@ from rockcheck.validation.studies.stress.runs import (
     Broken,
     Chunk,
     RunTotals,
+    Shrinking,
     parts,
     scene_text,
     shrink,
@@ -39,33 +40,15 @@ from rockcheck.validation.studies.stress.study import (
 from rockcheck.validation.study import run
 
 
-def test_a_load_is_dropped_only_if_it_does_not_matter():
-    """Shrinking tries a block without its load, or with it in the middle, and none that may not
-    be."""
-    loaded = random_scene(1, 0).replace(
-        block=Block(
-            half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
-        ),
-        floor=Floor(friction=0.25),
-    )
-    big = loaded.replace(block=loaded.block.scaled(30.0))
-    asymmetric, _ = shrink(big, lambda scene: scene.block.offset[0] > 0.0)
-    assert asymmetric.block.offset[0] > 0.0 == asymmetric.block.offset[1]
-    assert asymmetric.block.moment_of_inertia is None
-    assert 0.5 < asymmetric.block.radius < 2.0
-    plain, _ = shrink(big, lambda scene: True)
-    assert plain.block.homogeneous
-    edge = loaded.block.replace(half_width=0.94, centre_of_mass=(0.93, 0.0), moment_of_inertia=0.4)
-    rounded, _ = shrink(
-        loaded.replace(block=edge), lambda scene: scene.block.moment_of_inertia is not None
-    )
-    assert rounded.block == Block(**rounded.block.model_dump())
-
-
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     """Of a scene with everything in it, only what shows the "failure" is left, and the file is that
     scene again."""
+    loaded = Block(
+        half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
+    )
     scene = random_scene(1, 0).replace(
+        block=loaded.scaled(30.0),
+        floor=Floor(friction=0.25),
         walls=(Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.7)),
         vertical=Sine(amplitude=1.234567, period=1.0),
         excitation=Record.from_samples(np.arange(50.0) / 7.0, time_step=0.0123456789),
@@ -80,6 +63,8 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
         )
 
     small, complete = shrink(scene, shows, trials=2000)
+    assert small.block.homogeneous
+    assert 0.5 < small.block.radius < 2.0
     assert complete
     assert shows(small)
     early, complete = shrink(scene, shows, trials=3)
@@ -125,6 +110,9 @@ def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     assert [(half.first, half.count) for half in halves] == [(0, 2), (2, 3)]
     assert halves[1].seconds < whole.seconds
     assert parts(Chunk("ebm", 1, 2, 1)) == []
+    shrinking = Shrinking(Broken("ebm", "mirror", 1, 3, 1.0), 10.0)
+    assert [part.trials for part in parts(shrinking)] == [shrinking.trials // 4]
+    assert parts(dataclasses.replace(shrinking, trials=1)) == []
 
 
 def broken_without_walls(
@@ -231,10 +219,3 @@ def test_the_command(tmp_path, told):
     assert (found["seed"], found["batches"]["ebm"]["counts"]["runs"]) == (4, 6)
     assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
     assert "| ebm | " in (tmp_path / "summary.md").read_text()
-
-
-@pytest.mark.slow
-def test_quick_run(tmp_path):
-    found = run(Stress("runs", quick=True, seed=11), tmp_path)
-    assert found.complete
-    assert found.exit_code == 0
