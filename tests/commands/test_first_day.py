@@ -195,3 +195,22 @@ def test_a_model_of_ones_own_that_returns_no_history_is_told_so(typed):
     simulated(typed, "Nothing", "a.csv", code=3, holds=said)
     words = (suite("faulty:Nothing"), *CODE, "--no-report", "--jobs", "1")
     typed("validate", *words, code=3, holds=said)
+
+
+def test_accept_writes_nothing_that_validate_refuses(typed):
+    t = np.linspace(0.5, 2.0, 151)
+    rows = "\n".join(f"{x:.3f},0.0" for x in t)
+    Path("table.csv").write_text(f"t,theta\n{rows}\n", encoding="utf-8")
+    text = SUITE.format(other="measured").replace(
+        "[require]", 'files = { short = "table.csv" }\n[require]'
+    )
+    Path("mine.toml").write_text(text, encoding="utf-8")
+    words = ("mine.toml", *CODE, "--jobs", "1")
+    said = "theta_rms: other starts only at 0.5 s; `offset` of the measured model"
+    typed("accept", *words, code=1, holds=[f"not accepted: [short.other.still] {said}"])
+    assert not Path("mine.tolerances.toml").exists()
+    aligned = text.replace("[require]", "offset = -0.5\n[require]")
+    aligned = aligned.replace('"theta_rms", "outcome_agrees"', '"theta_rms@1s"')
+    Path("mine.toml").write_text(aligned, encoding="utf-8")
+    typed("accept", *words)
+    typed("validate", *words, "--no-report", "--strict")

@@ -29,6 +29,7 @@ from rockcheck import (
 )
 from rockcheck.engines.engine import Engine
 from rockcheck.engines.steps import AdaptiveStep, FixedStep
+from rockcheck.scenes import compiled
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
@@ -353,3 +354,11 @@ def test_mujocos_floor_is_where_it_is_said_to_be(friction, above):
     )
     world.close()
     assert falls == pytest.approx(-9.81 * 2e-5 if above > 0.0 else 0.0, abs=1e-9)
+
+
+def test_a_march_loads_its_compiled_step_before_its_clock_starts(monkeypatch, free_rocking):
+    scene = free_rocking(0.0).replace(duration=0.01)
+    world = SimpleNamespace(push=lambda *asked: (0.0, 0.0, 0.0))
+    march = AdaptiveStep().ready(world, scene)
+    monkeypatch.delattr(compiled, "for_types_of")
+    assert len(march()[0]) > 1

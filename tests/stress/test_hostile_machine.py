@@ -16,6 +16,10 @@ import pytest
 from hostile import LIMITED, ROCKCHECK
 
 from rockcheck.commands.cli import main
+from rockcheck.scenes.writing import write_whole
+from rockcheck.validation.execute import pool
+from rockcheck.validation.studies.stress import runs
+from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
@@ -151,3 +155,31 @@ def test_interrupted(tmp_path, later):
     assert sum(batch["counts"]["runs"] for batch in data["batches"].values()) < 60000
     assert (tmp_path / "index.html").is_file()
     assert not list(tmp_path.rglob("*.part"))
+
+
+def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    """A crash between writing and naming leaves the old content."""
+    path = write_whole(tmp_path / "a.json", "old")
+
+    def crash(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", crash)
+    with pytest.raises(OSError, match="No space"):
+        write_whole(path, "new")
+    assert path.read_text() == "old"
+    assert [one.name for one in tmp_path.iterdir()] == ["a.json"]
+
+
+def test_of_runs_whose_process_dies_or_hangs_only_that_one_fails(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
+    for module, name, value in ((pool, "COMPILING", 0.0), (runs, "A_RUN", 0.0)):
+        monkeypatch.setattr(module, name, value)
+    monkeypatch.setattr(runs, "PATIENCE", 4.0)
+    from deadly import Deadly
+
+    found = run(Deadly("runs", models=("ebm",), runs=16), tmp_path, jobs=2)
+    assert found.data["batches"]["ebm"]["counts"]["runs"] == 16
+    words = {one["number"]: one["words"] for one in found.table("failures").records()}
+    assert words == {3: "the process ended with code 9", 13: "did not end within 4 s"}
+    assert all("not shrunk" in text for text in found.files.values())

@@ -51,7 +51,7 @@ from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.files import UncertainScene, uncertain_scene
 from rockcheck.scenes.recordings import Reading, Recording
 from rockcheck.scenes.recordings.recording import Word
-from rockcheck.scenes.recordings.sets import files_of, motions_of, verticals_of
+from rockcheck.scenes.recordings.sets import Odd, files_of, motions_of, verticals_of
 
 #: Longest name of a scene, and of the part of it that is the record's.
 _LONGEST, _LONGEST_RECORD = 100, 60
@@ -86,9 +86,9 @@ def under_records(
         if unknown := [name for name in given.scenes if name not in scenes]:
             raise InputError(str(unknown_name("scene", unknown[0], scenes)), "records.scenes")
         files = files_of(given.files, folder)
-        motions, vertical = motions_of(files, given)
+        motions, others = motions_of(files, given)
         upward = verticals_of(files, given) if given.vertical else {}
-        left_out += [] if given.vertical else vertical
+        left_out += [one for one in others if isinstance(one, Odd) or not given.vertical]
         labels = _labels([motion for motion, _ in motions])
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)

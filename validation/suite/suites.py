@@ -438,7 +438,10 @@ def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     """Several suites as one: names of scenes must differ, references must agree."""
     included = [
-        load_suite(name if name in named_suites() else path.parent / name, allow_code=allow_code)
+        load_suite(
+            path.parent / name if Path(name).suffix.lower() == ".toml" else name,
+            allow_code=allow_code,
+        )
         for name in given.include
     ]
     first = included[0]

@@ -92,6 +92,7 @@ walls = [{ restitution = 0.5 }]
         ),
         ("reference = [\n", "not valid TOML"),
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
+        ('include = ["papre"]\n', "did you mean 'paper'"),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),
         (
             MODELS + SHELF + "[tolerances.shelf.ebm.figures]\nhighest_hop = { limit = -1 }\n",
