@@ -127,22 +127,22 @@ def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
         for cell, check in run.checks()
         if check.weighs != "pass" and check.words != "no tolerance yet"
     ]
-    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -overrun(pair[1])))
-
-
-def overrun(check: Check) -> float:
-    """How many times its limit a check uses, infinite where that cannot be said."""
-    value, limit = check.figure.value, check.limit
-    if value is None or not limit:
-        return math.inf if check.verdict == "fail" else 0.0
-    if check.ideal is None:
-        return limit / value if value > 0.0 else math.inf
-    return abs(value - check.ideal) / limit
+    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -use(pair[1])))
 
 
 def use(check: Check) -> float:
-    """How much of its limit a check uses: above 1 only where it is out."""
-    return overrun(check) if check.verdict == "fail" else min(1.0, used(check))
+    """How much of its limit a check uses: above 1 only where it is out.
+
+    Infinite where that cannot be said.
+    """
+    if check.verdict != "fail":
+        return min(1.0, used(check))
+    value, limit = check.figure.value, check.limit
+    if value is None or not limit:
+        return math.inf
+    if check.ideal is None:
+        return limit / value if value > 0.0 else math.inf
+    return abs(value - check.ideal) / limit
 
 
 def times_table(run: Run) -> Table:
@@ -341,7 +341,7 @@ def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, An
         "apart": [
             (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
         ],
-        "changed": sorted(changed, key=lambda pair: -overrun(pair[1])),
+        "changed": sorted(changed, key=lambda pair: -use(pair[1])),
         "judged": len(accepted),
     }
 
@@ -377,8 +377,8 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
     differs = len({_side(outcome_of(one)) for one in done}) > 1
-    nearest = max(cell.checks, key=overrun, default=None)
-    used = overrun(nearest) if nearest else 0.0
+    nearest = max(cell.checks, key=use, default=None)
+    used = use(nearest) if nearest else 0.0
     return {
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),

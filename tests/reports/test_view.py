@@ -21,8 +21,8 @@ from rockcheck.reports.tables import (
     entry,
     glance,
     matrix,
-    overrun,
     times_table,
+    use,
     why_apart,
 )
 from rockcheck.reports.view import FALL, SceneView, scene_views, slugs_of
@@ -269,7 +269,7 @@ def test_how_much_of_its_limit_a_check_uses() -> None:
         (None, {}, math.inf),
         (1.0, {"limit": None}, math.inf),
     ):
-        assert overrun(check(value, **more)) == used
+        assert use(check(value, **more)) == used
 
 
 def contrast(first: str, second: str) -> float:
