@@ -85,10 +85,8 @@ def under_records(
     for given in sets:
         if unknown := [name for name in given.scenes if name not in scenes]:
             raise InputError(str(unknown_name("scene", unknown[0], scenes)), "records.scenes")
-        files = files_of(given.files, folder)
-        motions, others = motions_of(files, given)
-        upward = verticals_of(files, given) if given.vertical else {}
-        left_out += [one for one in others if isinstance(one, Odd) or not given.vertical]
+        motions, upward, others = _motions(given, folder)
+        left_out += others
         labels = _labels([motion for motion, _ in motions])
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
@@ -103,6 +101,17 @@ def under_records(
                 )
             found[one.scene.name] = one
     return {name: one for name, one in scenes.items() if name not in shaken} | found, left_out
+
+
+def _motions(
+    given: RecordSet, folder: Path
+) -> tuple[list[tuple[str, Recording]], Mapping[str, Recording], list[str]]:
+    """The motions of a set by name, horizontal and upward, and what is left out."""
+    files = files_of(given.files, folder)
+    motions, left_out = motions_of(files, given)
+    if not given.vertical:
+        return motions, {}, left_out
+    return motions, verticals_of(files, given), [one for one in left_out if isinstance(one, Odd)]
 
 
 def _shaken(
