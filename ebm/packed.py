@@ -154,7 +154,8 @@ def loop_of(model: Any, *given: Any) -> Callable[..., None]:
 def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
     """The event loop for a single run that need not wait for the compiler; None where it must.
 
-    It need not if the loop is not compiled yet, and steps are long: Bouc-Wen friction is stiff.
+    It need not if the loop is not compiled yet. Bouc-Wen friction, which is stiff, takes too many
+    steps.
     """
     loop = march.LOOPS[model.friction]
     if not is_one_run() or model.friction == "bouc-wen" or is_ready(loop, *given):

@@ -239,7 +239,8 @@ def _leave_rest(block, base, run):
     state, t = run.state, run.state.t
     sense = modes.tips_first(block, base, state)
     u, g = ground.acceleration(base.horizontal, t), 1.0 + ground.acceleration(base.vertical, t)
-    # Friction falls with P: nothing tips until the floor pulls. It does not at a weightless block.
+    # Friction falls with P: nothing tips until the floor pulls, which it never does
+    # at a block that stays weightless.
     soon = 1.0 + ground.acceleration_after(base.vertical, t) < 0.0
     hangs = g <= 0.0 if abs(g) > series.NOISE[Kind.FORCE] else soon
     arm = side_of(block, sense).arm
