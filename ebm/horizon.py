@@ -6,7 +6,7 @@ from itertools import chain
 
 import numpy as np
 
-from rockcheck.ebm.core.rules import NAMES, Rule
+from rockcheck.ebm.core.names import RULE_NAMES, Rule
 from rockcheck.ebm.model import EventBasedModel, ImpactLaw
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.scene import Scene
@@ -17,7 +17,7 @@ PERTURBATION, ALLOWED = 1e-6, 1e-3
 START = ("initial_rotation", "initial_angular_velocity", "initial_velocity", "initial_height")
 #: The choice, as `History.cost.rules` counts it, at which the laws of one bottom corner before the
 #: other part.
-LANDS_FLAT = NAMES[Rule.FLAT_LANDING]
+LANDS_FLAT = RULE_NAMES[Rule.FLAT_LANDING]
 
 
 def predictability_horizon(

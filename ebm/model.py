@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import Field, Strict
 
-from rockcheck.ebm.core.rules import NAMES
+from rockcheck.ebm.core import names
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import InputError, ModelFailure, check_kind
 from rockcheck.scenes.history import Cost, Event, History
@@ -17,9 +17,7 @@ from rockcheck.scenes.scene import Scene
 
 #: The finest tolerance.
 FINEST = 1e-15
-
-
-#: The laws of impacts at several contacts at once (see ebm.core.laws.contact_impacts).
+#: The laws of impacts at several contacts at once (see ebm.core.contact_impacts).
 ImpactLaw = Literal["moreau", "closed", "open", "floor-first", "leading-first", "trailing-first"]
 
 
@@ -123,7 +121,7 @@ class EventBasedModel(Frozen):
         """
         began = time.perf_counter()
         from rockcheck.ebm import natural, packed
-        from rockcheck.ebm.core import names, state
+        from rockcheck.ebm.core import state
 
         given, unit = packed.pack([scene], self), natural.time_unit(scene)
         shape = 1, len(scene.output_times)
@@ -162,7 +160,9 @@ class EventBasedModel(Frozen):
             energy_gains=int(found.gains),
             largest_energy_gain=float(found.largest_gain),
             rules={
-                name: int(count) for name, count in zip(NAMES, found.rules, strict=True) if count
+                name: int(count)
+                for name, count in zip(names.RULE_NAMES, found.rules, strict=True)
+                if count
             },
         )
         outcome = "at rest" if at_rest else "moving"
@@ -189,16 +189,16 @@ class EventBasedModel(Frozen):
     def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
         from rockcheck.ebm import packed
-        from rockcheck.ebm.core.names import Ending
         from rockcheck.scenes.progress import interruptible
 
         runs = rows, states, *work
         # What is compiled or loaded is so before the clock starts. A run of few steps is played
         # here: to hand it over takes longer. Each sample of a record is a step.
-        slow = packed.interpreted_loop(self, *runs)
+        short = len(rows.samples) < _INTERPRETED
+        slow = packed.interpreted_loop(self, *runs) if short else None
         at_once = _INTERPRETED if slow else _AT_ONCE
         few = min(self.most_steps, at_once if len(rows.samples) < at_once else 0)
-        loop = slow if slow and few else packed.loop_of(self, *runs)
+        loop = slow or packed.loop_of(self, *runs)
 
         def play(most_steps: int) -> int:
             states["control"]["most_steps"] = most_steps
@@ -206,8 +206,8 @@ class EventBasedModel(Frozen):
             return int(work[-1]["ending"][0])
 
         ready, cpu = time.perf_counter(), time.process_time()
-        ending = play(few) if few else Ending.TOO_MANY_STEPS
-        if ending == Ending.TOO_MANY_STEPS and few < self.most_steps:
+        ending = play(few) if few else names.Ending.TOO_MANY_STEPS
+        if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
             if loop is slow:
                 loop = packed.loop_of(self, *runs)
                 ready, cpu = time.perf_counter(), time.process_time()

@@ -7,8 +7,7 @@ import numpy as np
 
 from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.steps import AdaptiveStep
-from rockcheck.engines.world import State, World
+from rockcheck.engines.steps import AdaptiveStep, State, World
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls

@@ -9,7 +9,7 @@ import numpy as np
 
 from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import State, World
+from rockcheck.engines.steps import State, World
 from rockcheck.scenes import Floor, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 

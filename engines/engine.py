@@ -13,8 +13,7 @@ from pydantic import field_validator, model_validator
 
 from rockcheck.engines.contacts import rebounds
 from rockcheck.engines.events import events_of
-from rockcheck.engines.steps import AdaptiveStep, FixedStep, at_output_times, in_units_of
-from rockcheck.engines.world import World
+from rockcheck.engines.steps import AdaptiveStep, FixedStep, World, at_output_times, in_units_of
 from rockcheck.scenes import Cost, Floor, History, InputError, Scene, kinematics
 from rockcheck.scenes.base import Frozen, Positive
 from rockcheck.scenes.errors import NotInstalled, check_kind, printable

@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import Point, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import State, World
+from rockcheck.engines.steps import State, World
 from rockcheck.scenes import InputError, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls

@@ -7,7 +7,7 @@ import numpy as np
 
 from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.world import FloatArray, State, Vector, World
+from rockcheck.engines.steps import FloatArray, State, Vector, World
 from rockcheck.scenes import Floor, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import State, World
+from rockcheck.engines.steps import State, World
 from rockcheck.scenes import Scene
 
 CORNER_RADIUS = 1e-4  # of the block's radius; contacts are points

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from rockcheck.engines.contacts import Surface, corners_of, rebounds, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import FloatArray, State, Vector, World
+from rockcheck.engines.steps import FloatArray, State, Vector, World
 from rockcheck.scenes import Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane

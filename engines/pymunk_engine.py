@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from rockcheck.engines.contacts import surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.world import State, Vector, World
+from rockcheck.engines.steps import State, Vector, World
 from rockcheck.scenes import Scene
 
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each

@@ -1,4 +1,6 @@
-"""How an engine's steps follow each other: all of one length, or as long as the events allow.
+"""What an engine gives, a `World`, and how its steps follow each other.
+
+They are all of one length, or as long as the events allow.
 
 With a fixed step, an engine's error has two sources: the time of its impacts and a drift along the
 arcs of its contacts. Both are of first order in the step. At adaptive steps the engine only turns
@@ -10,6 +12,7 @@ change corrects the drift, which is then of third order.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -17,17 +20,68 @@ from typing import ClassVar
 
 import numpy as np
 
-from rockcheck.engines.base_motion import BaseMotion
-from rockcheck.engines.world import FloatArray, Vector, World
+from rockcheck.engines.base_motion import BaseMotion, FloatArray
 from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
+Vector = tuple[float, float, float]  # along x, y and theta
+State = tuple[float, float, float, float, float, float]
 #: Times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2).
 Marched = tuple[FloatArray, FloatArray, FloatArray]
 STEPS_AT_ONCE = 2048
 #: Where a block lies on its side: contacts stop it a hair before a quarter turn, or after it.
 LYING = math.pi / 2 - 1e-6
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
+
+
+class World(ABC):
+    """One scene as an engine holds it: a block of unit mass that is free to move in its plane.
+
+    A state is x, y, theta of the mass's centre and their rates, x = 0 where the centre of the box
+    stands first; theta is counterclockwise positive.
+    """
+
+    @abstractmethod
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
+        """Put the block into this state."""
+
+    @abstractmethod
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        """One step of `dt` s under the acceleration `felt`, right and up, in lengths / s^2."""
+
+    @abstractmethod
+    def state(self) -> State:
+        """Where the block is."""
+
+    def ready(self, dt: float) -> None:  # noqa: B027 - most engines take steps of any length
+        """Before the first of steps of `dt` s: what is done here is no run time."""
+
+    def velocity(self) -> Vector:
+        """How fast the block is."""
+        return self.state()[3:]
+
+    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+        """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2)."""
+        states = np.empty((len(felt), 6))
+        for row, (ax, ay) in enumerate(felt.tolist()):
+            self.step((ax, ay), dt)
+            states[row] = self.state()
+        return states
+
+    def bounce(self, bouncing: bool) -> None:  # noqa: B027 - asked of those alone whose steps can vary
+        """Let contacts have their restitution, or none."""
+
+    def push(
+        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
+    ) -> Vector:
+        """The engine as a map of velocities, for adaptive steps: `Push`."""
+        self.bounce(bouncing)
+        self.place(*pose, *velocity)
+        self.step(felt, dt)
+        return self.velocity()
+
+    def close(self) -> None:  # noqa: B027 - most engines hold nothing
+        """Give back what the engine holds."""
 
 
 def in_units_of(length: float, scene: Scene) -> Scene:

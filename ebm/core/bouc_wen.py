@@ -24,8 +24,7 @@ import math
 from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.motion import flat_series, tilt_series, turned
-from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row, Rule
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 

@@ -10,7 +10,7 @@ How to add a law of friction: a module beside this one, with the same doors and 
 - `after_event`, at the start, after an impact and after a guard: the mode that follows,
   `modes.slacken` where nothing was struck, and the event (`tell`).
 - `LOOKS_AHEAD`: whether rest may be skipped to the next time at which abs(u) leaves its limit
-  (`ebm.core.rest`).
+  (`ebm.core.steps.rest`).
 
 Its constants stand in SETTING (`ebm.natural.setting_of`). Impacts have Coulomb's friction, mu_s and
 mu_k of SETTING: say what these are. Its loop is a `play` in `ebm.core.march` and a line in `LOOPS`;

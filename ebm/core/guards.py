@@ -18,7 +18,7 @@ How to add a guard:
 
 A guard ends its mode, and takes part in the choice of the next one (`ebm.core.modes.wrong_by`): it
 is not negative in a mode that may begin. What only tells, as the passing of an angle, is no guard:
-`ebm.core.moving.advance` finds the top of a swing so, by a root of its own, and `note` writes it.
+`ebm.core.steps.advance` finds the top of a swing so, by a root of its own, and `note` writes it.
 """
 
 import math

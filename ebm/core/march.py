@@ -10,13 +10,13 @@ from types import ModuleType
 
 import numpy as np
 
-from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, moving, rest, series, settle
+from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, series, settle, steps
 from rockcheck.ebm.core.contacts import closed_floor
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.guards import KIND
-from rockcheck.ebm.core.laws.strike import strike
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
 from rockcheck.ebm.core.state import Base, Records, Run, mode_code, rests
+from rockcheck.ebm.core.strike import strike
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
@@ -34,9 +34,9 @@ def loop_with(friction: ModuleType) -> object:
             if state.changing:
                 state.changing = False
                 after_event(block, base, run)
-            elif looks_ahead and rest.waits(base, state):
-                rest.rest(block, base, run)
-            elif moving.may_go_on(block, base, run):
+            elif looks_ahead and steps.waits(base, state):
+                steps.rest(block, base, run)
+            elif steps.may_go_on(block, base, run):
                 step(block, base, run)
         end(run)
 
@@ -50,10 +50,10 @@ def loop_with(friction: ModuleType) -> object:
         locate(block, run)
         if not finite(state, math.isfinite(state.tau)):
             return
-        moving.sample(block, run)
-        moving.advance(block, base, run)
+        steps.sample(block, run)
+        steps.advance(block, base, run)
         advance_friction(run)
-        if state.guard != Guard.NONE and not moving.passes_on(block, base, run):
+        if state.guard != Guard.NONE and not steps.passes_on(block, base, run):
             resolve(block, base, run)
 
     @inner_kernel
@@ -150,7 +150,7 @@ def end(run):
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE
     if state.ending == Ending.DONE and not run.state.control.until_decided:
-        rest.sample_rest(run, np.inf)
+        steps.sample_rest(run, np.inf)
 
 
 @inner_kernel

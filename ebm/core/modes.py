@@ -20,8 +20,7 @@ import numpy as np
 
 from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
 from rockcheck.scenes.compiled import inner_kernel
 

@@ -8,7 +8,7 @@ too many at one instant, all impacts are plastic. So impacts are finitely many i
 
 import numpy as np
 
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Rule
 from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import record
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.names import ROWS, Event, Family, Pivot, Row
-from rockcheck.ebm.core.rules import RULES
+from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.scenes.compiled import inner_kernel, kernel
 

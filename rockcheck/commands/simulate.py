@@ -26,8 +26,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import listening, one_run
 from rockcheck.validation.discrepancy.motion import motion_of
-from rockcheck.validation.execute import workers
-from rockcheck.validation.execute.models import FAMILIES, build, check_allowed, is_own
+from rockcheck.validation.execute.models import FAMILIES, Work, build, check_allowed, is_own, play
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 
@@ -113,11 +112,9 @@ def run(
 
 def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
-    work = workers.Work(
-        label=model, family=model, settings=settings, search_path=(str(Path.cwd()),)
-    )
+    work = Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
     with Pool(1) as pool:
-        (ended,) = pool.run(deque([Call(guarded, (workers.play, work, scene))]))
+        (ended,) = pool.run(deque([Call(guarded, (play, work, scene))]))
     result = ended.outcome
     if isinstance(result, Failure):
         if result.refused:

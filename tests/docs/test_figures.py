@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
-from rockcheck.ebm.core import block, contacts, rules, series, settle, state
+from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
@@ -180,7 +180,7 @@ def test_a_threshold_that_the_limits_name(module, name, stated):
 def test_what_counts_as_closed_and_each_choice_is_on_the_page_of_limits():
     assert series.NOISE[Kind.POSITION] == 1e-13
     page = (DOCS / "limits.md").read_text(encoding="utf-8")
-    assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(rules.NAMES)
+    assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(names.RULE_NAMES)
 
 
 def floor_impulses(scene, step=1e-4, alone=5) -> list[float]:

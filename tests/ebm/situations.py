@@ -14,8 +14,7 @@ from stepping import TILTED, block_of, run_at
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import guards, modes, motion
-from rockcheck.ebm.core.names import Family, Guard, Pivot, Row
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Family, Guard, Pivot, Row, Rule
 from rockcheck.ebm.core.state import Run
 from rockcheck.scenes import Floor, Record, Scene, Wall
 

@@ -22,8 +22,7 @@ from rockcheck.validation.discrepancy.compare import compare, describe, too_shor
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import build, is_own
+from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
@@ -47,7 +46,7 @@ class Planned(Task):
     """
 
     scene: Scene = field(compare=False)
-    variant: workers.Work = field(compare=False)
+    variant: models.Work = field(compare=False)
     model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
@@ -71,12 +70,12 @@ class Planned(Task):
         part = f", from {self.numbers.start}" if self.ensemble else ""
         return f"{self.place}, {self.variant.label}{part}"
 
-    def play(self) -> workers.Played:
+    def play(self) -> models.Played:
         """The history, or the peaks of a batch."""
         if self.ensemble is None:
-            return workers.play(self.variant, self.scene, uncertainty=self.uncertainty)
+            return models.play(self.variant, self.scene, uncertainty=self.uncertainty)
         scenes = [self.ensemble.drawn(self.scene, n) for n in self.numbers]
-        return workers.play_batch(self.variant, scenes)
+        return models.play_batch(self.variant, scenes)
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
@@ -190,12 +189,14 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
     return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
 
 
-def under_other_laws(scene: Scene, variant: workers.Work) -> dict[str, History]:
+def under_other_laws(scene: Scene, variant: models.Work) -> dict[str, History]:
     """A reference's histories under the other laws of impacts, by law.
 
     Laws under which it fails are left out. Empty for a model without a choice of law.
     """
-    model = None if is_own(variant.family) else build(variant.family, variant.settings)
+    model = (
+        None if models.is_own(variant.family) else models.build(variant.family, variant.settings)
+    )
     found: dict[str, History] = {}
     if isinstance(model, EventBasedModel):
         for law in other_laws(model, walls=bool(scene.walls), flat=True):

@@ -17,8 +17,16 @@ from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
 from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
-from rockcheck.validation.execute import provenance, workers
-from rockcheck.validation.execute.models import compiles, family, has_wheel, is_own, not_installed
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute.models import (
+    Played,
+    Work,
+    compiles,
+    family,
+    has_wheel,
+    is_own,
+    not_installed,
+)
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
@@ -123,9 +131,7 @@ class SuiteStudy(Study):
         self.traces: set[Planned] = set()
         self.compared: dict[str, list[Cell]] = {}
 
-    def _planned(
-        self, scene: Scene, variant: workers.Work, ensemble: Ensemble | None
-    ) -> Iterator[Planned]:
+    def _planned(self, scene: Scene, variant: Work, ensemble: Ensemble | None) -> Iterator[Planned]:
         """A cell, or the batches of an ensemble.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
@@ -176,7 +182,7 @@ class SuiteStudy(Study):
             self.read_back.add(task)
         return self.ended.get(task)
 
-    def keep(self, store: Store, task: Any, record: workers.Played) -> None:
+    def keep(self, store: Store, task: Any, record: Played) -> None:
         """Keep a history or a batch; compare a scene's cells once the last of them is kept.
 
         So scenes are compared while others are still played.

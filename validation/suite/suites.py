@@ -75,8 +75,7 @@ from rockcheck.scenes.files import (
 )
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.discrepancy.statistics import STATISTICS
-from rockcheck.validation.execute.models import build, check_allowed, family, is_own
-from rockcheck.validation.execute.workers import Work
+from rockcheck.validation.execute.models import Work, build, check_allowed, family, is_own
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (

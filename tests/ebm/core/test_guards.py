@@ -28,11 +28,10 @@ from rockcheck.ebm.core import (
     ground,
     modes,
     motion,
-    moving,
     series,
+    steps,
 )
-from rockcheck.ebm.core.names import Guard, Pivot, Row
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
 from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
@@ -182,9 +181,9 @@ def test_a_block_that_lies_down_along_a_wall_meets_it_while_it_turns_over(sign, 
     start = [0.0, 0.0, sign * (0.5 * math.pi - left), 0.0, 0.0, sign * spin]
     state = run_at(start, **ROCKS, sense=sign).state
     state.guard = Guard.TIP_GAP
-    assert moving.lies_along_wall(state) == state.rules[Rule.LANDS_ALONG] == lies
+    assert steps.lies_along_wall(state) == state.rules[Rule.LANDS_ALONG] == lies
     state.guard = Guard.FAR_GAP
-    assert not moving.lies_along_wall(state)
+    assert not steps.lies_along_wall(state)
 
 
 @pytest.mark.parametrize("symmetric", [False, True])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stepping import block_of, run_at, setting_of
 
-from rockcheck.ebm.core.laws import contact_impacts as ci, impacts
+from rockcheck.ebm.core import contact_impacts as ci, impacts
 from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Found, Landing
 from rockcheck.scenes import Block
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import rockcheck.ebm
-from rockcheck.ebm.core import march, rules
+from rockcheck.ebm.core import march, names
 
 ROOT = Path(__file__).parents[3]
 FOLDER = Path(rockcheck.ebm.__file__).parent
@@ -36,10 +36,10 @@ def test_there_is_one_zero_of_a_kind(name):
 
 
 def test_modelling_choices_are_few():
-    assert len(rules.Rule) == rules.RULES == len(rules.NAMES) <= 15
+    assert len(names.Rule) == names.RULES == len(names.RULE_NAMES) <= 15
 
 
-@pytest.mark.parametrize("rule", rules.Rule, ids=lambda rule: rule.name)
+@pytest.mark.parametrize("rule", names.Rule, ids=lambda rule: rule.name)
 def test_a_modelling_choice_is_counted_and_explained(rule):
     homes = {
         name
@@ -49,7 +49,7 @@ def test_a_modelling_choice_is_counted_and_explained(rule):
         and f".{rule.name}" in ast.unparse(node.target.slice)
     }
     assert len(homes) in (1, 2, 3)
-    assert rules.NAMES[rule] in (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+    assert names.RULE_NAMES[rule] in (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
 
 
 def test_the_theory_page_links_each_stage_to_its_function():

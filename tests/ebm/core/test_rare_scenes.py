@@ -11,7 +11,7 @@ from stepping import assert_contacts_hold
 
 from rockcheck.ebm import EventBasedModel, packed
 from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.ebm.core import rules
+from rockcheck.ebm.core import names
 from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead
 from rockcheck.ebm.core.lanes import LANES
 from rockcheck.scenes import (
@@ -316,8 +316,8 @@ def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
 
 def test_every_modelling_choice_has_a_pinned_scene():
     """A choice that no scene needs would go."""
-    assert {one["name"] for one in PINNED.values()} == set(rules.NAMES)
-    assert len(rules.Rule) == rules.RULES == len(rules.NAMES)
+    assert {one["name"] for one in PINNED.values()} == set(names.RULE_NAMES)
+    assert len(names.Rule) == names.RULES == len(names.RULE_NAMES)
 
 
 @pytest.mark.parametrize("slug", PINNED)

@@ -20,8 +20,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import (
     modes,
 )
-from rockcheck.ebm.core.names import Family, Kind, Pivot
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.names import Family, Kind, Pivot, Rule
 from rockcheck.ebm.core.state import code_of
 from rockcheck.scenes import Wall
 

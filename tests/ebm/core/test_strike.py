@@ -9,10 +9,8 @@ from cases import places, random_scene
 from stepping import ROCKS, run_at, setting_of, six
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.core import contacts, settle
-from rockcheck.ebm.core.laws import strike
-from rockcheck.ebm.core.names import Family, Guard, Pivot
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core import contacts, settle, strike
+from rockcheck.ebm.core.names import Family, Guard, Pivot, Rule
 from rockcheck.scenes import Floor, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 

@@ -116,7 +116,7 @@ FAULTS = [
     ),
     (
         "Housner's ratio off by 1 %",
-        "ebm/core/laws/impacts.py",
+        "ebm/core/impacts.py",
         r"w2 = \(1\.0 - k2",
         "w2 = 1.01 * (1.0 - k2",
         15,

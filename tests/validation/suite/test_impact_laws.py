@@ -8,8 +8,8 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.execute.models import Work
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.execute.workers import Work
 from rockcheck.validation.suite.comparing import Window, by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite

@@ -9,12 +9,20 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import contacts, modes
+from rockcheck.ebm.core import contacts, impacts, modes
 from rockcheck.ebm.core.block import side_of
-from rockcheck.ebm.core.laws import impacts
-from rockcheck.ebm.core.laws.contact_impacts import ROUNDING, WORK, Impact, contact_impact
-from rockcheck.ebm.core.names import Branch, Contact, Event, Family, Found, Guard, Landing, Pivot
-from rockcheck.ebm.core.rules import Rule
+from rockcheck.ebm.core.contact_impacts import ROUNDING, WORK, Impact, contact_impact
+from rockcheck.ebm.core.names import (
+    Branch,
+    Contact,
+    Event,
+    Family,
+    Found,
+    Guard,
+    Landing,
+    Pivot,
+    Rule,
+)
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel

@@ -1,1 +1,0 @@
-"""Laws of impact: the paper's cascade, and contacts that only push."""
