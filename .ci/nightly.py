@@ -28,6 +28,10 @@ KEPT = ROOT / "docs" / "nightly.json"
 READERS = (
     "at2",
     "record_csv",
+    "record_v2",
+    "record_esm",
+    "record_knet",
+    "record_columns",
     "scene_toml",
     "suite_toml",
     "history_csv",
