@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rockcheck.scenes import Record, Scene
 from rockcheck.scenes.block import Block
@@ -150,8 +150,7 @@ def reserve_sliding(scene: Scene, base: Base) -> float:
     damped spectrum reaches c_s, the slip is c_s/(2 pi f_es)^2; 0 where it never does. The last
     expression was derived, not read: check it against your copy.
     """
-    gravity = scene.gravity
-    capacity = 2.0 * scene.floor.friction * (gravity - 0.4 * base.vertical)
+    capacity = 2.0 * scene.floor.friction * (scene.gravity - 0.4 * base.vertical)
     if capacity <= 0.0:
         return math.inf
     slower, found = _SLOWEST, _FASTEST
@@ -179,8 +178,7 @@ def reserve_rocking(scene: Scene, base: Base) -> float:
     inertia = 4.0 / 3.0 * (1.0 + a * a)
     gamma = -2.0 * math.log(max(1.0 - 2.0 * a * a / inertia, _LEAST_RESTITUTION))
     damping = gamma / math.hypot(2.0 * math.pi, gamma)
-    angles: NDArray[np.float64] = pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES
-    for angle in angles.tolist():
+    for angle in (pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES).tolist():
         # cos th - 1 without cancellation
         work = a * math.sin(angle) - 2.0 * math.sin(0.5 * angle) ** 2
         frequency = math.sqrt(2.0 * gravity * work / (inertia * height)) / (2.0 * math.pi * angle)

@@ -87,8 +87,11 @@ class Table:
             for k, column in enumerate(self.columns)
             if not column.optional or any(plain(row[k]) is not None for row in self.rows)
         ]
-        rows = [[row[k] for k in kept] for row in self.rows]
-        return replace(self, columns=[self.columns[k] for k in kept], rows=rows)
+        return replace(
+            self,
+            columns=[self.columns[k] for k in kept],
+            rows=[[row[k] for k in kept] for row in self.rows],
+        )
 
     def records(self) -> list[dict[str, Any]]:
         """The rows by the names of the columns, without marks."""
@@ -104,8 +107,12 @@ def plain(cell: Cell) -> Any:
 def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Table:
     """Records of one dataclass as a table for files, a column a field."""
     fields = list(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-    rows = [[getattr(record, key) for key in fields] for record in records]
-    return Table(name, [Column(key) for key in fields], rows, **{"on": "file", **more})
+    return Table(
+        name,
+        [Column(key) for key in fields],
+        [[getattr(record, key) for key in fields] for record in records],
+        **{"on": "file", **more},
+    )
 
 
 #: How a line of a panel is drawn.
