@@ -39,11 +39,6 @@ def uplift_acceleration(block: Block, gravity: float) -> float:
     return gravity * block.slope
 
 
-def slip_acceleration(mu_s: float, gravity: float) -> float:
-    """Base acceleration (m/s^2) above which a block at rest slides: mu_s g; Coulomb."""
-    return mu_s * gravity
-
-
 def overturning_velocity(block: Block, gravity: float) -> float:
     """Step of the base's velocity (m/s) that just overturns a block that does not slip.
 
@@ -233,10 +228,7 @@ CRITERIA = (
         "slides",
         "Coulomb",
         "exact for a block at rest that does not uplift first, without vertical motion",
-        lambda scene, base: (
-            base.acceleration > slip_acceleration(scene.floor.mu_s, scene.gravity),
-            None,
-        ),
+        lambda scene, base: (base.acceleration > scene.floor.mu_s * scene.gravity, None),
     ),
     Criterion(
         "step of velocity",

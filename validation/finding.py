@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
-Cell = Any
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Table:
 
     name: str
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[Any]]
     title: str = ""
     note: str = ""
     on: Literal["all", "page", "file"] = "all"
@@ -99,7 +98,7 @@ class Table:
         return [dict(zip(names, map(plain, row), strict=True)) for row in self.rows]
 
 
-def plain(cell: Cell) -> Any:
+def plain(cell: Any) -> Any:
     """A cell's value without its mark."""
     return cell.value if isinstance(cell, Mark) else cell
 

@@ -83,8 +83,9 @@ class Task:
     @cached_property
     def key(self) -> str:
         """Hash of what it depends on."""
-        depends = [type(self).__qualname__, self.depends()]
-        return provenance.digest(json.dumps(depends, sort_keys=True, default=str))
+        return provenance.digest(
+            json.dumps([type(self).__qualname__, self.depends()], sort_keys=True, default=str)
+        )
 
 
 class Study(ABC):

@@ -126,21 +126,20 @@ def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
         before, after = place[:k], place[k + 1 :]
         along = paper.safe[(*before, slice(None), *after)]
         for (one, safe), (other, next_safe) in pairwise(zip(AXES[axis], along, strict=True)):
-            what = about((*before, None, *after))
-            what += f": {one:g} against {other:g} mm" if len(along) > 2 else ""
-            rows.append(_pair(paper, what, safe, next_safe))
+            two = f": {one:g} against {other:g} mm" if len(along) > 2 else ""
+            rows.append(_pair(paper, about((*before, None, *after)) + two, safe, next_safe))
     return rows, {}
 
 
 def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
     i, j = np.nonzero(~safer & other)
     f, a = paper.frequencies[j], paper.amplitudes[i]
-    opposite = "nowhere the opposite"
-    if len(i):
-        opposite = (
-            f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-            f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
-        )
+    opposite = (
+        f"the opposite at {share(len(i) / safer.size)} of the nodes,"
+        f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+        if len(i)
+        else "nowhere the opposite"
+    )
     return Row(
         what,
         f"safe area {share(safer)} against {share(other)}; {opposite}",
@@ -233,8 +232,10 @@ def matters_most(paper: Paper, most: str) -> Measured:
         axis: float(np.mean([np.mean(one != other) for one, other in combinations(safe, 2)]))
         for axis, safe in ((axis, np.moveaxis(paper.safe, k, 0)) for k, axis in enumerate(AXES))
     }
-    rows = [Row(most, f"{share(means[most])} of the nodes")]
-    rows += [Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most]
+    rows = [
+        Row(most, f"{share(means[most])} of the nodes"),
+        *(Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most),
+    ]
     return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
 
 
@@ -278,12 +279,19 @@ def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
     gains = (areas - alone[None, :, None, None])[AXES["side"].index(side)]
     rows = []
     for axis in axes:
-        along = np.moveaxis(gains, list(AXES).index(axis) - 1, 0)
-        both = [np.stack(pair) for pair in combinations(along, 2)]
+        both = [
+            np.stack(pair)
+            for pair in combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2)
+        ]
         turn = sum(int(((one.min(0) < -SMALL) & (one.max(0) > SMALL)).sum()) for one in both)
-        size = sum(one[0].size for one in both)
-        said = f"turns a benefit into harm, or back, in {turn} of {size} pairs"
-        rows.append(Row(f"{axis} alone", said, turn > 0))
+        rows.append(
+            Row(
+                f"{axis} alone",
+                f"turns a benefit into harm, or back, in {turn} of"
+                f" {sum(one[0].size for one in both)} pairs",
+                turn > 0,
+            )
+        )
     return rows, {"turns": "; ".join(f"{row.what} {row.value}" for row in rows).capitalize()}
 
 
@@ -291,10 +299,12 @@ def least_amplitude(paper: Paper) -> Measured:
     """The lowest overturning amplitude on the scan, with walls against none."""
     walls = {wall: value for wall, value in paper.least.items() if wall}
     none = paper.least[None]
-    rows = [Row("no wall", f"overturns from a_p = {none:.2f} g tan α")]
-    rows += [
-        Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {value:.2f} g tan α", value < none)
-        for (gap, e), value in walls.items()
+    rows = [
+        Row("no wall", f"overturns from a_p = {none:.2f} g tan α"),
+        *(
+            Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {v:.2f} g tan α", v < none)
+            for (gap, e), v in walls.items()
+        ),
     ]
     return rows, {
         "without": none,
@@ -374,11 +384,10 @@ def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
     clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
     lead = np.cumsum(np.where(clockwise, 1, -1))
     count = int(np.argmax(lead)) + 1
-    end = paper.frequencies[some[count - 1]]
     return Row(
         f"μ {mu:g}, the lowest overturning",
         f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of"
-        f" {end:.1f}",
+        f" {paper.frequencies[some[count - 1]]:.1f}",
         bool(lead[count - 1] > 0),
     )
 
@@ -486,8 +495,10 @@ def stronger_is_safe(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     alone = paper.safe_alone & np.logical_or.accumulate(paper.falls_alone, axis=-2)
     place = max(WALLS, key=lambda one: int(above[one].sum()))
     free = alone[place[1]]
-    masks = [(f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)]
-    masks += [(_case(one), above[one]) for one in WALLS]
+    masks = [
+        *((f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)),
+        *((_case(one), above[one]) for one in WALLS),
+    ]
     return Beyond(
         sentence,
         _case(place),

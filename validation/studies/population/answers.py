@@ -468,9 +468,11 @@ def _sure(found: Found, numerical: Mapping[str, Any]) -> list[str]:
         return [said, f"The law of impacts matters in {laws}."] if laws else [said]
     if found.own.numerical is None:
         return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
-    if numerical["converged"]:
-        return ["Numerically converged."]
-    return ["Not converged: no figure of it is sure."]
+    return [
+        "Numerically converged."
+        if numerical["converged"]
+        else "Not converged: no figure of it is sure."
+    ]
 
 
 def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -515,9 +517,14 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
     shown = [q for q in QUANTITIES if quantities[q.name]["of"]]
-    units = {q.name: {"unit": UNITS.get(q.unit, q.unit)} for q in shown}
     rows = [
-        [q.label, *((quantities[q.name] | units[q.name])[c.name] for c in columns[1:])]
+        [
+            q.label,
+            *(
+                UNITS.get(q.unit, q.unit) if c.name == "unit" else quantities[q.name][c.name]
+                for c in columns[1:]
+            ),
+        ]
         for q in shown
     ]
     return Table(
@@ -548,43 +555,53 @@ def _strips(found: Found) -> Iterator[Block]:
         )
 
 
-def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
+def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
     rows = [row | row["wall_speed"] for row in gaps]
     across = [row["gap"] for row in rows]
-    shares = [
-        Series(name, across, [row[name] / row["runs"] for row in rows])
-        for name in ("struck", "overturned")
-    ]
-    speeds = [Series(name, across, [row[name] for row in rows]) for name in ("median", "largest")]
-    plot = Plot(
-        "gaps",
-        "Which gap is safe",
-        panels=[Panel("share of the runs", shares), Panel("speed at the wall, m/s", speeds)],
-        x=Axis("clear gap, m"),
-        shared=False,
-    )
-    table = Table(
-        "gaps",
-        [
-            Column("gap", "clear gap", "m"),
-            Column("runs"),
-            Column("overturned"),
-            Column("struck"),
-            Column("median", "speed, median", "m/s"),
-            Column("largest", "largest", "m/s"),
-        ],
-        [
+    if gaps:
+        yield Plot(
+            "gaps",
+            "Which gap is safe",
+            panels=[
+                Panel(
+                    "share of the runs",
+                    [
+                        Series(name, across, [row[name] / row["runs"] for row in rows])
+                        for name in ("struck", "overturned")
+                    ],
+                ),
+                Panel(
+                    "speed at the wall, m/s",
+                    [
+                        Series(name, across, [row[name] for row in rows])
+                        for name in ("median", "largest")
+                    ],
+                ),
+            ],
+            x=Axis("clear gap, m"),
+            shared=False,
+        )
+        yield Table(
+            "gaps",
             [
-                row["gap"],
-                row["runs"],
-                Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
-                *(row[name] for name in ("struck", "median", "largest")),
-            ]
-            for row in rows
-        ],
-        note="Runs that strike the wall, also those that then overturn.",
-    )
-    return [plot, table] if gaps else []
+                Column("gap", "clear gap", "m"),
+                Column("runs"),
+                Column("overturned"),
+                Column("struck"),
+                Column("median", "speed, median", "m/s"),
+                Column("largest", "largest", "m/s"),
+            ],
+            [
+                [
+                    row["gap"],
+                    row["runs"],
+                    Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
+                    *(row[name] for name in ("struck", "median", "largest")),
+                ]
+                for row in rows
+            ],
+            note="Runs that strike the wall, also those that then overturn.",
+        )
 
 
 def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
@@ -702,7 +719,6 @@ def _runs(found: Found) -> Table:
 
 
 def _certainty(own: Sure, numerical: Mapping[str, Any]) -> Iterator[Block]:
-    """The numerical uncertainty, the law of impacts, and the uncertain inputs."""
     if own.numerical:
         columns = [
             text("name", "quantity"),
@@ -754,7 +770,6 @@ def _certainty(own: Sure, numerical: Mapping[str, Any]) -> Iterator[Block]:
 
 
 def _histories(found: Found) -> list[Block]:
-    """The rotations of all cases over time."""
     rows = {
         case: np.genfromtxt(io.StringIO(one.history), delimiter=",", names=True)
         for case, one in found.shown.items()
@@ -805,7 +820,6 @@ def file_of(case: str) -> str:
 
 
 def _notes(found: Found) -> list[Block]:
-    """What else a reader should know."""
     study, drawn = found.study, found.drawn
     beyond: dict[str, list[str]] = {}
     for case, one in study.cases.items():
@@ -833,7 +847,13 @@ class Assessment(Asked):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The answers to the engineer's questions."""
         ended = {task: one for task, one in done.items() if not isinstance(one, Failure)}
-        first = {part: _first(tasks, ended) for part, tasks in self.parts.items()}
+        # by part and case, the record of the first of its tasks
+        first = {
+            part: {
+                case: ended[some[0]] for case, some in tasks.items() if some and some[0] in ended
+            }
+            for part, tasks in self.parts.items()
+        }
         drawn = {case: _runs_of(tasks, ended) for case, tasks in self.parts["drawn"].items()}
         count = len(self.draws)
         at_gaps = {
@@ -859,11 +879,6 @@ class Assessment(Asked):
                 failed=len(ended) < len(done),
             )
         )
-
-
-def _first(tasks: Mapping[str, Sequence[Any]], ended: Mapping[Any, Any]) -> dict[str, Any]:
-    """The record of the first of each list of tasks that has ended."""
-    return {key: ended[some[0]] for key, some in tasks.items() if some and some[0] in ended}
 
 
 def _runs_of(tasks: Sequence[Any], ended: Mapping[Any, Any]) -> list[Ran]:

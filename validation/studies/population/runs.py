@@ -117,8 +117,11 @@ class Run(OneScene):
             every = -(-len(history.channels["t"]) // MOST_ROWS)
             columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
             rows = columns_text(columns)
-        said = tuple(criterion.says(self.scene, base) for criterion in CRITERIA)
-        return Played(runs=runs, history=rows, said=said)
+        return Played(
+            runs=runs,
+            history=rows,
+            said=tuple(criterion.says(self.scene, base) for criterion in CRITERIA),
+        )
 
 
 def changed(scene: Scene, numbers: Numbers) -> Scene:
@@ -152,8 +155,11 @@ class Certainty(OneScene):
         """Also what is not known of the scene, where it is drawn."""
         if self.given is None:
             return super().depends()
-        spreads = {name: spread.model_dump() for name, spread in self.given.spreads.items()}
-        return super().depends(), spreads, self.given.correlation.tolist()
+        return (
+            super().depends(),
+            {name: spread.model_dump() for name, spread in self.given.spreads.items()},
+            self.given.correlation.tolist(),
+        )
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""

@@ -79,8 +79,10 @@ class OneScene(Task):
 
 def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
     """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
-    a_run = A_RUN if family(model).compiled else A_SLOW_RUN
-    return {"expected": runs * a_run, "compiles": compiles(model, settings)}
+    return {
+        "expected": runs * (A_RUN if family(model).compiled else A_SLOW_RUN),
+        "compiles": compiles(model, settings),
+    }
 
 
 @dataclass(frozen=True)
