@@ -34,11 +34,6 @@ _LEAST_RESTITUTION = 1e-6
 _SLIDING_DAMPING = 0.10
 
 
-def uplift_acceleration(block: Block, gravity: float) -> float:
-    """Base acceleration (m/s^2) above which a block at rest uplifts: g tan(alpha); statics."""
-    return gravity * block.slope
-
-
 def overturning_velocity(block: Block, gravity: float) -> float:
     """Step of the base's velocity (m/s) that just overturns a block that does not slip.
 
@@ -204,7 +199,7 @@ def _sliding(estimate: Callable[[Scene, Base], float]) -> Callable[..., tuple[bo
 
 
 def _rocking(scene: Scene, base: Base) -> tuple[bool, float | None]:
-    if base.acceleration <= uplift_acceleration(scene.block, scene.gravity):
+    if base.acceleration <= scene.gravity * scene.block.slope:
         return False, 0.0
     angle = reserve_rocking(scene, base)
     return math.isinf(angle), angle / scene.block.alpha
@@ -217,10 +212,7 @@ CRITERIA = (
         "uplifts",
         "statics",
         "exact for a block at rest that does not slide first, without vertical motion",
-        lambda scene, base: (
-            base.acceleration > uplift_acceleration(scene.block, scene.gravity),
-            None,
-        ),
+        lambda scene, base: (base.acceleration > scene.gravity * scene.block.slope, None),
     ),
     Criterion(
         "sliding",

@@ -232,11 +232,10 @@ def matters_most(paper: Paper, most: str) -> Measured:
         axis: float(np.mean([np.mean(one != other) for one, other in combinations(safe, 2)]))
         for axis, safe in ((axis, np.moveaxis(paper.safe, k, 0)) for k, axis in enumerate(AXES))
     }
-    rows = [
+    return [
         Row(most, f"{share(means[most])} of the nodes"),
         *(Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most),
-    ]
-    return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
+    ], {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
 
 
 def side_decides(paper: Paper) -> Measured:
@@ -299,14 +298,13 @@ def least_amplitude(paper: Paper) -> Measured:
     """The lowest overturning amplitude on the scan, with walls against none."""
     walls = {wall: value for wall, value in paper.least.items() if wall}
     none = paper.least[None]
-    rows = [
+    return [
         Row("no wall", f"overturns from a_p = {none:.2f} g tan α"),
         *(
             Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {v:.2f} g tan α", v < none)
             for (gap, e), v in walls.items()
         ),
-    ]
-    return rows, {
+    ], {
         "without": none,
         "walls": ", ".join(f"{value:.1f} (e = {e:g})" for (_, e), value in walls.items()),
     }

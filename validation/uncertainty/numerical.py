@@ -282,8 +282,9 @@ def explain(
     elif error <= u_val:
         verdict = INPUTS if u_input >= u_data else DATA
     else:
-        least = f"{error - u_val:.2g} {unit}".rstrip()
-        verdict = f"not explained: model form or set-up, at least {least}"
+        verdict = (
+            f"not explained: model form or set-up, at least {error - u_val:.2g} {unit}".rstrip()
+        )
     return Explanation(
         quantity=quantity,
         unit=unit,

@@ -47,8 +47,9 @@ class Runs(Stored):
     @property
     def peaks(self) -> Floats:
         """Peak rotations, alpha: infinite of a block that overturned, NaN where the run failed."""
-        peaks = np.where(self.side, np.inf, self.figures["peak_rotation"])
-        return np.where(self.failed, np.nan, peaks)
+        return np.where(
+            self.failed, np.nan, np.where(self.side, np.inf, self.figures["peak_rotation"])
+        )
 
 
 def play(scenes: Sequence[Scene], player: Any) -> Runs:

@@ -12,30 +12,13 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
-from rockcheck.validation.paper import KEPT, paper_panels
+from rockcheck.validation.paper import kept_spectra, paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
 from rockcheck.validation.studies.spectrum.tiles import nodes_of
 
 ROOT = Path(__file__).parents[3]
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
-
-
-def kept_spectra():
-    """The 28 spectra as they come with the package, 100 x 100 nodes each."""
-    data = np.load(KEPT / "grids.npz")
-    return [
-        Spectrum(
-            outcomes=data[panel.name],
-            frequency_ratios=data["frequency_ratios"],
-            amplitude_ratios=data["amplitude_ratios"],
-            evaluations=data[panel.name].size,
-            undecided=data[f"{panel.name}.undecided"],
-            scene=panel.scene,
-            model=None,
-        )
-        for panel in paper_panels()
-    ]
 
 
 def synthetic(height, size=40, edit=lambda one: None):

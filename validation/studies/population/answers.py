@@ -180,7 +180,7 @@ def finding_of(found: Found) -> Finding:
     answers = {
         "Does it fall?": [_fall(found, overturning)],
         "How far does it move?": _move(quantities),
-        "Which gap is safe?": _safe_gap(gaps),
+        "Which gap is safe?": [*_safe_gap(gaps)],
         "At which intensity does it fall?": [at_levels],
         "How sure is that?": [*_sure(found, numerical), *_change(found, contributions)],
         "What do hand methods say?": _by_hand(criteria),
@@ -266,9 +266,8 @@ def overturning_of(runs: Mapping[str, Sequence[Ran]]) -> dict[str, Any]:
     some = [each for each in runs.values() if each]
     hits = np.array([[sum(run.fell for run in each)] for each in some]).reshape(-1, 1)
     decided = np.array([[len(each)] for each in some]).reshape(-1, 1)
-    ends = np.ravel(share_of(hits, decided) if some else [math.nan] * 3)
-    shares = finite(np.clip(ends, 0.0, 1.0).tolist())
-    return {"count": int(hits.sum()), **dict(zip(INTERVAL, shares, strict=True))}
+    ends = np.clip(np.ravel(share_of(hits, decided) if some else [math.nan] * 3), 0.0, 1.0)
+    return {"count": int(hits.sum()), **dict(zip(INTERVAL, finite(ends.tolist()), strict=True))}
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
@@ -390,17 +389,12 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
             "of": len(runs),
             "simulated": sum(far > least for *_, far in runs),
             "agrees": sum(says == (far > least) for says, _, far in runs),
-            "estimate": _median([estimate for estimate, _ in pairs]),
-            "motion": _median([far for _, far in pairs]),
+            # the lower medians; None where they are infinite
+            "estimate": finite(median_low(estimate for estimate, _ in pairs)) if pairs else None,
+            "motion": finite(median_low(far for _, far in pairs)) if pairs else None,
             "unit": unit,
             "unsafe": unsafe if pairs else None,
         }
-
-
-def _median(values: Sequence[float]) -> float | None:
-    """The lower median; None where there is none, or it is infinite."""
-    middle = median_low(values) if values else math.inf
-    return middle if math.isfinite(middle) else None
 
 
 # The sentences.
@@ -441,21 +435,19 @@ def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"Hand methods let it overturn: {', '.join(said)}."] if said else []
 
 
-def _safe_gap(gaps: Mapping[str, Any]) -> list[str]:
-    said, safe = [], gaps["none_overturns_up_to"]
+def _safe_gap(gaps: Mapping[str, Any]) -> Iterator[str]:
+    safe, fallen = gaps["none_overturns_up_to"], gaps["free_overturned"]
     if gaps["gaps"]:
-        said.append(
+        yield (
             f"None overturns up to a gap of {safe:g} m."
             if safe is not None
             else f"Some overturn already at the smallest gap, {gaps['gaps'][0]['gap']:g} m."
         )
     if not gaps["monotonic"]:
-        said.append("A larger gap is not always worse: see each.")
+        yield "A larger gap is not always worse: see each."
     if gaps["clearance"] is not None:
-        fallen = gaps["free_overturned"]
         falls = f"; {fallen} run{'s overturn' if fallen > 1 else ' overturns'}" if fallen else ""
-        said.append(f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}.")
-    return said
+        yield f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}."
 
 
 def _sure(found: Found, numerical: Mapping[str, Any]) -> list[str]:

@@ -16,8 +16,7 @@ import numpy as np
 from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.excitations import Excitation
-from rockcheck.scenes.recordings import Recording, intensity
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, compiles, family
 from rockcheck.validation.finding import (

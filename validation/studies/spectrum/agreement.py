@@ -202,8 +202,11 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
         f"{model} {', '.join(f'{key} {value}' for key, value in chosen.items()) or 'as it comes'}"
         for model, chosen in found["settings"].items()
     )
-    engines = {"mujoco", "pybullet", "pymunk", "dartpy", "drake"} & found["versions"].keys()
-    versions = ", ".join(f"{name} {found['versions'][name]}" for name in sorted(engines))
+    versions = ", ".join(
+        f"{name} {found['versions'][name]}"
+        for name in ("dartpy", "drake", "mujoco", "pybullet", "pymunk")
+        if name in found["versions"]
+    )
     yield Text(
         f"{found['about']} {origin}. Settings: {settings}. {versions}.",
         "The same spectra by the other models",
@@ -220,7 +223,36 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
         folded=True,
     )
     if found["maps"]:
-        yield _drawn(found, panels)
+        equal = ", ".join(
+            f"{one['model']} {one['equal']} of {one['nodes']}"
+            for one in found["maps"]
+            if one["model"] != "ebm-unilateral"
+        )
+        size = len(found["map_frequencies"])
+        yield Plot(
+            "models",
+            f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
+            kind="spectra",
+            note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
+            f" {equal}.",
+            data={
+                "frequencies": found["map_frequencies"],
+                "amplitudes": found["map_amplitudes"],
+                "record": False,
+                "panels": [
+                    {
+                        "title": panel.title.replace(", ", "\n") if row == 0 else "",
+                        "free": panel.wall is None,
+                        "outcomes": "".join(one["outcomes"][panel.name]),
+                        "place": [row, 1, column],
+                        "row": one["model"],
+                    }
+                    for row, one in enumerate(found["maps"])
+                    for column, panel in enumerate(panels)
+                ],
+                "height": 0.4 + 0.92 * len(found["maps"]),
+            },
+        )
 
 
 def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
@@ -252,36 +284,3 @@ def _equal(shares: Sequence[Any], near: bool, reference: str) -> float | None:
     mine = [share for share in shares if share["near"] == near and reference in share["equal"]]
     nodes = sum(share["nodes"] for share in mine)
     return sum(share["equal"][reference] for share in mine) / nodes if nodes else None
-
-
-def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
-    equal = ", ".join(
-        f"{one['model']} {one['equal']} of {one['nodes']}"
-        for one in found["maps"]
-        if one["model"] != "ebm-unilateral"
-    )
-    size = len(found["map_frequencies"])
-    return Plot(
-        "models",
-        f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
-        kind="spectra",
-        note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
-        f" {equal}.",
-        data={
-            "frequencies": found["map_frequencies"],
-            "amplitudes": found["map_amplitudes"],
-            "record": False,
-            "panels": [
-                {
-                    "title": panel.title.replace(", ", "\n") if row == 0 else "",
-                    "free": panel.wall is None,
-                    "outcomes": "".join(one["outcomes"][panel.name]),
-                    "place": [row, 1, column],
-                    "row": one["model"],
-                }
-                for row, one in enumerate(found["maps"])
-                for column, panel in enumerate(panels)
-            ],
-            "height": 0.4 + 0.92 * len(found["maps"]),
-        },
-    )

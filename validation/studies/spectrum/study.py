@@ -28,7 +28,6 @@ from rockcheck.validation.paper import (
     title_of,
 )
 from rockcheck.validation.studies.spectrum import agreement, tiles
-from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing
 from rockcheck.validation.study import Study
 from rockcheck.validation.uncertainty.population import compiled
 
@@ -69,7 +68,7 @@ class Spectra(Study):
     """
 
     panels: tuple[Panel, ...]
-    request: Request = field(default_factory=Request)
+    request: tiles.Request = field(default_factory=tiles.Request)
     compared: int = 0
     name = "spectrum"
     record = tiles.Played
@@ -81,13 +80,13 @@ class Spectra(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
         """The nodes that are still to be played."""
-        book = Book(done)
+        book = tiles.Book(done)
         self._found(book)
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The complete spectra, and the findings from them."""
-        found = self._found(Book(done))
+        found = self._found(tiles.Book(done))
         panels, spectra = list(found.spectra), list(found.spectra.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
         answer = (
@@ -144,7 +143,7 @@ class Spectra(Study):
         model = self.request.model
         return panel.name if model == "ebm" else f"{panel.name}--{model}"
 
-    def _found(self, book: Book) -> _Found:
+    def _found(self, book: tiles.Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
         found, fast = _Found(), compiled(build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
@@ -162,7 +161,7 @@ class Spectra(Study):
             found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
         return found
 
-    def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
+    def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
         one = book.spectrum(panel, self.request)
         laws = [
@@ -171,7 +170,7 @@ class Spectra(Study):
         known = [law for law in laws if law is not None]
         if one is None or not laws or len(known) < len(laws):
             return one
-        return replace(one, depends_on_law=differing(one, known))
+        return replace(one, depends_on_law=tiles.differing(one, known))
 
     def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
         one = self.request
@@ -179,7 +178,7 @@ class Spectra(Study):
             scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings, what
         )
 
-    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
         scanned: dict[Any, Any] = {
             measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
                 one.scene,
@@ -250,13 +249,13 @@ class Spectra(Study):
 
     def _figures(self, found: _Found) -> Iterator[Plot]:
         request = self.request
-        by = "" if request.model == "ebm" else f", by {request.model}"
         for number in dict.fromkeys(panel.figure for panel in found.spectra):
             mine = [panel for panel in found.spectra if panel.figure == number]
             first = mine[0]
             yield Plot(
                 self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
-                (title_of(number) if number else first.title) + by,
+                (title_of(number) if number else first.title)
+                + ("" if request.model == "ebm" else f", by {request.model}"),
                 kind="spectra",
                 live=True,
                 note=f"{request.size} x {request.size} nodes, {request.model}"
@@ -326,7 +325,7 @@ def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
 
 
-def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
+def _pulse(panel: Panel, request: tiles.Request) -> dict[str, Any] | None:
     """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record.
 
     `own` has the frequency and amplitude ratio of the user's own pulse; None for the paper's.

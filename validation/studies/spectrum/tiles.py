@@ -30,7 +30,6 @@ from rockcheck.validation.execute.pool import Failure, cores
 from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
 from rockcheck.validation.study import Task
 from rockcheck.validation.uncertainty import population
-from rockcheck.validation.uncertainty.population import compiled
 
 What = Literal["outcomes", "motions", "one impact"]
 #: Nodes of a tile of the compiled event-based models, and of a model that is simulated one by one.
@@ -101,7 +100,7 @@ class Nodes(Task):
                 for one in (each.replace(output_step=each.duration) for each in self.scenes())
             ]
             return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
-        if compiled(player):
+        if population.compiled(player):
             sides, failed = play_nodes(*where, model=player, jobs=cores())
         else:
             runs = population.play(self.scenes(), player)
@@ -118,7 +117,7 @@ def nodes_of(
     what: What = "outcomes",
 ) -> list[Nodes]:
     """The tasks that play nodes (1-D arrays of one length) of a spectrum, in order."""
-    fast = compiled(build(model, settings))
+    fast = population.compiled(build(model, settings))
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
     how = provenance.code_digest(__name__) if fast else f"{population.SETTLE} {population.ENOUGH}"
     base = provenance.cell_key(neutral, model, settings) + what + how
@@ -252,10 +251,13 @@ class Request:
         player = build(self.model, self.settings)
         if not isinstance(player, EventBasedModel):
             return []
-        bounces = any(wall.restitution > 0.0 for wall in scene.walls)
         return [
             {**self.settings, "impacts": law}
-            for law in other_laws(player, walls=bounces, flat=may_fly(scene))
+            for law in other_laws(
+                player,
+                walls=any(wall.restitution > 0.0 for wall in scene.walls),
+                flat=may_fly(scene),
+            )
         ]
 
 
@@ -290,8 +292,9 @@ class Book:
         if found is None:
             return None
         letters = np.array([*"".join(one.letters for one in found)])
-        sides = [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)]
-        return np.select(sides, [LEFT, RIGHT], SAFE).astype(np.int8), letters == UNDECIDED
+        return np.select(
+            [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)], [LEFT, RIGHT], SAFE
+        ).astype(np.int8), letters == UNDECIDED
 
     def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
         """A spectrum; None where nodes are still to be played.

@@ -350,8 +350,9 @@ def scene_text(scene: Scene, remarks: str) -> str:
         ((key, value) for key, value in _tables(scene).items() if key != "name"),
         key=lambda item: isinstance(item[1], dict | list),
     )
-    lines = "".join(f"# {line}\n" for line in remarks.splitlines())
-    return lines + tomlkit.dumps(dict(ordered))
+    return "".join(
+        [*(f"# {line}\n" for line in remarks.splitlines()), tomlkit.dumps(dict(ordered))]
+    )
 
 
 #: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then

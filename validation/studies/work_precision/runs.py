@@ -383,7 +383,6 @@ class Play(Task):
             costs.append(model.simulate(ready.scene).cost)
         reference = ready.references[line.reference]
         errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
-        paper = compare(ready.references["ebm"], history, measures=["theta_rms"])
         first = [
             min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
             for h in (reference, history)
@@ -395,7 +394,9 @@ class Play(Task):
                 peak=abs(history.peak_rotation - reference.peak_rotation)
                 / (reference.alpha or 1.0),
                 first_impact=abs(first[1] - first[0]),
-                against_ebm=paper["theta_rms"],
+                against_ebm=compare(ready.references["ebm"], history, measures=["theta_rms"])[
+                    "theta_rms"
+                ],
                 step=float(history.settings.get("time_step", math.nan))
                 if line.knob != "largest_step"
                 else self.value,
@@ -531,8 +532,13 @@ def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]
         good = line[line.rms <= LEVEL]
         met = {kind: set(good.value[good.family == kind]) for kind in LEAGUE}
         met["all"] = set.intersection(*met.values())
-        largest = {kind: max(values, default=math.nan) for kind, values in met.items()}
-        rows.append((label, largest, line.value.min()))
+        rows.append(
+            (
+                label,
+                {kind: max(values, default=math.nan) for kind, values in met.items()},
+                line.value.min(),
+            )
+        )
     return rows
 
 
@@ -619,11 +625,13 @@ def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
     settings = dict(grouped(levels, "model", "reference"))
     for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):
         mine = settings[model, reference]
-        rows.append((model, reference, slope(mine.step, mine["median"]), ""))
         rows += [
-            (model, reference, slope(one.step, one[reference]), scene)
-            for scene in WALLS
-            if (one := lines.get((model, scene))) is not None
+            (model, reference, slope(mine.step, mine["median"]), ""),
+            *(
+                (model, reference, slope(one.step, one[reference]), scene)
+                for scene in WALLS
+                if (one := lines.get((model, scene))) is not None
+            ),
         ]
     return pd.DataFrame(rows, columns=["model", "reference", "order", "scene"])
 

@@ -439,10 +439,9 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
         good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
         series = []
         for (model,), mine in runs.grouped(levels[levels.reference == reference], "model"):
-            lines = [good.get((model, name), frame[:0]) for name in WALLS]
             series += [
                 Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
-                for one in lines
+                for one in (good.get((model, name), frame[:0]) for name in WALLS)
             ]
             medians = mine["median"].clip(upper=3.0).tolist()
             series.append(Series(model, mine.step.tolist(), medians, look=model))
@@ -484,17 +483,22 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
         f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
         f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
     )
-    series = [
-        Series(
-            f"{case.name}: {case.words}",
-            [row.error_95 for row in times if row.case == case.name and row.error_95 > 0.0],
-            [1e6 * row.cpu for row in times if row.case == case.name and row.error_95 > 0.0],
-        )
-        for case in timings.CASES
-    ]
+    shown = [row for row in times if row.error_95 > 0.0]
     yield Plot(
         "batches",
-        panels=[Panel("", series)],
+        panels=[
+            Panel(
+                "",
+                [
+                    Series(
+                        f"{case.name}: {case.words}",
+                        [row.error_95 for row in shown if row.case == case.name],
+                        [1e6 * row.cpu for row in shown if row.case == case.name],
+                    )
+                    for case in timings.CASES
+                ],
+            )
+        ],
         x=Axis("p95 error of the peak, rad", log=True),
         y=Axis("CPU μs a run, one core", log=True),
     )
