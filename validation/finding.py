@@ -94,8 +94,10 @@ class Table:
 
     def records(self) -> list[dict[str, Any]]:
         """The rows by the names of the columns, without marks."""
-        names = [column.name for column in self.columns]
-        return [dict(zip(names, map(plain, row), strict=True)) for row in self.rows]
+        return [
+            {one.name: plain(cell) for one, cell in zip(self.columns, row, strict=True)}
+            for row in self.rows
+        ]
 
 
 def plain(cell: Any) -> Any:

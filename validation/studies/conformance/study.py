@@ -305,12 +305,6 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         [*HEAD, *(Column(key, words) for key, (words, *_) in VERDICTS.items()), Column("total")],
         [[*head, *card["counts"].values()] for head, card in zip(about, cards, strict=True)],
     )
-    wrong = [
-        f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
-        for card in cards
-        for row in card["phenomena"]
-        if row["verdict"] == "fail"
-    ]
     of = [
         {
             row["id"]: Mark(
@@ -341,7 +335,15 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         " limit of the target. –: the engine says that it has none.",
         on="page",
     )
-    wrong += [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
+    wrong = [
+        *(
+            f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
+            for card in cards
+            for row in card["phenomena"]
+            if row["verdict"] == "fail"
+        ),
+        *(f"{card['title']}: {note}" for card in cards for note in card["notes"]),
+    ]
     if wrong:
         yield Text(title="What goes wrong", items=wrong)
     yield Table(

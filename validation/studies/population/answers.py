@@ -110,9 +110,11 @@ class Found:
     @property
     def failures(self) -> dict[str, str]:
         """Why a run as it is failed, by case, and by the other model."""
-        runs = {case: one.runs[0] for case, one in self.shown.items()}
-        for model, others in self.others.items():
-            runs |= {f"{case}, {model}": run for case, run in others.items()}
+        runs = {case: one.runs[0] for case, one in self.shown.items()} | {
+            f"{case}, {model}": run
+            for model, others in self.others.items()
+            for case, run in others.items()
+        }
         return {where: run.reason for where, run in runs.items() if run.reason}
 
     @property
@@ -817,18 +819,24 @@ def _notes(found: Found) -> list[Block]:
     for case, one in study.cases.items():
         for line in outside(one.scene):
             beyond.setdefault(line, []).append(case)
-    said = [
-        f"outside of what the suites cover: {line}"
-        + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
-        for line, cases in beyond.items()
-    ]
-    if drawn and (without := [case for case in study.cases if case not in drawn]):
-        said.append(f"left out, since not all of its draws were played: {', '.join(without)}")
-    if study.model != study.swift and (found.at_gaps or drawn):
-        said.append(f"gaps and draws are played by {study.swift}")
+    without = ", ".join(case for case in study.cases if drawn and case not in drawn)
+    others = found.at_gaps or drawn
     names = ", ".join(next(iter(study.cases.values())).names)
-    if names and not drawn and study.recorded:
-        said.append(f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them")
+    told = {
+        f"left out, since not all of its draws were played: {without}": without,
+        f"gaps and draws are played by {study.swift}": study.model != study.swift and others,
+        f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them": names
+        and not drawn
+        and study.recorded,
+    }
+    said = [
+        *(
+            f"outside of what the suites cover: {line}"
+            + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
+            for line, cases in beyond.items()
+        ),
+        *(line for line, holds in told.items() if holds),
+    ]
     return [Text(items=said, title="Notes", on="page")] if said else []
 
 

@@ -277,16 +277,16 @@ class Asked(Study):
         "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
         among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
         """
-        others = {model: self._runs("", model) for model in self.models[1:]}
-        if self.model == SWIFT and self.own.scene.walls:
-            others[LAW] = self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)
+        walled = self.model == SWIFT and self.own.scene.walls
+        law = {LAW: self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)} if walled else {}
         settings = self.settings.get(self.model, {})
         drawn = bool(self.samples) and not self.recorded
         return {
             "shown": self._runs("", self.model),
             "drawn": self._runs("draws", self.swift, self.draws),
             **self.at_gaps,
-            **others,
+            **{model: self._runs("", model) for model in self.models[1:]},
+            **law,
             "sure": {
                 case: [
                     Certainty(

@@ -166,13 +166,14 @@ class Population:
             for case, some in peaks.items()
             for event, limit in self.limits.items()
         ]
-        blocks: list[Block] = []
-        if "" in peaks:
-            blocks += lines_of([one.label for one in played], peaks[""], self.levels, self.across)
-        if curves:
-            blocks += blocks_of(curves, self.across, self.other)
-        unit = self.across.unit
-        blocks.append(
+        names, unit = [one.label for one in played], self.across.unit
+        medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
+        return (
+            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
+            f" Median {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}."
+        ), [
+            *(lines_of(names, peaks[""], self.levels, self.across) if "" in peaks else ()),
+            *(blocks_of(curves, self.across, self.other) if curves else ()),
             Table(
                 "motions",
                 [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
@@ -180,13 +181,8 @@ class Population:
                 "Motions",
                 on="page",
                 folded=True,
-            )
-        )
-        medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
-        return (
-            f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
-            f" Median {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}."
-        ), blocks
+            ),
+        ]
 
 
 def blocks_of(

@@ -277,9 +277,12 @@ def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
         return found
     drift = 1e-6 * np.abs(motion.channels["x_dot"]) * motion.unit / motion.radius
     speed = np.abs(motion.slip) / (1.0 + drift + np.abs(motion.w))
-    found["stick"] = _largest(speed, motion.within("rest", "rock", "lean"))
     friction, push = _force_conditions(model, motion)
-    return found | {"coulomb": friction, "push": push}
+    return found | {
+        "stick": _largest(speed, motion.within("rest", "rock", "lean")),
+        "coulomb": friction,
+        "push": push,
+    }
 
 
 def _largest(values: Floats, rows: Mask) -> float:
@@ -312,10 +315,14 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
     rest = clear & motion.within("rest") & ~(motion.tip | motion.far)
     excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)
     tension = _largest(-g / scale, clear & motion.within("rest", "slide") & unilateral)
-    tilted = clear & motion.within("rock", "slide-rock", "lean", "ladder") & (theta != 0.0)
-    tilted &= ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
     slides = motion.within("slide-rock", "ladder")
-    tilted &= ~(slides & (np.abs(motion.slip) < SLIPS))
+    tilted = (
+        clear
+        & motion.within("rock", "slide-rock", "lean", "ladder")
+        & (theta != 0.0)
+        & ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
+        & ~(slides & (np.abs(motion.slip) < SLIPS))
+    )
     direction = np.where(slides, np.sign(motion.sign * motion.slip), 0.0)
     beyond, pulls = [], []
     # What happens within NEAR is one event, in the core and here: a spinning block passes through
@@ -430,9 +437,11 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
 
     # An event at an edge itself: the row there is from before or after it. The base acceleration
     # jumps where a record ends.
-    whole = _free([*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near)
-    events += [one.quiet_after for one in records]
-    whole &= _free(events, edges[:-1] - 1e3 * near, edges[1:] + 1e3 * near)
+    whole = _free([*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near) & _free(
+        [*events, *(one.quiet_after for one in records)],
+        edges[:-1] - 1e3 * near,
+        edges[1:] + 1e3 * near,
+    )
     nodes = mode[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 

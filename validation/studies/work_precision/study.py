@@ -170,15 +170,14 @@ class WorkPrecision(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
-        rows = list(
-            itertools.chain.from_iterable(
-                one for one in done.values() if not isinstance(one, Failure)
-            )
-        )
-        rows += [
-            task.record(failure=one.reason)
-            for task, one in done.items()
-            if isinstance(task, Play) and isinstance(one, Failure)
+        played = (one for one in done.values() if not isinstance(one, Failure))
+        rows = [
+            *itertools.chain.from_iterable(played),
+            *(
+                task.record(failure=one.reason)
+                for task, one in done.items()
+                if isinstance(task, Play) and isinstance(one, Failure)
+            ),
         ]
         samples, times, sizes, starts, saved = (
             [row for row in rows if isinstance(row, kind)] for kind in get_args(Row)
