@@ -323,9 +323,6 @@ def propagate(
     played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
     own = play_ensemble([given.scene], model)
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
-    figures = [_interval("peak_rotation", "alpha", np.minimum(own.peak / own.alpha, 1.0), peaks)]
-    if np.any(~fallen) and not own.side[0]:
-        figures.append(_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen]))
     bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
     return Propagated(
@@ -333,7 +330,14 @@ def propagate(
             samples=count,
             model=model.name,
             names=given.names,
-            figures=tuple(figures),
+            figures=(
+                _interval("peak_rotation", "alpha", np.minimum(own.peak / own.alpha, 1.0), peaks),
+                *(
+                    [_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen])]
+                    if np.any(~fallen) and not own.side[0]
+                    else ()
+                ),
+            ),
             overturns=Interval(
                 name="overturns",
                 unit="1",

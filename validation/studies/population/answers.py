@@ -82,8 +82,8 @@ class Found:
 
     `drawn` has the draws of each case with all of them; `at_gaps` the runs at each gap
     (m) and `free` those without the wall that have a motion; `others` the runs by other models;
-    `sure` how sure a run is, "" the scene's own; `levels` the answer and blocks over intensities;
-    `failed` whether any task did.
+    `sure` how sure a run is, and `own`, by "", the scene under its own motion; `levels`
+    the answer and blocks over intensities; `failed` whether any task did.
     """
 
     study: Asked
@@ -93,6 +93,7 @@ class Found:
     free: Sequence[Ran]
     others: Mapping[str, Mapping[str, Ran]]
     sure: Mapping[str, Sure]
+    own: Sure
     levels: tuple[str, Sequence[Block]]
     failed: bool
 
@@ -116,11 +117,6 @@ class Found:
             for case, run in others.items()
         }
         return {where: run.reason for where, run in runs.items() if run.reason}
-
-    @property
-    def own(self) -> Sure:
-        """How sure the scene under its own motion is."""
-        return self.sure.get("", Sure())
 
     @cached_property
     def nominal(self) -> dict[str, Ran]:
@@ -384,7 +380,6 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
         # whether it happens by the method, the method's estimate, and how far the run went
         runs = [(*said[k], getattr(run, figure)) for run, said in cases]
         pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
-        unsafe = sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
         yield {
             **{key: getattr(one, key) for key in METHOD},
             "predicts": sum(says for says, *_ in runs),
@@ -395,7 +390,9 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
             "estimate": finite(median_low(estimate for estimate, _ in pairs)) if pairs else None,
             "motion": finite(median_low(far for _, far in pairs)) if pairs else None,
             "unit": unit,
-            "unsafe": unsafe if pairs else None,
+            "unsafe": sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
+            if pairs
+            else None,
         }
 
 
@@ -476,8 +473,7 @@ def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[st
         return []
     inputs = found.own.inputs
     most = inputs.sensitivities[0].name if inputs and inputs.sensitivities else _leading(found)
-    *_, changes = CONTRIBUTIONS[contributions[0]["source"]]
-    said = changes.format(most)
+    said = CONTRIBUTIONS[contributions[0]["source"]][-1].format(most)
     return [f"{said[0].upper()}{said[1:]} would change the answer most."]
 
 
@@ -875,6 +871,7 @@ class Assessment(Asked):
                     if first.get(model)
                 },
                 sure=first["sure"],
+                own=first["sure"].get("", Sure()),
                 levels=self.levels.gather(ended) if self.levels else ("", ()),
                 failed=len(ended) < len(done),
             )

@@ -201,12 +201,7 @@ def blocks_of(
         Column("motions", brief=False),
         Column("undecided", "undecided runs", brief=False),
     ]
-    rows = [
-        [getattr(one, "label" if c.name == "case" else c.name) for c in columns] for one in curves
-    ]
-    if other:
-        columns.append(Column(f"median_{other['other_unit']}", "median", other["other_unit"]))
-        rows = [[*row, other["per_unit"] * row[1]] for row in rows]
+    unit = [other["other_unit"]] if other else []
     series = []
     for one in curves:
         level, share, low, high, fit = zip(*one.points, strict=True)
@@ -228,8 +223,14 @@ def blocks_of(
         ),
         Table(
             "fits",
-            columns,
-            rows,
+            [*columns, *(Column(f"median_{one}", "median", one) for one in unit)],
+            [
+                [
+                    *(getattr(one, "label" if c.name == "case" else c.name) for c in columns),
+                    *([other["per_unit"] * one.median] if other else ()),
+                ]
+                for one in curves
+            ],
             note="Lognormal fits; the interval of the median is from drawing the motions anew.",
         ),
         Table(

@@ -282,10 +282,8 @@ class Spectra(Study):
 
     def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
         wall, spread = panel.wall, _spread(self.request.size)
-        place = [1, 2, 0]
-        if panel.figure is None:
-            place = [0, 4, 0]
-        elif wall:
+        place = [0, 4, 0] if panel.figure is None else [1, 2, 0]
+        if panel.figure is not None and wall:
             place = [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
         return {
             "title": panel.title,

@@ -242,10 +242,12 @@ def audited(scene: Scene) -> Scene:
 
     It is cut after `MOST_ROWS` rows.
     """
-    unit = math.sqrt(scene.block.radius / scene.gravity)
     bases = scene.excitation, scene.vertical
     step = min(
-        [0.03 * unit, *(one.period / FINE for one in bases if isinstance(one, Ricker | Sine))]
+        [
+            0.03 * math.sqrt(scene.block.radius / scene.gravity),
+            *(one.period / FINE for one in bases if isinstance(one, Ricker | Sine)),
+        ]
     )
     if records := [one.time_step for one in bases if isinstance(one, Record)]:
         step = records[0] / (GROUP * max(1, math.ceil(records[0] / (GROUP * step))))
