@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from rockcheck.scenes import Record, Scene
 from rockcheck.scenes.block import Block
@@ -32,16 +32,6 @@ _ANGLES = 20
 _LEAST_RESTITUTION = 1e-6
 #: Damping of the spectrum that the sliding estimate uses.
 _SLIDING_DAMPING = 0.10
-
-
-def uplift_acceleration(block: Block, gravity: float) -> float:
-    """Base acceleration (m/s^2) above which a block at rest uplifts: g tan(alpha); statics."""
-    return gravity * block.slope
-
-
-def slip_acceleration(mu_s: float, gravity: float) -> float:
-    """Base acceleration (m/s^2) above which a block at rest slides: mu_s g; Coulomb."""
-    return mu_s * gravity
 
 
 def overturning_velocity(block: Block, gravity: float) -> float:
@@ -150,8 +140,7 @@ def reserve_sliding(scene: Scene, base: Base) -> float:
     damped spectrum reaches c_s, the slip is c_s/(2 pi f_es)^2; 0 where it never does. The last
     expression was derived, not read: check it against your copy.
     """
-    gravity = scene.gravity
-    capacity = 2.0 * scene.floor.friction * (gravity - 0.4 * base.vertical)
+    capacity = 2.0 * scene.floor.friction * (scene.gravity - 0.4 * base.vertical)
     if capacity <= 0.0:
         return math.inf
     slower, found = _SLOWEST, _FASTEST
@@ -179,8 +168,7 @@ def reserve_rocking(scene: Scene, base: Base) -> float:
     inertia = 4.0 / 3.0 * (1.0 + a * a)
     gamma = -2.0 * math.log(max(1.0 - 2.0 * a * a / inertia, _LEAST_RESTITUTION))
     damping = gamma / math.hypot(2.0 * math.pi, gamma)
-    angles: NDArray[np.float64] = pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES
-    for angle in angles.tolist():
+    for angle in (pivot.alpha * np.arange(1, _ANGLES + 1) / _ANGLES).tolist():
         # cos th - 1 without cancellation
         work = a * math.sin(angle) - 2.0 * math.sin(0.5 * angle) ** 2
         frequency = math.sqrt(2.0 * gravity * work / (inertia * height)) / (2.0 * math.pi * angle)
@@ -211,7 +199,7 @@ def _sliding(estimate: Callable[[Scene, Base], float]) -> Callable[..., tuple[bo
 
 
 def _rocking(scene: Scene, base: Base) -> tuple[bool, float | None]:
-    if base.acceleration <= uplift_acceleration(scene.block, scene.gravity):
+    if base.acceleration <= scene.gravity * scene.block.slope:
         return False, 0.0
     angle = reserve_rocking(scene, base)
     return math.isinf(angle), angle / scene.block.alpha
@@ -224,10 +212,7 @@ CRITERIA = (
         "uplifts",
         "statics",
         "exact for a block at rest that does not slide first, without vertical motion",
-        lambda scene, base: (
-            base.acceleration > uplift_acceleration(scene.block, scene.gravity),
-            None,
-        ),
+        lambda scene, base: (base.acceleration > scene.gravity * scene.block.slope, None),
     ),
     Criterion(
         "sliding",
@@ -235,10 +220,7 @@ CRITERIA = (
         "slides",
         "Coulomb",
         "exact for a block at rest that does not uplift first, without vertical motion",
-        lambda scene, base: (
-            base.acceleration > slip_acceleration(scene.floor.mu_s, scene.gravity),
-            None,
-        ),
+        lambda scene, base: (base.acceleration > scene.floor.mu_s * scene.gravity, None),
     ),
     Criterion(
         "step of velocity",

@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
-Cell = Any
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ class Table:
 
     name: str
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Sequence[Any]]
     title: str = ""
     note: str = ""
     on: Literal["all", "page", "file"] = "all"
@@ -87,16 +86,21 @@ class Table:
             for k, column in enumerate(self.columns)
             if not column.optional or any(plain(row[k]) is not None for row in self.rows)
         ]
-        rows = [[row[k] for k in kept] for row in self.rows]
-        return replace(self, columns=[self.columns[k] for k in kept], rows=rows)
+        return replace(
+            self,
+            columns=[self.columns[k] for k in kept],
+            rows=[[row[k] for k in kept] for row in self.rows],
+        )
 
     def records(self) -> list[dict[str, Any]]:
         """The rows by the names of the columns, without marks."""
-        names = [column.name for column in self.columns]
-        return [dict(zip(names, map(plain, row), strict=True)) for row in self.rows]
+        return [
+            {one.name: plain(cell) for one, cell in zip(self.columns, row, strict=True)}
+            for row in self.rows
+        ]
 
 
-def plain(cell: Cell) -> Any:
+def plain(cell: Any) -> Any:
     """A cell's value without its mark."""
     return cell.value if isinstance(cell, Mark) else cell
 
@@ -104,8 +108,12 @@ def plain(cell: Cell) -> Any:
 def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Table:
     """Records of one dataclass as a table for files, a column a field."""
     fields = list(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-    rows = [[getattr(record, key) for key in fields] for record in records]
-    return Table(name, [Column(key) for key in fields], rows, **{"on": "file", **more})
+    return Table(
+        name,
+        [Column(key) for key in fields],
+        [[getattr(record, key) for key in fields] for record in records],
+        **{"on": "file", **more},
+    )
 
 
 #: How a line of a panel is drawn.

@@ -74,14 +74,18 @@ class Task:
 
         By default the fields, the code that its module can reach, and all libraries.
         """
-        code = provenance.code_digest(type(self).__module__)
-        return {"task": self.fields(), "code": code, "versions": provenance.versions()}
+        return {
+            "task": self.fields(),
+            "code": provenance.code_digest(type(self).__module__),
+            "versions": provenance.versions(),
+        }
 
     @cached_property
     def key(self) -> str:
         """Hash of what it depends on."""
-        depends = [type(self).__qualname__, self.depends()]
-        return provenance.digest(json.dumps(depends, sort_keys=True, default=str))
+        return provenance.digest(
+            json.dumps([type(self).__qualname__, self.depends()], sort_keys=True, default=str)
+        )
 
 
 class Study(ABC):
@@ -124,8 +128,11 @@ class Study(ABC):
 
     def keep(self, store: Store, task: Task, record: Any) -> None:
         """Keep the record of a task."""
-        plain = {"record": self._adapter.dump_python(record, mode="json")}
-        store.put_record(RECORDS, self.file(task), plain)
+        store.put_record(
+            RECORDS,
+            self.file(task),
+            {"record": self._adapter.dump_python(record, mode="json")},
+        )
 
     @cached_property
     def _adapter(self) -> TypeAdapter[Any]:
@@ -179,12 +186,11 @@ class _Run:
         )
 
     def finding(self, minutes: float | None) -> Finding:
-        until = self.began + 60.0 * minutes if minutes else math.inf
         ended = 0
         with self.stack:
             self.stack.callback(THREADS.reset, THREADS.set(self.jobs))
             try:
-                self._play(until)
+                self._play(self.began + 60.0 * minutes if minutes else math.inf)
             except KeyboardInterrupt:
                 ended = INTERRUPTED
         complete = not ended and len(self.done) == len(self.known)
@@ -195,12 +201,14 @@ class _Run:
             {task: self.done[task] for task in self.known if task in self.done}
         )
         self.store.prune()
-        failed = {
-            task.label: one.reason for task, one in self.done.items() if isinstance(one, Failure)
-        }
         return replace(
             found,
-            failures={**failed, **found.failures},
+            failures={
+                task.label: one.reason
+                for task, one in self.done.items()
+                if isinstance(one, Failure)
+            }
+            | {**found.failures},
             exit_code=found.exit_code or ended,
             complete=complete and found.complete,
             made=Made(
@@ -256,8 +264,9 @@ class _Run:
         self.done[task] = result
         if isinstance(result, Failure):
             if result.traceback:
-                path = made(self.folder, FAULTS) / f"{self.study.file(task)}.txt"
-                write_whole(path, result.traceback)
+                write_whole(
+                    made(self.folder, FAULTS) / f"{self.study.file(task)}.txt", result.traceback
+                )
         else:
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)

@@ -78,13 +78,14 @@ def test_newmarks_sliding_block(a, v, mu):
 
 
 @pytest.mark.parametrize(("ratio", "moves"), [(1.0 - 1e-6, False), (1.0 + 1e-6, True)])
-@pytest.mark.parametrize(("kind", "friction"), [("uplift", 1.0), ("slip", 0.05)])
+@pytest.mark.parametrize(("kind", "friction", "k"), [("uplift", 1.0, 0), ("slip", 0.05, 1)])
 @pytest.mark.parametrize("block", BLOCKS)
-def test_uplift_and_sliding_begin_where_the_criteria_say(block, kind, friction, ratio, moves):
-    uplift, slip = criteria.uplift_acceleration(block, G), criteria.slip_acceleration(friction, G)
+def test_uplift_and_sliding_begin_where_the_criteria_say(block, kind, friction, k, ratio, moves):
+    uplift, slip = G * block.slope, friction * G
     pulse = Record.from_samples([ratio * min(uplift, slip)] * 2, 0.1)
-    events = played(shaken(block, pulse, friction)).event_list
-    assert any(event.kind == kind for event in events) is moves
+    scene = shaken(block, pulse, friction)
+    assert any(event.kind == kind for event in played(scene).event_list) is moves
+    assert criteria.CRITERIA[k].says(scene, criteria.base_of(scene)) == (moves, None)
 
 
 @pytest.mark.parametrize(

@@ -49,8 +49,11 @@ def paper_panels(*figures: int) -> tuple[Panel, ...]:
 
     Unobstructed, then gap by gap with e = 0 and e = 1.
     """
-    places = [None, *itertools.product(GAPS, RESTITUTIONS)]
-    return tuple(_panel(n, place) for n in figures or FIGURES for place in places)
+    return tuple(
+        _panel(figure, place)
+        for figure in figures or FIGURES
+        for place in (None, *itertools.product(GAPS, RESTITUTIONS))
+    )
 
 
 def _panel(figure: int, place: tuple[float, float] | None) -> Panel:

@@ -106,8 +106,11 @@ class Paper:
 
 def about(place: Sequence[int | None]) -> str:
     """The wall and friction of a place in words, without those that are None."""
-    values = zip(SAID, AXES.values(), place, strict=True)
-    return ", ".join(said.format(axis[n]) for said, axis, n in values if n is not None)
+    return ", ".join(
+        said.format(axis[n])
+        for said, axis, n in zip(SAID, AXES.values(), place, strict=True)
+        if n is not None
+    )
 
 
 def share(mask: Mask | float) -> str:
@@ -123,23 +126,25 @@ def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
         before, after = place[:k], place[k + 1 :]
         along = paper.safe[(*before, slice(None), *after)]
         for (one, safe), (other, next_safe) in pairwise(zip(AXES[axis], along, strict=True)):
-            what = about((*before, None, *after))
-            what += f": {one:g} against {other:g} mm" if len(along) > 2 else ""
-            rows.append(_pair(paper, what, safe, next_safe))
+            two = f": {one:g} against {other:g} mm" if len(along) > 2 else ""
+            rows.append(_pair(paper, about((*before, None, *after)) + two, safe, next_safe))
     return rows, {}
 
 
 def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
     i, j = np.nonzero(~safer & other)
     f, a = paper.frequencies[j], paper.amplitudes[i]
-    opposite = "nowhere the opposite"
-    if len(i):
-        opposite = (
-            f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-            f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
-        )
-    value = f"safe area {share(safer)} against {share(other)}; {opposite}"
-    return Row(what, value, bool(safer.mean() > other.mean()))
+    opposite = (
+        f"the opposite at {share(len(i) / safer.size)} of the nodes,"
+        f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+        if len(i)
+        else "nowhere the opposite"
+    )
+    return Row(
+        what,
+        f"safe area {share(safer)} against {share(other)}; {opposite}",
+        bool(safer.mean() > other.mean()),
+    )
 
 
 def against_none(
@@ -151,8 +156,10 @@ def against_none(
     area is `below`, or `beyond`, the factor times the area without one plus the share. With
     `examples` some walls must help, and some harm.
     """
-    high = paper.frequencies > above
-    areas, alone = (safe[..., high].mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
+    areas, alone = (
+        safe[..., paper.frequencies > above].mean(axis=(-2, -1))
+        for safe in (paper.safe, paper.safe_alone)
+    )
     compared = [
         (part, place, float(areas[place]), float(alone[place[1]]))
         for part in parts
@@ -171,9 +178,12 @@ def against_none(
         for sign in (1.0, -1.0)
     )
     if examples:
-        said = ((f"{examples} may enlarge the safe area", helped), ("it may shrink it", harmed))
         rows[:0] = [
-            Row(what, f"{len(some)} of {len(compared)} spectra", bool(some)) for what, some in said
+            Row(what, f"{len(some)} of {len(compared)} spectra", bool(some))
+            for what, some in (
+                (f"{examples} may enlarge the safe area", helped),
+                ("it may shrink it", harmed),
+            )
         ]
     ratios = [wall / none if none else 1.0 for *_, wall, none in compared]
     return rows, {
@@ -222,17 +232,21 @@ def matters_most(paper: Paper, most: str) -> Measured:
         axis: float(np.mean([np.mean(one != other) for one, other in combinations(safe, 2)]))
         for axis, safe in ((axis, np.moveaxis(paper.safe, k, 0)) for k, axis in enumerate(AXES))
     }
-    rows = [Row(most, f"{share(means[most])} of the nodes")]
-    rows += [Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most]
-    return rows, {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
+    return [
+        Row(most, f"{share(means[most])} of the nodes"),
+        *(Row(axis, share(n), means[most] > n) for axis, n in means.items() if axis != most),
+    ], {"means": ", ".join(f"{axis} {share(mean)}" for axis, mean in means.items())}
 
 
 def side_decides(paper: Paper) -> Measured:
     """Nodes that are safe with the wall on one side only, at either friction."""
     depends = np.mean(paper.safe[0] != paper.safe[1], axis=(-2, -1))
-    said = "the side decides at {} of the nodes at μ 0.3, at {} at μ 0.6"
     return [
-        Row(about((None, None, gap, e)), said.format(share(low), share(high)), bool(low > high))
+        Row(
+            about((None, None, gap, e)),
+            f"the side decides at {share(low)} of the nodes at μ 0.3, at {share(high)} at μ 0.6",
+            bool(low > high),
+        )
         for gap, e in np.ndindex(*SIZES[2:])
         for low, high in (depends[:, gap, e],)
     ], {}
@@ -247,9 +261,13 @@ def one_impact(paper: Paper) -> Measured:
             there = tongue & ((f >= low) & (f <= high))
             part = float(np.mean(safe[there])) if there.any() else 0.0
             where = f"ω_p/p {low:g} to {high:g}"
-            value = f"{there.sum()} nodes without the wall, of which it makes {share(part)} safe"
-            holds = part > 0.5 if low == ONE_IMPACT[0] else None
-            rows.append(Row(f"μ {mu:g}, {where}", value, holds))
+            rows.append(
+                Row(
+                    f"μ {mu:g}, {where}",
+                    f"{there.sum()} nodes without the wall, of which it makes {share(part)} safe",
+                    part > 0.5 if low == ONE_IMPACT[0] else None,
+                )
+            )
             shares.append(f"{share(part)} at μ = {mu:g} and {where}")
     return rows, {"shares": ", ".join(shares)}
 
@@ -260,13 +278,19 @@ def turns(paper: Paper, side: str, axes: Sequence[str]) -> Measured:
     gains = (areas - alone[None, :, None, None])[AXES["side"].index(side)]
     rows = []
     for axis in axes:
-        two = combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2)
-        both = [np.stack(pair) for pair in two]
+        both = [
+            np.stack(pair)
+            for pair in combinations(np.moveaxis(gains, list(AXES).index(axis) - 1, 0), 2)
+        ]
         turn = sum(int(((one.min(0) < -SMALL) & (one.max(0) > SMALL)).sum()) for one in both)
-        value = (
-            f"turns a benefit into harm, or back, in {turn} of {sum(o[0].size for o in both)} pairs"
+        rows.append(
+            Row(
+                f"{axis} alone",
+                f"turns a benefit into harm, or back, in {turn} of"
+                f" {sum(one[0].size for one in both)} pairs",
+                turn > 0,
+            )
         )
-        rows.append(Row(f"{axis} alone", value, turn > 0))
     return rows, {"turns": "; ".join(f"{row.what} {row.value}" for row in rows).capitalize()}
 
 
@@ -274,13 +298,16 @@ def least_amplitude(paper: Paper) -> Measured:
     """The lowest overturning amplitude on the scan, with walls against none."""
     walls = {wall: value for wall, value in paper.least.items() if wall}
     none = paper.least[None]
-    rows = [Row("no wall", f"overturns from a_p = {none:.2f} g tan α")]
-    rows += [
-        Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {value:.2f} g tan α", value < none)
-        for (gap, e), value in walls.items()
-    ]
-    said = ", ".join(f"{value:.1f} (e = {e:g})" for (_, e), value in walls.items())
-    return rows, {"without": none, "walls": said}
+    return [
+        Row("no wall", f"overturns from a_p = {none:.2f} g tan α"),
+        *(
+            Row(f"right wall, {1000 * gap:g} mm, e {e:g}", f"from {v:.2f} g tan α", v < none)
+            for (gap, e), v in walls.items()
+        ),
+    ], {
+        "without": none,
+        "walls": ", ".join(f"{value:.1f} (e = {e:g})" for (_, e), value in walls.items()),
+    }
 
 
 def restitution_rules(paper: Paper) -> Measured:
@@ -289,11 +316,14 @@ def restitution_rules(paper: Paper) -> Measured:
     for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
         by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
         by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
-        value = (
-            f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-            f" at up to {share(by_e)} between e"
+        rows.append(
+            Row(
+                f"{side} wall, μ 0.6",
+                f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
+                f" at up to {share(by_e)} between e",
+                bool(by_gap < by_e),
+            )
         )
-        rows.append(Row(f"{side} wall, μ 0.6", value, bool(by_gap < by_e)))
         most.append((by_gap, by_e))
     gaps, e = map(share, np.max(most, axis=0))
     return rows, {"gaps": gaps, "e": e}
@@ -326,11 +356,20 @@ def likelier_side(paper: Paper) -> Measured:
         whole.append(f"{share(right)} against {share(left)} of the nodes (μ = {mu:g})")
     # The mirror image: a right wall under the reversed pulse is a left wall under the pulse.
     wall, none = paper.safe[0, 0, 0, 0], paper.safe_alone[0]
-    value = f"safe area {share(wall)}, {share(none)} without"
-    rows.append(Row("with the pulse reversed: right wall, μ 0.3, 3 mm, e 0", value))
-    back = " With the pulse reversed it would be so over all of them, but then a right wall would"
-    said = f"{back} shrink the safe area." if wall.mean() < none.mean() else ""
-    return rows, {"ends": " and ".join(ends), "whole": ", ".join(whole), "reversed": said}
+    rows.append(
+        Row(
+            "with the pulse reversed: right wall, μ 0.3, 3 mm, e 0",
+            f"safe area {share(wall)}, {share(none)} without",
+        )
+    )
+    return rows, {
+        "ends": " and ".join(ends),
+        "whole": ", ".join(whole),
+        "reversed": " With the pulse reversed it would be so over all of them, but then a right"
+        " wall would shrink the safe area."
+        if wall.mean() < none.mean()
+        else "",
+    }
 
 
 def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
@@ -343,11 +382,12 @@ def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
     clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
     lead = np.cumsum(np.where(clockwise, 1, -1))
     count = int(np.argmax(lead)) + 1
-    end = paper.frequencies[some[count - 1]]
-    value = (
-        f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of {end:.1f}"
+    return Row(
+        f"μ {mu:g}, the lowest overturning",
+        f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of"
+        f" {paper.frequencies[some[count - 1]]:.1f}",
+        bool(lead[count - 1] > 0),
     )
-    return Row(f"μ {mu:g}, the lowest overturning", value, bool(lead[count - 1] > 0))
 
 
 def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -380,13 +420,14 @@ class Beyond:
     @property
     def words(self) -> str:
         """The finding's text, filled in."""
-        counts = {"gained": self.gained.sum(), "lost": self.lost.sum()}
-        return str(self.about["words"].format(**counts, **self.says))
+        return str(
+            self.about["words"].format(gained=self.gained.sum(), lost=self.lost.sum(), **self.says)
+        )
 
 
 def _figure(side: int, mu: int) -> int:
-    shown = {what: number for number, what in FIGURES.items()}
-    return shown[AXES["side"][side], AXES["friction"][mu]]
+    shown = AXES["side"][side], AXES["friction"][mu]
+    return next(number for number, what in FIGURES.items() if what == shown)
 
 
 def _case(place: Place) -> str:
@@ -452,8 +493,10 @@ def stronger_is_safe(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     alone = paper.safe_alone & np.logical_or.accumulate(paper.falls_alone, axis=-2)
     place = max(WALLS, key=lambda one: int(above[one].sum()))
     free = alone[place[1]]
-    masks = [(f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)]
-    masks += [(_case(one), above[one]) for one in WALLS]
+    masks = [
+        *((f"no wall, μ {mu:g}", mask) for mu, mask in zip(AXES["friction"], alone, strict=True)),
+        *((_case(one), above[one]) for one in WALLS),
+    ]
     return Beyond(
         sentence,
         _case(place),
@@ -530,27 +573,30 @@ def findings_of(paper: Paper) -> list[Beyond]:
 
 def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
     """The sentences with their verdicts, the safe areas behind most of them, and our findings."""
-    columns = [
-        text("sentence", "sentence, restated"),
-        text("place", "where in the paper", brief=False),
-        text("verdict"),
-        text("finding"),
-        text("criterion", "judged by", brief=False),
-        text("figures", brief=False),
-    ]
-    rows = [
+    yield Table(
+        "claims",
         [
-            *(claim.about[name] for name in ("sentence", "place")),
-            Mark(claim.verdict, VERDICTS[claim.verdict]),
-            claim.finding,
-            claim.about["criterion"],
-            ", ".join(map(str, claim.about["figures"])),
-        ]
-        for claim in claims
-    ]
-    size = f"{len(paper.amplitudes)} x {len(paper.frequencies)}"
-    note = f"Each sentence of section 5 and the conclusions, judged by spectra of {size} nodes."
-    yield Table("claims", columns, rows, "What the paper says of them, checked", note)
+            text("sentence", "sentence, restated"),
+            text("place", "where in the paper", brief=False),
+            text("verdict"),
+            text("finding"),
+            text("criterion", "judged by", brief=False),
+            text("figures", brief=False),
+        ],
+        [
+            [
+                *(claim.about[name] for name in ("sentence", "place")),
+                Mark(claim.verdict, VERDICTS[claim.verdict]),
+                claim.finding,
+                claim.about["criterion"],
+                ", ".join(map(str, claim.about["figures"])),
+            ]
+            for claim in claims
+        ],
+        "What the paper says of them, checked",
+        "Each sentence of section 5 and the conclusions, judged by spectra of"
+        f" {len(paper.amplitudes)} x {len(paper.frequencies)} nodes.",
+    )
     yield _areas(paper)
     yield _rows(
         "claim-figures",
@@ -601,13 +647,18 @@ def beyond(paper: Paper, found: Sequence[Beyond]) -> Iterator[Block]:
 
 def _rows(name: str, title: str, of: Mapping[str, Sequence[Row]]) -> Table:
     words = {None: "", True: "holds", False: "does not hold"}
-    rows = [
-        [whose, row.what, row.value, Mark(words[row.holds], VERDICTS[words[row.holds]])]
-        for whose, some in of.items()
-        for row in some
-    ]
-    columns = [text("name", "of"), text("what"), text("value"), text("holds", "")]
-    return Table(name, columns, rows, title, on="page", folded=True)
+    return Table(
+        name,
+        [text("name", "of"), text("what"), text("value"), text("holds", "")],
+        [
+            [whose, row.what, row.value, Mark(words[row.holds], VERDICTS[words[row.holds]])]
+            for whose, some in of.items()
+            for row in some
+        ],
+        title,
+        on="page",
+        folded=True,
+    )
 
 
 def _areas(paper: Paper) -> Plot:
@@ -625,5 +676,10 @@ def _areas(paper: Paper) -> Plot:
                 Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
             ]
         panels.append(Panel(f"Wall on the {side}", series))
-    x, y = Axis("gap, mm"), Axis("safe nodes, %")
-    return Plot("safe-areas", panels=panels, x=x, y=y, note="Safe areas of all spectra.")
+    return Plot(
+        "safe-areas",
+        panels=panels,
+        x=Axis("gap, mm"),
+        y=Axis("safe nodes, %"),
+        note="Safe areas of all spectra.",
+    )

@@ -43,8 +43,6 @@ LEAST_ORDER = 0.5
 #: times in 1/p).
 LARGE = 0.1
 
-Verdict = Literal["converged", "not converged"]
-
 
 class Quantity(Stored):
     """One figure of a run with its numerical uncertainty.
@@ -59,7 +57,7 @@ class Quantity(Stored):
     value: float | str | None
     u_num: float | None = None
     order: float | None = None
-    verdict: Verdict
+    verdict: Literal["converged", "not converged"]
     reason: str = ""
 
 
@@ -108,8 +106,10 @@ def numerical_uncertainty(
     if hasattr(model, "coarser"):
         runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
         return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
-    found = _from_tolerance(scene, given, model.finer().simulate(scene))
-    return Numerical(method="a hundredth of the tolerance", quantities=found)
+    return Numerical(
+        method="a hundredth of the tolerance",
+        quantities=_from_tolerance(scene, given, model.finer().simulate(scene)),
+    )
 
 
 def failed(history: History, reason: str) -> Numerical:
@@ -147,8 +147,11 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
 def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
     """Largest change of each figure's history between two runs; of theta_rms the RMS over time."""
     rows = min(len(one.channels["theta"]), len(other.channels["theta"]))
-    channels = [name for name in ("theta", "slip") if name in one.channels]
-    change = {c: np.abs(other.channels[c][:rows] - one.channels[c][:rows]) for c in channels}
+    change = {
+        name: np.abs(other.channels[name][:rows] - one.channels[name][:rows])
+        for name in ("theta", "slip")
+        if name in one.channels
+    }
     theta = change["theta"] / scene.block.alpha
     return {
         "theta_rms": float(np.sqrt(np.mean(theta**2))),
@@ -195,8 +198,7 @@ def _between_rows(history: History) -> float:
 def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
     """u_num is `SAFETY` times the change: the finer run errs by a few hundredths of the change."""
     if _side(given) != _side(finer):
-        reason = "the outcome changes with the tolerance"
-        return (_quantity("outcome", "", given.outcome, reason=reason),)
+        return failed(given, "the outcome changes with the tolerance").quantities
     rms = _changes(scene, given, finer)["theta_rms"]
     figures = zip(_scalars(scene, given), _scalars(scene, finer), strict=True)
     return (
@@ -213,10 +215,11 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
     if _side(history):
         return [("end_time", "s", float(history.channels["t"][-1]))]
-    found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
-    if "slip" in history.channels:
-        found.append(("last_slip", "m", float(history.channels["slip"][-1])))
-    return found
+    slips = [history.channels["slip"]] if "slip" in history.channels else []
+    return [
+        ("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha),
+        *(("last_slip", "m", float(slip[-1])) for slip in slips),
+    ]
 
 
 def _side(history: History) -> str:
@@ -280,8 +283,9 @@ def explain(
     elif error <= u_val:
         verdict = INPUTS if u_input >= u_data else DATA
     else:
-        least = f"at least {error - u_val:.2g} {unit}".rstrip()
-        verdict = f"not explained: model form or set-up, {least}"
+        verdict = (
+            f"not explained: model form or set-up, at least {error - u_val:.2g} {unit}".rstrip()
+        )
     return Explanation(
         quantity=quantity,
         unit=unit,

@@ -47,8 +47,9 @@ class Runs(Stored):
     @property
     def peaks(self) -> Floats:
         """Peak rotations, alpha: infinite of a block that overturned, NaN where the run failed."""
-        peaks = np.where(self.side, np.inf, self.figures["peak_rotation"])
-        return np.where(self.failed, np.nan, peaks)
+        return np.where(
+            self.failed, np.nan, np.where(self.side, np.inf, self.figures["peak_rotation"])
+        )
 
 
 def play(scenes: Sequence[Scene], player: Any) -> Runs:
@@ -67,8 +68,12 @@ def play(scenes: Sequence[Scene], player: Any) -> Runs:
     else:
         rows = [_one(scene, player) for scene in scenes]
         side, peak, failed = (np.array(column) for column in zip(*rows, strict=True))
-    rotations = (peak / np.array([scene.block.alpha for scene in scenes])).tolist()
-    return Runs(side=side.tolist(), failed=failed.tolist(), figures={"peak_rotation": rotations})
+    rotations = peak / np.array([scene.block.alpha for scene in scenes])
+    return Runs(
+        side=side.tolist(),
+        failed=failed.tolist(),
+        figures={"peak_rotation": rotations.tolist()},
+    )
 
 
 def _batch(scenes: Sequence[Scene], model: EventBasedModel, **how: Any) -> Any:
@@ -82,8 +87,8 @@ def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
         history = decided(scene, player)
     except ModelFailure:
         return SAFE, 0.0, True
-    sides = {"overturned left": LEFT, "overturned right": RIGHT}
-    return sides.get(history.outcome, SAFE), history.peak_rotation, False
+    side = {"overturned left": LEFT, "overturned right": RIGHT}.get(history.outcome, SAFE)
+    return side, history.peak_rotation, False
 
 
 def decided(scene: Scene, player: Any) -> History:
@@ -97,8 +102,9 @@ def decided(scene: Scene, player: Any) -> History:
     needed = scene.gravity * (scene.block.radius - scene.block.weaker_pivot.height)
     for settle in (0.0, SETTLE):  # few rows: only the outcome is needed
         history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
-        names = ("theta", "y", "x_dot", "y_dot", "theta_dot")
-        theta, y, *rates = (history.channels[name][-1] for name in names)
+        theta, y, *rates = (
+            history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot")
+        )
         energy = kinematics.energy(scene.block, scene.gravity, y, theta, *rates)
         weak = energy < ENOUGH * needed and abs(theta) < scene.block.alpha
         if weak or history.outcome.startswith("overturned"):
@@ -157,8 +163,7 @@ def curve_of(
     ]
     known = [one for one in medians if not math.isnan(one)]
     low, high = _ends(known) if known and len(known) >= 0.9 * draws else NO_FIT
-    motions, undecided = len(hit), int(failed.sum())
-    return Curve(label, motions, undecided, median, dispersion, low, high, points)
+    return Curve(label, len(hit), int(failed.sum()), median, dispersion, low, high, points)
 
 
 def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
@@ -203,8 +208,12 @@ def fit_lognormal(
         likelihood = hits * special.log_ndtr(linear) + (runs - hits) * special.log_ndtr(-linear)
         return -float(np.sum(likelihood))
 
-    how = {"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000}
-    level, slope = optimize.minimize(unlikelihood, [0.0, 1.0], method="Nelder-Mead", options=how).x
+    level, slope = optimize.minimize(
+        unlikelihood,
+        [0.0, 1.0],
+        method="Nelder-Mead",
+        options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},
+    ).x
     return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
 
 
@@ -264,8 +273,9 @@ class Inputs(Stored):
         """
         if name == "theta_rms":
             return self.theta_band
-        found = (f for f in self.figures if f.name == name)
-        return next((max(f.high - f.value, f.value - f.low) for f in found), None)
+        return next(
+            (max(f.high - f.value, f.value - f.low) for f in self.figures if f.name == name), None
+        )
 
 
 @dataclass(frozen=True)
@@ -308,34 +318,48 @@ def propagate(
         )
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
-    chance = np.random.default_rng(seed)
-    values = given.values(qmc.Sobol(len(given.spreads), seed=chance).random(count))
+    sobol = qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed))
+    values = given.values(sobol.random(count))
     played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
     own = play_ensemble([given.scene], model)
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
-    one = np.minimum(own.peak / own.alpha, 1.0)
-    figures = [_interval("peak_rotation", "alpha", one, peaks)]
-    if np.any(~fallen) and not own.side[0]:
-        figures.append(_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen]))
     bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
-    found = Inputs(
-        samples=count,
-        model=model.name,
-        names=given.names,
-        figures=tuple(figures),
-        overturns=Interval(
-            name="overturns", unit="1", value=float(np.mean(fallen)), low=share.low, high=share.high
+    return Propagated(
+        Inputs(
+            samples=count,
+            model=model.name,
+            names=given.names,
+            figures=(
+                _interval("peak_rotation", "alpha", np.minimum(own.peak / own.alpha, 1.0), peaks),
+                *(
+                    [_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen])]
+                    if np.any(~fallen) and not own.side[0]
+                    else ()
+                ),
+            ),
+            overturns=Interval(
+                name="overturns",
+                unit="1",
+                value=float(np.mean(fallen)),
+                low=share.low,
+                high=share.high,
+            ),
+            sensitivities=sensitivities(given, model, seed=seed)
+            if indices and given.independent
+            else (),
+            theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
+            note=""
+            if given.independent
+            else "inputs are correlated: Sobol indices, which are for independent ones, are left"
+            " out",
         ),
-        sensitivities=sensitivities(given, model, seed=seed)
-        if indices and given.independent
-        else (),
-        theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
-        note=""
-        if given.independent
-        else "inputs are correlated: Sobol indices, which are for independent ones, are left out",
+        played.t,
+        bands,
+        values,
+        peaks,
+        fallen,
     )
-    return Propagated(found, played.t, bands, values, peaks, fallen)
 
 
 def sensitivities(
@@ -351,8 +375,8 @@ def sensitivities(
     def peak_and_fall(points: Floats) -> Floats:
         scenes = [given.at(row) for row in points.T]
         found = _batch(scenes, model, until_decided=False)
-        peaks = found.peak / np.array([scene.block.alpha for scene in scenes])
-        return np.array([np.minimum(peaks, 1.0), found.side != 0], dtype=float)
+        alphas = np.array([scene.block.alpha for scene in scenes])
+        return np.array([np.minimum(found.peak / alphas, 1.0), found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
     how = {"func": peak_and_fall, "n": samples, "dists": laws}
@@ -364,11 +388,12 @@ def sensitivities(
     first, total = (np.reshape(some, (2, -1))[0] for some in (found.first_order, found.total_order))
     if not np.any(total):
         return ()
-    rows = [
+    return tuple(
         Sensitivity(name=name, first=float(a), total=float(b))
-        for name, a, b in zip(given.names, first, total, strict=True)
-    ]
-    return tuple(sorted(rows, key=lambda row: -row.total))
+        for name, a, b in sorted(
+            zip(given.names, first, total, strict=True), key=lambda row: -row[2]
+        )
+    )
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:

@@ -72,8 +72,10 @@ class Phenomenon:
             return "pass", ""
         digits = 6 if 0.0 < self.limit < 1e-3 else 4
         seen = "never seen" if math.isnan(value) else f"{value:.{digits}g}"
-        right = f"{self.target:g} ± {self.limit:g} {self.unit} is right"
-        return "fail", f"{seen}, {right}. {self.means} Look at: {self.cure}."
+        return "fail", (
+            f"{seen}, {self.target:g} ± {self.limit:g} {self.unit} is right."
+            f" {self.means} Look at: {self.cure}."
+        )
 
 
 def _when(t: FloatArray, values: FloatArray, level: float) -> float:
@@ -248,12 +250,6 @@ def energy_gained(m: Motion) -> float:
     return float(np.max(total - np.minimum.accumulate(total)) / total[0])
 
 
-def restlessness(m: Motion) -> float:
-    """Largest displacement of any corner, mm."""
-    strayed = np.abs(m.x) + np.abs(m.y - SLENDER.half_height) + SLENDER.radius * np.abs(m.theta)
-    return 1e3 * float(np.max(strayed))
-
-
 def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
     """The larger of two errors, both shares.
 
@@ -280,8 +276,12 @@ PUSH_SLIP = newmark_slip(PUSH * PUSHED, PUSH, 0.3 * G)
 
 
 def _pulsed(name: str, block: Block, pulse: Record | Sine, **more: Any) -> Scene:
-    floor = {"floor": Floor(friction=1.333)}
-    return Scene(name=name, block=block, excitation=pulse, **{"duration": 6.0, **floor, **more})
+    return Scene(
+        name=name,
+        block=block,
+        excitation=pulse,
+        **{"floor": Floor(friction=1.333), "duration": 6.0, **more},
+    )
 
 
 def _rectangle(size: float, length: float) -> Record:
@@ -314,8 +314,9 @@ def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Moti
 def _integral(scene: Scene) -> bool:
     """Whether the sine overturns the needle before its first impact."""
     t = np.linspace(0.0, scene.excitation.quiet_after, 20001)
-    ratios = scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
-    return overturns_without_impact(NEEDLE_P * t, ratios)
+    return overturns_without_impact(
+        NEEDLE_P * t, scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
+    )
 
 
 COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
@@ -553,7 +554,15 @@ PHENOMENA: dict[str, Phenomenon] = {
                     output_step=0.05,
                 ),
             ),
-            restlessness,
+            # the largest displacement of any corner
+            lambda m: (
+                1e3
+                * np.max(
+                    np.abs(m.x)
+                    + np.abs(m.y - SLENDER.half_height)
+                    + SLENDER.radius * np.abs(m.theta)
+                )
+            ),
             0.0,
             0.1,
             "mm",

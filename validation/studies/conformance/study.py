@@ -98,8 +98,11 @@ class Player:
 def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
     """An engine, with rockcheck's best settings unless others are named, or a "module:Class"."""
     own = is_own(name)
-    kind = {"settings": settings or "best"} if settings or not own else {}
-    built_by = {"time_step": STEP, **kind, **given}
+    built_by = {
+        "time_step": STEP,
+        **({"settings": settings or "best"} if settings or not own else {}),
+        **given,
+    }
     if not own:
         build(name, built_by)  # an unusable player is refused before anything runs
     more = (
@@ -124,8 +127,10 @@ def written(folder: Path) -> Player:
     about = {"engine": ""} | read_toml(folder / ABOUT)
     for key, value in about.items():
         if not isinstance(value, allowed.get(key, ())) or (key == "engine" and not value):
-            reason = f"{printable(repr(value))} is not allowed; allowed: {', '.join(allowed)}"
-            raise InputError(reason, f"{printable(folder / ABOUT)}: {printable(key)}")
+            raise InputError(
+                f"{printable(repr(value))} is not allowed; allowed: {', '.join(allowed)}",
+                f"{printable(folder / ABOUT)}: {printable(key)}",
+            )
     return Player(
         about["engine"],
         about.get("settings") or AS_IT_COMES,
@@ -163,8 +168,10 @@ class Trial(Task):
     def depends(self) -> Any:
         """Also the model's own code, and the files of histories."""
         who, scenes = self.player, PHENOMENA[self.id].scenes
-        cells = [cell_key(scene, who.model, who.given, who.search) for scene in scenes]
-        return {**super().depends(), "cells": cells}
+        return {
+            **super().depends(),
+            "cells": [cell_key(scene, who.model, who.given, who.search) for scene in scenes],
+        }
 
     def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
@@ -173,8 +180,9 @@ class Trial(Task):
         model: Any = build_own(who.model, who.given)
         version = who.version or str(getattr(model, "version", ""))
         if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
-            reason = f"the engine has no {what.needs} with these settings"
-            return Seen(None, "lacks", reason, version)
+            return Seen(
+                None, "lacks", f"the engine has no {what.needs} with these settings", version
+            )
         histories = [model.simulate(scene) for scene in what.scenes]
         if who.model == "measured":
             for scene, history in zip(what.scenes, histories, strict=True):
@@ -184,10 +192,13 @@ class Trial(Task):
         except (ValueError, IndexError) as error:  # the motion lacks the wanted event
             raise ModelFailure(printable(error, 200)) from None
         told = set(chain.from_iterable(map(scene_notes, what.scenes)))  # of our own scenes
-        said = chain.from_iterable(history.notes for history in histories)
-        notes = dict.fromkeys(note for note in said if note not in told)
         return Seen(
-            value if math.isfinite(value) else None, *what.judge(value), version, tuple(notes)
+            value if math.isfinite(value) else None,
+            *what.judge(value),
+            version,
+            tuple(
+                dict.fromkeys(note for one in histories for note in one.notes if note not in told)
+            ),
         )
 
 
@@ -216,12 +227,11 @@ class Conformance(Study):
         ]
         wrong = [card["counts"]["fail"] + card["counts"]["error"] for card in cards]
         failing = sum(count > 0 for count in wrong)
-        asked = sum(card["counts"]["total"] for card in cards)
         return Finding(
             self.name,
             "Conformance: phenomena with a certain answer",
-            f"{len(cards) - failing} of {len(cards)} cards conform; of {asked} phenomena"
-            f" {sum(wrong)} failed.",
+            f"{len(cards) - failing} of {len(cards)} cards conform; of"
+            f" {sum(card['counts']['total'] for card in cards)} phenomena {sum(wrong)} failed.",
             list(_blocks(cards)),
             {"cards": cards},
             "fail" if failing else "pass",
@@ -295,12 +305,6 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         [*HEAD, *(Column(key, words) for key, (words, *_) in VERDICTS.items()), Column("total")],
         [[*head, *card["counts"].values()] for head, card in zip(about, cards, strict=True)],
     )
-    wrong = [
-        f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
-        for card in cards
-        for row in card["phenomena"]
-        if row["verdict"] == "fail"
-    ]
     of = [
         {
             row["id"]: Mark(
@@ -331,7 +335,15 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         " limit of the target. –: the engine says that it has none.",
         on="page",
     )
-    wrong += [f"{card['title']}: {note}" for card in cards for note in card["notes"]]
+    wrong = [
+        *(
+            f"{card['title']}: {row['id']} {row['name']}: {row['reason']}"
+            for card in cards
+            for row in card["phenomena"]
+            if row["verdict"] == "fail"
+        ),
+        *(f"{card['title']}: {note}" for card in cards for note in card["notes"]),
+    ]
     if wrong:
         yield Text(title="What goes wrong", items=wrong)
     yield Table(
@@ -346,12 +358,16 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
         "The phenomena",
         on="page",
     )
-    rows = [
-        [*head, *row.values()]
-        for head, card in zip(about, cards, strict=True)
-        for row in card["phenomena"]
-    ]
-    yield Table("rows", [*HEAD, *map(Column, ROW)], rows, on="file")
+    yield Table(
+        "rows",
+        [*HEAD, *map(Column, ROW)],
+        [
+            [*head, *row.values()]
+            for head, card in zip(about, cards, strict=True)
+            for row in card["phenomena"]
+        ],
+        on="file",
+    )
 
 
 def junit(cards: Sequence[Card]) -> str:
@@ -397,7 +413,11 @@ def changes(before: Path, after: Path) -> Finding:
             was["verdict"] == "pass" and now["verdict"] in ("fail", "error", "absent"),
         ]
         for key, (was, now) in pairs.items()
-        if _changed(was, now)
+        if was["verdict"] != now["verdict"]
+        or (
+            None not in (was["value"], now["value"], was["limit"])
+            and abs(now["value"] - was["value"]) > SHARE * was["limit"]
+        )
     ]
     worse = sum(row[-1] for row in rows)
     return Finding(
@@ -426,12 +446,6 @@ def changes(before: Path, after: Path) -> Finding:
         verdict="fail" if worse else "changed" if rows else "pass",
         exit_code=int(worse > 0),
     )
-
-
-def _changed(was: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
-    known = None not in (was["value"], now["value"], was["limit"])
-    moved = known and abs(now["value"] - was["value"]) > SHARE * was["limit"]
-    return moved or bool(was["verdict"] != now["verdict"])
 
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
@@ -464,7 +478,6 @@ def export(folder: Path) -> list[str]:
             t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
             velocity = list(map(BaseMotion(scene).velocity, t.tolist()))
             accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
-            rows = np.column_stack([t, velocity, *accelerations]).tolist()
             write_whole(
                 folder / f"{name}-base.csv",
                 table_text(
@@ -475,7 +488,7 @@ def export(folder: Path) -> list[str]:
                         "x_acceleration_m_s2",
                         "y_acceleration_m_s2",
                     ),
-                    rows,
+                    np.column_stack([t, velocity, *accelerations]).tolist(),
                 ),
             )
     scenes: list[dict[str, Any]] = [
@@ -500,12 +513,19 @@ def export(folder: Path) -> list[str]:
     write_whole(
         folder / "scenes.csv", table_text(tuple(scenes[0]), [tuple(row.values()) for row in scenes])
     )
-    played = [
-        f"- {one.id} {one.name}: {', '.join(scene.name for scene in one.scenes)}"
-        for one in PHENOMENA.values()
-    ]
-    about = (TEXTS / "README.md").read_text(encoding="utf-8")
-    write_whole(folder / "README.md", "\n".join([about, *played, ""]))
+    write_whole(
+        folder / "README.md",
+        "\n".join(
+            [
+                (TEXTS / "README.md").read_text(encoding="utf-8"),
+                *(
+                    f"- {one.id} {one.name}: {', '.join(scene.name for scene in one.scenes)}"
+                    for one in PHENOMENA.values()
+                ),
+                "",
+            ]
+        ),
+    )
     if not (folder / ABOUT).exists():
         write_whole(folder / ABOUT, (TEXTS / ABOUT).read_text(encoding="utf-8"))
     return list(SCENES)
@@ -523,20 +543,10 @@ WANTED = {
 }
 
 
-@dataclass(frozen=True)
-class Knob:
-    """The parameter that sets an engine's restitution.
-
-    `bounds` are its limits; `words` are all parameters in the engine's own words, in which
-    `Tune` fills in the numbers.
-    """
-
-    bounds: tuple[float, float]
-    words: Mapping[str, str]
-
-
-KNOBS: dict[str, Knob] = {
-    "mujoco": Knob(
+#: By engine, the limits of the parameter that sets its restitution, and all parameters in the
+#: engine's own words, in which `Tune` fills in the numbers.
+KNOBS: dict[str, tuple[tuple[float, float], Mapping[str, str]]] = {
+    "mujoco": (
         (0.5, 2.2),
         {
             "geom solref": "{push:.6g} {damp:.6g}",
@@ -545,7 +555,7 @@ KNOBS: dict[str, Knob] = {
             "option": 'timestep="{step:g}" integrator="Euler" cone="elliptic"',
         },
     ),
-    "pybullet": Knob(
+    "pybullet": (
         (0.0, 1.2),
         {
             "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they"
@@ -556,7 +566,7 @@ KNOBS: dict[str, Knob] = {
             " bounce), contactERP=0.2",
         },
     ),
-    "pymunk": Knob(
+    "pymunk": (
         (0.0, 1.2),
         {
             "block": "elasticity=1, friction=1 (of two shapes they multiply)",
@@ -564,7 +574,7 @@ KNOBS: dict[str, Knob] = {
             "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
         },
     ),
-    "dart": Knob(
+    "dart": (
         (0.0, 1.0),
         {
             "block": "setRestitutionCoeff(1), setFrictionCoeff({friction:.4g}) (restitutions"
@@ -574,7 +584,7 @@ KNOBS: dict[str, Knob] = {
             " set from Python",
         },
     ),
-    "drake": Knob(
+    "drake": (
         (0.0, 20.0),
         {
             "AddContactMaterial": "dissipation={restitution:.4g} s/m, point_stiffness="
@@ -585,7 +595,7 @@ KNOBS: dict[str, Knob] = {
             " and this mass",
         },
     ),
-    "box2d": Knob(
+    "box2d": (
         (0.0, 1.0),
         {
             "block": "restitution=0, friction={friction:.4g} (of two restitutions the larger"
@@ -595,7 +605,7 @@ KNOBS: dict[str, Knob] = {
             " substeps",
         },
     ),
-    "physx": Knob(
+    "physx": (
         (0.0, 2.0),
         {
             "PhysxMaterial(block)": "{friction:.4g}, {friction:.4g}, 0 (of two materials the mean"
@@ -604,7 +614,7 @@ KNOBS: dict[str, Knob] = {
             "set_scene_config": "bounce_threshold=2 (slower contacts do not bounce)",
         },
     ),
-    "jolt": Knob(
+    "jolt": (
         (0.0, 1.2),
         {
             "create_body(block)": "friction={friction:.4g}, restitution=0 (of two restitutions the"
@@ -660,8 +670,10 @@ class Tune(Task):
         for name, (least, most) in WANTED.items():
             value = getattr(self, name)
             if not isinstance(value, int | float) or not least <= value <= most:
-                reason = f"{printable(value)} is not allowed: give {least:g} to {most:g}"
-                raise InputError(reason, "--tune" if name == "restitution" else f"--set {name}")
+                raise InputError(
+                    f"{printable(value)} is not allowed: give {least:g} to {most:g}",
+                    "--tune" if name == "restitution" else f"--set {name}",
+                )
 
     def depends(self) -> Any:
         """Also the engine's code."""
@@ -676,7 +688,7 @@ class Tune(Task):
         """
         from scipy.optimize import brentq
 
-        knob, step, friction = KNOBS[self.engine], self.time_step, self.friction
+        (bounds, words), step, friction = KNOBS[self.engine], self.time_step, self.friction
         model: Any = build(self.engine, {"time_step": step, "settings": "default"})
         drop = Scene(
             name="drop",
@@ -700,7 +712,7 @@ class Tune(Task):
             later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
             return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
 
-        restitution, ends = self.restitution, [dropped(end)[0] for end in knob.bounds]
+        restitution, ends = self.restitution, [dropped(end)[0] for end in bounds]
         if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
             raise InputError(
                 f"{restitution:g} cannot be reached by {self.engine} at a step of {step:g} s:"
@@ -708,18 +720,13 @@ class Tune(Task):
                 "--tune",
             )
         near = [
-            one
-            for one, end in zip(knob.bounds, ends, strict=True)
-            if abs(end - restitution) <= NEAR
+            one for one, end in zip(bounds, ends, strict=True) if abs(end - restitution) <= NEAR
         ]
         found = (
             near[0]
             if near
             else brentq(
-                lambda setting: dropped(setting)[0] - restitution,
-                *knob.bounds,
-                xtol=1e-5,
-                rtol=1e-5,
+                lambda setting: dropped(setting)[0] - restitution, *bounds, xtol=1e-5, rtol=1e-5
             )
         )
         asked = friction
@@ -732,13 +739,17 @@ class Tune(Task):
         rebound, deep = dropped(found)
         used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
         used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
-        words = {where: what.format_map(used) for where, what in knob.words.items()}
-        reached = (
-            abs(rebound - restitution) <= 5.0 * NEAR
+        return Calibration(
+            self.engine,
+            step,
+            {where: what.format_map(used) for where, what in words.items()},
+            rebound,
+            slid,
+            max(deep, 0.0),
+            reached=abs(rebound - restitution) <= 5.0 * NEAR
             and abs(slid - friction) <= 5.0 * NEAR * friction
-            and deep <= self.penetration
+            and deep <= self.penetration,
         )
-        return Calibration(self.engine, step, words, rebound, slid, max(deep, 0.0), reached)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from rockcheck.scenes.experience import WIDTH, outside, trust_of
 from rockcheck.scenes.writing import finite
-from rockcheck.validation.criteria import CRITERIA, Criterion
+from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
@@ -39,7 +39,7 @@ from rockcheck.validation.studies.population.runs import (
     Sure,
 )
 from rockcheck.validation.uncertainty.numerical import Numerical
-from rockcheck.validation.uncertainty.population import Inputs, share_of
+from rockcheck.validation.uncertainty.population import share_of
 
 #: Name of the error of a step or tolerance, among the sources of uncertainty.
 STEPS = "numerical error"
@@ -82,8 +82,8 @@ class Found:
 
     `drawn` has the draws of each case with all of them; `at_gaps` the runs at each gap
     (m) and `free` those without the wall that have a motion; `others` the runs by other models;
-    `sure` how sure a run is, "" the scene's own; `levels` the answer and blocks over intensities;
-    `failed` whether any task did.
+    `sure` how sure a run is, and `own`, by "", the scene under its own motion; `levels`
+    the answer and blocks over intensities; `failed` whether any task did.
     """
 
     study: Asked
@@ -93,6 +93,7 @@ class Found:
     free: Sequence[Ran]
     others: Mapping[str, Mapping[str, Ran]]
     sure: Mapping[str, Sure]
+    own: Sure
     levels: tuple[str, Sequence[Block]]
     failed: bool
 
@@ -110,15 +111,12 @@ class Found:
     @property
     def failures(self) -> dict[str, str]:
         """Why a run as it is failed, by case, and by the other model."""
-        runs = {case: one.runs[0] for case, one in self.shown.items()}
-        for model, others in self.others.items():
-            runs |= {f"{case}, {model}": run for case, run in others.items()}
+        runs = {case: one.runs[0] for case, one in self.shown.items()} | {
+            f"{case}, {model}": run
+            for model, others in self.others.items()
+            for case, run in others.items()
+        }
         return {where: run.reason for where, run in runs.items() if run.reason}
-
-    @property
-    def own(self) -> Sure:
-        """How sure the scene under its own motion is."""
-        return self.sure.get("", Sure())
 
     @cached_property
     def nominal(self) -> dict[str, Ran]:
@@ -164,13 +162,23 @@ def finding_of(found: Found) -> Finding:
     study, own, scene = found.study, found.own, found.study.own.scene
     at_levels, levels = found.levels
     overturning, gaps = overturning_of(found.runs), gaps_of(found)
-    contributions, criteria = contributions_of(found), criteria_of(found)
-    quantities = quantities_of(found)
+    contributions, criteria = contributions_of(found), [*criteria_of(found)]
+    outcomes = {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES}
+    # by name, the spread of each of the four figures, and the case of the largest
+    quantities = {
+        q.name: {
+            "unit": q.unit,
+            **spread([value for value, _ in found.moved[q.name]]),
+            "record": max(found.moved[q.name], key=operator.itemgetter(0), default=(0.0, None))[1],
+            "of": len(found.moved[q.name]),
+        }
+        for q in QUANTITIES
+    }
     numerical = numerical_of(found)
     answers = {
         "Does it fall?": [_fall(found, overturning)],
         "How far does it move?": _move(quantities),
-        "Which gap is safe?": _safe_gap(gaps),
+        "Which gap is safe?": [*_safe_gap(gaps)],
         "At which intensity does it fall?": [at_levels],
         "How sure is that?": [*_sure(found, numerical), *_change(found, contributions)],
         "What do hand methods say?": _by_hand(criteria),
@@ -181,7 +189,26 @@ def finding_of(found: Found) -> Finding:
             [text("question"), text("answer")],
             [[one, " ".join(said) or ASKS.get(one, "")] for one, said in answers.items()],
         ),
-        _outcomes(found, overturning),
+        Table(
+            "outcomes",
+            [
+                text("outcome"),
+                Column("runs"),
+                *(
+                    Column(name, label, kind="percent", digits=4)
+                    for name, label in zip(
+                        INTERVAL, ("probability", "95 % from", "to"), strict=True
+                    )
+                ),
+            ],
+            [
+                *([name, count, None, None, None] for name, count in outcomes.items() if count),
+                ["overturned", *overturning.values()],
+            ],
+            "What happens",
+            note="The interval is Wilson's; draws of one record count as one record.",
+            on="all" if len(found.each) > 1 else "file",
+        ),
         _quantities(quantities, found),
         _criteria(criteria),
         *_strips(found),
@@ -190,7 +217,6 @@ def finding_of(found: Found) -> Finding:
         _contributions(contributions, found),
         *_models(found),
         *_certainty(own, numerical),
-        *(_inputs(own.inputs) if own.inputs else ()),
         Table(
             "methods",
             [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
@@ -208,7 +234,7 @@ def finding_of(found: Found) -> Finding:
         "model": study.model,
         **(study.levels.data if study.levels else {}),
         "runs": len(found.each),
-        "outcomes": {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES},
+        "outcomes": outcomes,
         "overturning": overturning,
         "quantities": quantities,
         "motion": quantities,
@@ -220,14 +246,14 @@ def finding_of(found: Found) -> Finding:
     }
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own.inputs else None}
-    unsure = "" in found.sure and not (study.recorded or numerical["converged"] or study.levels)
+    sure = study.recorded or numerical["converged"] or study.levels
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
         " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
-        exit_code=3 if found.failed or found.failures else int(unsure),
+        exit_code=3 if found.failed or found.failures else int("" in found.sure and not sure),
         failures=found.failures,
         files={file_of(case): one.history for case, one in found.shown.items() if one.history},
     )
@@ -238,22 +264,8 @@ def overturning_of(runs: Mapping[str, Sequence[Ran]]) -> dict[str, Any]:
     some = [each for each in runs.values() if each]
     hits = np.array([[sum(run.fell for run in each)] for each in some]).reshape(-1, 1)
     decided = np.array([[len(each)] for each in some]).reshape(-1, 1)
-    ends = np.ravel(share_of(hits, decided) if some else [math.nan] * 3)
-    shares = [None if math.isnan(end) else end for end in np.clip(ends, 0.0, 1.0).tolist()]
-    return {"count": int(hits.sum()), **dict(zip(INTERVAL, shares, strict=True))}
-
-
-def quantities_of(found: Found) -> dict[str, dict[str, Any]]:
-    """By name, the spread of each of the four figures, and the case of the largest."""
-    return {
-        q.name: {
-            "unit": q.unit,
-            **spread([value for value, _ in found.moved[q.name]]),
-            "record": max(found.moved[q.name], key=operator.itemgetter(0), default=(0.0, None))[1],
-            "of": len(found.moved[q.name]),
-        }
-        for q in QUANTITIES
-    }
+    ends = np.clip(np.ravel(share_of(hits, decided) if some else [math.nan] * 3), 0.0, 1.0)
+    return {"count": int(hits.sum()), **dict(zip(INTERVAL, finite(ends.tolist()), strict=True))}
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
@@ -318,8 +330,9 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
 
 def _by_steps(found: Found) -> list[float]:
     """Variances of the peak by the step or tolerance; a block that falls has the peak 1."""
-    recorded = found.study.recorded
-    fallen = {case if recorded else "" for case, run in found.nominal.items() if run.fell}
+    fallen = {
+        case if found.study.recorded else "" for case, run in found.nominal.items() if run.fell
+    }
     errors = [
         0.0 if case in fallen and numerical.converged else numerical.u_num("peak_rotation")
         for case, numerical in found.judged.items()
@@ -359,37 +372,28 @@ EVENTS = {
 }
 
 
-def criteria_of(found: Found) -> list[dict[str, Any]]:
+def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
     """What hand methods said of the cases against what the simulation did."""
     cases = [(run, said) for case, run in found.nominal.items() if (said := found.shown[case].said)]
-    return [
-        _judged(one, [(*said[k], getattr(run, EVENTS[one.event][0])) for run, said in cases])
-        for k, one in enumerate(CRITERIA)
-    ]
-
-
-def _judged(criterion: Criterion, runs: Sequence[tuple[bool, float | None, float]]) -> Any:
-    """A hand method against some runs: what it says, its estimate, and how far the run went."""
-    _, unit, least = EVENTS[criterion.event]
-    pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
-    unsafe = sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
-    return {
-        **{key: getattr(criterion, key) for key in METHOD},
-        "predicts": sum(says for says, *_ in runs),
-        "of": len(runs),
-        "simulated": sum(far > least for *_, far in runs),
-        "agrees": sum(says == (far > least) for says, _, far in runs),
-        "estimate": _median([estimate for estimate, _ in pairs]),
-        "motion": _median([far for _, far in pairs]),
-        "unit": unit,
-        "unsafe": unsafe if pairs else None,
-    }
-
-
-def _median(values: Sequence[float]) -> float | None:
-    """The lower median; None where there is none, or it is infinite."""
-    middle = median_low(values) if values else math.inf
-    return middle if math.isfinite(middle) else None
+    for k, one in enumerate(CRITERIA):
+        figure, unit, least = EVENTS[one.event]
+        # whether it happens by the method, the method's estimate, and how far the run went
+        runs = [(*said[k], getattr(run, figure)) for run, said in cases]
+        pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
+        yield {
+            **{key: getattr(one, key) for key in METHOD},
+            "predicts": sum(says for says, *_ in runs),
+            "of": len(runs),
+            "simulated": sum(far > least for *_, far in runs),
+            "agrees": sum(says == (far > least) for says, _, far in runs),
+            # the lower medians; None where they are infinite
+            "estimate": finite(median_low(estimate for estimate, _ in pairs)) if pairs else None,
+            "motion": finite(median_low(far for _, far in pairs)) if pairs else None,
+            "unit": unit,
+            "unsafe": sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
+            if pairs
+            else None,
+        }
 
 
 # The sentences.
@@ -421,23 +425,6 @@ def _move(quantities: Mapping[str, Any]) -> list[str]:
     return [f"Where it stands, at most: {', '.join(told)}."] if told else []
 
 
-def _safe_gap(gaps: Mapping[str, Any]) -> list[str]:
-    said, safe = [], gaps["none_overturns_up_to"]
-    if gaps["gaps"]:
-        said.append(
-            f"None overturns up to a gap of {safe:g} m."
-            if safe is not None
-            else f"Some overturn already at the smallest gap, {gaps['gaps'][0]['gap']:g} m."
-        )
-    if not gaps["monotonic"]:
-        said.append("A larger gap is not always worse: see each.")
-    if gaps["clearance"] is not None:
-        fallen = gaps["free_overturned"]
-        falls = f"; {fallen} run{'s overturn' if fallen > 1 else ' overturns'}" if fallen else ""
-        said.append(f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}.")
-    return said
-
-
 def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
     said = [
         f"{row['name']} in {row['predicts']} of {row['of']}"
@@ -447,18 +434,36 @@ def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"Hand methods let it overturn: {', '.join(said)}."] if said else []
 
 
+def _safe_gap(gaps: Mapping[str, Any]) -> Iterator[str]:
+    safe, fallen = gaps["none_overturns_up_to"], gaps["free_overturned"]
+    if gaps["gaps"]:
+        yield (
+            f"None overturns up to a gap of {safe:g} m."
+            if safe is not None
+            else f"Some overturn already at the smallest gap, {gaps['gaps'][0]['gap']:g} m."
+        )
+    if not gaps["monotonic"]:
+        yield "A larger gap is not always worse: see each."
+    if gaps["clearance"] is not None:
+        falls = f"; {fallen} run{'s overturn' if fallen > 1 else ' overturns'}" if fallen else ""
+        yield f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}."
+
+
 def _sure(found: Found, numerical: Mapping[str, Any]) -> list[str]:
     if found.study.recorded:
         judged = [one.converged for one in found.judged.values()]
         laws = sum(
             one.depends_on_law_from_s is not None for case, one in found.sure.items() if case
         )
-        said = [f"{sum(judged)} of {len(judged)} runs are numerically converged."]
-        return said + ([f"The law of impacts matters in {laws}."] if laws else [])
+        said = f"{sum(judged)} of {len(judged)} runs are numerically converged."
+        return [said, f"The law of impacts matters in {laws}."] if laws else [said]
     if found.own.numerical is None:
         return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
-    converged = numerical["converged"]
-    return ["Numerically converged." if converged else "Not converged: no figure of it is sure."]
+    return [
+        "Numerically converged."
+        if numerical["converged"]
+        else "Not converged: no figure of it is sure."
+    ]
 
 
 def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -468,8 +473,7 @@ def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[st
         return []
     inputs = found.own.inputs
     most = inputs.sensitivities[0].name if inputs and inputs.sensitivities else _leading(found)
-    *_, changes = CONTRIBUTIONS[contributions[0]["source"]]
-    said = changes.format(most)
+    said = CONTRIBUTIONS[contributions[0]["source"]][-1].format(most)
     return [f"{said[0].upper()}{said[1:]} would change the answer most."]
 
 
@@ -489,26 +493,6 @@ def _leading(found: Found) -> str:
 # The blocks.
 
 
-def _outcomes(found: Found, overturning: Mapping[str, Any]) -> Table:
-    runs = [run.outcome for _, run in found.each]
-    rows: list[list[Any]] = [[name, runs.count(name), None, None, None] for name in OUTCOMES]
-    return Table(
-        "outcomes",
-        [
-            text("outcome"),
-            Column("runs"),
-            *(
-                Column(name, label, kind="percent", digits=4)
-                for name, label in zip(INTERVAL, ("probability", "95 % from", "to"), strict=True)
-            ),
-        ],
-        [*(row for row in rows if row[1]), ["overturned", *overturning.values()]],
-        "What happens",
-        note="The interval is Wilson's; draws of one record count as one record.",
-        on="all" if len(runs) > 1 else "file",
-    )
-
-
 def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
     several = len(found.shown) > 1 or bool(found.drawn)
     columns = [
@@ -523,22 +507,26 @@ def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
         Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
     ]
     shown = [q for q in QUANTITIES if quantities[q.name]["of"]]
-    units = {q.name: {"unit": UNITS.get(q.unit, q.unit)} for q in shown}
     rows = [
-        [q.label, *((quantities[q.name] | units[q.name])[c.name] for c in columns[1:])]
+        [
+            q.label,
+            *(
+                UNITS.get(q.unit, q.unit) if c.name == "unit" else quantities[q.name][c.name]
+                for c in columns[1:]
+            ),
+        ]
         for q in shown
     ]
-    meant = (f"{q.label}: {q.help}" for q in shown)
     return Table(
         "quantities",
         columns,
         rows,
-        note=f"{'; '.join(meant)}.",
+        note="; ".join(f"{q.label}: {q.help}" for q in shown) + ".",
         on="all" if rows else "file",
     )
 
 
-def _strips(found: Found) -> list[Block]:
+def _strips(found: Found) -> Iterator[Block]:
     strips = [
         {
             "label": f"{q.label}, {UNITS.get(q.unit, q.unit)}",
@@ -547,35 +535,43 @@ def _strips(found: Found) -> list[Block]:
         for q in QUANTITIES
         if len(found.moved[q.name]) > 1
     ]
-    plot = Plot(
-        "motion",
-        "How far each run moves",
-        kind="strips",
-        data=strips,
-        note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
-    )
-    return [plot] if strips else []
+    if strips:
+        yield Plot(
+            "motion",
+            "How far each run moves",
+            kind="strips",
+            data=strips,
+            note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
+        )
 
 
-def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
-    if not gaps:
-        return []
+def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
     rows = [row | row["wall_speed"] for row in gaps]
     across = [row["gap"] for row in rows]
-    shares = [
-        Series(name, across, [row[name] / row["runs"] for row in rows])
-        for name in ("struck", "overturned")
-    ]
-    speeds = [Series(name, across, [row[name] for row in rows]) for name in ("median", "largest")]
-    return [
-        Plot(
+    if gaps:
+        yield Plot(
             "gaps",
             "Which gap is safe",
-            panels=[Panel("share of the runs", shares), Panel("speed at the wall, m/s", speeds)],
+            panels=[
+                Panel(
+                    "share of the runs",
+                    [
+                        Series(name, across, [row[name] / row["runs"] for row in rows])
+                        for name in ("struck", "overturned")
+                    ],
+                ),
+                Panel(
+                    "speed at the wall, m/s",
+                    [
+                        Series(name, across, [row[name] for row in rows])
+                        for name in ("median", "largest")
+                    ],
+                ),
+            ],
             x=Axis("clear gap, m"),
             shared=False,
-        ),
-        Table(
+        )
+        yield Table(
             "gaps",
             [
                 Column("gap", "clear gap", "m"),
@@ -595,8 +591,7 @@ def _gaps(gaps: Sequence[Mapping[str, Any]]) -> list[Block]:
                 for row in rows
             ],
             note="Runs that strike the wall, also those that then overturn.",
-        ),
-    ]
+        )
 
 
 def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
@@ -623,7 +618,7 @@ def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> 
     )
 
 
-def _models(found: Found) -> list[Block]:
+def _models(found: Found) -> Iterator[Block]:
     """How far the other models are from the first, and what the suites know of them."""
     rows = []
     for model, apart in found.apart.items():
@@ -639,23 +634,23 @@ def _models(found: Found) -> list[Block]:
                 trust and trust.scatter,
             ]
         )
-    table = Table(
-        "models",
-        [
-            text("model", "compared with the first model"),
-            Column("runs"),
-            Column("overturned"),
-            Column("rms", "RMS difference", "α"),
-            Column("largest", "largest", "α"),
-            Column("bias", "bias in the suites", optional=True),
-            Column("scatter", "σ in the suites", kind="percent", digits=3, optional=True),
-        ],
-        rows,
-        "Other models",
-        f"Differences in peak rotation from {found.study.model}.",
-        folded=True,
-    )
-    return [table] if rows else []
+    if rows:
+        yield Table(
+            "models",
+            [
+                text("model", "compared with the first model"),
+                Column("runs"),
+                Column("overturned"),
+                Column("rms", "RMS difference", "α"),
+                Column("largest", "largest", "α"),
+                Column("bias", "bias in the suites", optional=True),
+                Column("scatter", "σ in the suites", kind="percent", digits=3, optional=True),
+            ],
+            rows,
+            "Other models",
+            f"Differences in peak rotation from {found.study.model}.",
+            folded=True,
+        )
 
 
 def _criteria(criteria: Sequence[Mapping[str, Any]]) -> Table:
@@ -691,7 +686,6 @@ def _criteria(criteria: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _runs(found: Found) -> Table:
-    """Each case with its four figures."""
     return Table(
         "runs",
         [
@@ -736,13 +730,8 @@ def _certainty(own: Sure, numerical: Mapping[str, Any]) -> Iterator[Block]:
             f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)",
             verdict="changed",
         )
-
-
-def _inputs(inputs: Inputs) -> list[Block]:
-    """Tables of the figures with their input intervals, and of the sensitivities of the peak."""
-    shares = [[s.name, max(s.first, 0.0), max(s.total, 0.0)] for s in inputs.sensitivities]
-    return [
-        Table(
+    if inputs := own.inputs:
+        yield Table(
             "inputs",
             [
                 text("figure"),
@@ -756,23 +745,21 @@ def _inputs(inputs: Inputs) -> list[Block]:
             "Uncertain inputs",
             note=f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model};"
             " 95 % of them between low and high.",
-        ),
-        Table(
+        )
+        yield Table(
             "sensitivities",
             [
                 text("input", "what matters most for the peak"),
                 Column("alone", kind="percent", digits=2),
                 Column("with_others", kind="percent", digits=2),
             ],
-            shares,
-            on="all" if shares else "file",
-        ),
-        Text(inputs.note),
-    ]
+            [[one.name, max(one.first, 0.0), max(one.total, 0.0)] for one in inputs.sensitivities],
+            on="all" if inputs.sensitivities else "file",
+        )
+        yield Text(inputs.note)
 
 
 def _histories(found: Found) -> list[Block]:
-    """The rotations of all cases over time."""
     rows = {
         case: np.genfromtxt(io.StringIO(one.history), delimiter=",", names=True)
         for case, one in found.shown.items()
@@ -792,17 +779,23 @@ def _histories(found: Found) -> list[Block]:
             for case, one in rows.items()
         ]
     )
-    series = [
-        Series(case, times.tolist(), line, style="thin" if len(rows) > 1 else "smooth")
-        for case, line in zip(rows, finite(lines.tolist()), strict=True)
-    ]
     low, high = float(np.nanmin(lines)), float(np.nanmax(lines))
     beyond = max(0.05 * (high - low), 0.5e-3)  # noise is not blown up
     return [
         Plot(
             "histories",
             "Histories",
-            panels=[Panel("", series)],
+            panels=[
+                Panel(
+                    "",
+                    [
+                        Series(
+                            case, times.tolist(), line, style="thin" if len(rows) > 1 else "smooth"
+                        )
+                        for case, line in zip(rows, finite(lines.tolist()), strict=True)
+                    ],
+                )
+            ],
             x=Axis("time, s"),
             y=Axis("θ/α", limits=(low - beyond, high + beyond)),
             note="Rotation over the slenderness angle, positive to the left; a line a run.",
@@ -817,24 +810,29 @@ def file_of(case: str) -> str:
 
 
 def _notes(found: Found) -> list[Block]:
-    """What else a reader should know."""
     study, drawn = found.study, found.drawn
     beyond: dict[str, list[str]] = {}
     for case, one in study.cases.items():
         for line in outside(one.scene):
             beyond.setdefault(line, []).append(case)
-    said = [
-        f"outside of what the suites cover: {line}"
-        + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
-        for line, cases in beyond.items()
-    ]
-    if drawn and (without := [case for case in study.cases if case not in drawn]):
-        said.append(f"left out, since not all of its draws were played: {', '.join(without)}")
-    if study.model != study.swift and (found.at_gaps or drawn):
-        said.append(f"gaps and draws are played by {study.swift}")
+    without = ", ".join(case for case in study.cases if drawn and case not in drawn)
+    others = found.at_gaps or drawn
     names = ", ".join(next(iter(study.cases.values())).names)
-    if names and not drawn and study.recorded:
-        said.append(f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them")
+    told = {
+        f"left out, since not all of its draws were played: {without}": without,
+        f"gaps and draws are played by {study.swift}": study.model != study.swift and others,
+        f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them": names
+        and not drawn
+        and study.recorded,
+    }
+    said = [
+        *(
+            f"outside of what the suites cover: {line}"
+            + (f" ({', '.join(cases)})" if len(cases) < len(study.cases) else "")
+            for line, cases in beyond.items()
+        ),
+        *(line for line, holds in told.items() if holds),
+    ]
     return [Text(items=said, title="Notes", on="page")] if said else []
 
 
@@ -845,7 +843,13 @@ class Assessment(Asked):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The answers to the engineer's questions."""
         ended = {task: one for task, one in done.items() if not isinstance(one, Failure)}
-        first = {part: _first(tasks, ended) for part, tasks in self.parts.items()}
+        # by part and case, the record of the first of its tasks
+        first = {
+            part: {
+                case: ended[some[0]] for case, some in tasks.items() if some and some[0] in ended
+            }
+            for part, tasks in self.parts.items()
+        }
         drawn = {case: _runs_of(tasks, ended) for case, tasks in self.parts["drawn"].items()}
         count = len(self.draws)
         at_gaps = {
@@ -867,15 +871,11 @@ class Assessment(Asked):
                     if first.get(model)
                 },
                 sure=first["sure"],
+                own=first["sure"].get("", Sure()),
                 levels=self.levels.gather(ended) if self.levels else ("", ()),
                 failed=len(ended) < len(done),
             )
         )
-
-
-def _first(tasks: Mapping[str, Sequence[Any]], ended: Mapping[Any, Any]) -> dict[str, Any]:
-    """The record of the first of each list of tasks that has ended."""
-    return {key: ended[some[0]] for key, some in tasks.items() if some and some[0] in ended}
 
 
 def _runs_of(tasks: Sequence[Any], ended: Mapping[Any, Any]) -> list[Ran]:

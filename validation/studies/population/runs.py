@@ -117,8 +117,11 @@ class Run(OneScene):
             every = -(-len(history.channels["t"]) // MOST_ROWS)
             columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
             rows = columns_text(columns)
-        said = tuple(criterion.says(self.scene, base) for criterion in CRITERIA)
-        return Played(runs=runs, history=rows, said=said)
+        return Played(
+            runs=runs,
+            history=rows,
+            said=tuple(criterion.says(self.scene, base) for criterion in CRITERIA),
+        )
 
 
 def changed(scene: Scene, numbers: Numbers) -> Scene:
@@ -133,13 +136,12 @@ def _ran(scene: Scene, model: Any) -> tuple[Ran, History | None]:
         history = model.simulate(scene)
     except ModelFailure as failure:
         return Ran(outcome="", reason=str(failure)), None
-    ran = Ran(
+    return Ran(
         outcome=history.outcome,
         motion=motion_of(history, scene),
         slid=largest_slip(history),
         reach={side: largest_reach(history, scene, side) for side in get_args(Side)},
-    )
-    return ran, history
+    ), history
 
 
 @dataclass(frozen=True)
@@ -153,8 +155,11 @@ class Certainty(OneScene):
         """Also what is not known of the scene, where it is drawn."""
         if self.given is None:
             return super().depends()
-        spreads = {name: spread.model_dump() for name, spread in self.given.spreads.items()}
-        return super().depends(), spreads, self.given.correlation.tolist()
+        return (
+            super().depends(),
+            {name: spread.model_dump() for name, spread in self.given.spreads.items()},
+            self.given.correlation.tolist(),
+        )
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
@@ -211,9 +216,8 @@ class Asked(Study):
             return ()
         from scipy.stats import qmc
 
-        chance = np.random.default_rng(_SEED)
-        points = qmc.Sobol(len(first.spreads), seed=chance).random(self.samples)
-        for row in (values := first.values(points)):
+        sobol = qmc.Sobol(len(first.spreads), seed=np.random.default_rng(_SEED))
+        for row in (values := first.values(sobol.random(self.samples))):
             first.at(row)  # names a draw that is no scene
         return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())
 
@@ -261,8 +265,9 @@ class Asked(Study):
         for gap in (*self.gaps, np.inf) if self.sides else ():
             walls = {f"walls.{side}.gap": gap for side in self.sides}
             variants = [tuple({**dict(one), **walls}.items()) for one in self.draws or ((),)]
-            what = "without the wall" if gap == np.inf else f"gap {gap:g} m"
-            found[gap] = self._runs(what, self.swift, variants)
+            found[gap] = self._runs(
+                "without the wall" if gap == np.inf else f"gap {gap:g} m", self.swift, variants
+            )
         return found
 
     @cached_property
@@ -272,39 +277,39 @@ class Asked(Study):
         "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
         among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
         """
-        others = {model: self._runs("", model) for model in self.models[1:]}
-        if self.model == SWIFT and self.own.scene.walls:
-            others[LAW] = self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)
+        walled = self.model == SWIFT and self.own.scene.walls
+        law = {LAW: self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)} if walled else {}
         settings = self.settings.get(self.model, {})
-        own = {"": self.own, **(self.cases if self.recorded else {})}
         drawn = bool(self.samples) and not self.recorded
-        sure: dict[str, list[Task]] = {
-            case: [
-                Certainty(
-                    ("certainty", case or given.scene.name),
-                    given.scene,
-                    self.model,
-                    tuple(settings.items()),
-                    self.samples if drawn else 0,
-                    given if drawn else None,
-                    where=self._where,
-                    **effort(self.model, settings, 4),
-                )
-            ]
-            for case, given in own.items()
-        }
         return {
             "shown": self._runs("", self.model),
             "drawn": self._runs("draws", self.swift, self.draws),
             **self.at_gaps,
-            **others,
-            "sure": sure,
+            **{model: self._runs("", model) for model in self.models[1:]},
+            **law,
+            "sure": {
+                case: [
+                    Certainty(
+                        ("certainty", case or given.scene.name),
+                        given.scene,
+                        self.model,
+                        tuple(settings.items()),
+                        self.samples if drawn else 0,
+                        given if drawn else None,
+                        where=self._where,
+                        **effort(self.model, settings, 4),
+                    )
+                ]
+                for case, given in {"": self.own, **(self.cases if self.recorded else {})}.items()
+            },
         }
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """All of them at once."""
-        own = [task for part in self.parts.values() for some in part.values() for task in some]
-        return [*own, *(self.levels.batches if self.levels else ())]
+        return [
+            *(task for part in self.parts.values() for some in part.values() for task in some),
+            *(self.levels.batches if self.levels else ()),
+        ]
 
 
 def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:

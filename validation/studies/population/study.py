@@ -16,8 +16,7 @@ import numpy as np
 from rockcheck.scenes import InputError, Record, Scene
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.excitations import Excitation
-from rockcheck.scenes.recordings import Recording, intensity
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, compiles, family
 from rockcheck.validation.finding import (
@@ -70,16 +69,19 @@ class OneScene(Task):
 
     def depends(self) -> Any:
         """The scene with its motion, the model, what else is asked for, and the code."""
-        cell = provenance.cell_key(self.scene, self.model, dict(self.settings))
-        code = provenance.code_digest(type(self).__module__)
-        asked = [one for one in self.fields() if one not in OneScene.__dataclass_fields__]
-        return cell, [getattr(self, one) for one in asked], code
+        return (
+            provenance.cell_key(self.scene, self.model, dict(self.settings)),
+            [v for k, v in self.fields().items() if k not in OneScene.__dataclass_fields__],
+            provenance.code_digest(type(self).__module__),
+        )
 
 
 def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
     """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
-    a_run = A_RUN if family(model).compiled else A_SLOW_RUN
-    return {"expected": runs * a_run, "compiles": compiles(model, settings)}
+    return {
+        "expected": runs * (A_RUN if family(model).compiled else A_SLOW_RUN),
+        "compiles": compiles(model, settings),
+    }
 
 
 @dataclass(frozen=True)
@@ -95,14 +97,16 @@ class Batch(OneScene):
     def play(self) -> Runs:
         """The runs."""
         across, upward = self.scene.excitation, self.scene.vertical
-        scenes = [
-            self.scene.replace(
-                excitation=across.scaled(factor),
-                vertical=upward.scaled(abs(factor)) if self.both else upward,
-            )
-            for factor in self.factors
-        ]
-        return play(scenes, build(self.model, dict(self.settings)))
+        return play(
+            [
+                self.scene.replace(
+                    excitation=across.scaled(factor),
+                    vertical=upward.scaled(abs(factor)) if self.both else upward,
+                )
+                for factor in self.factors
+            ],
+            build(self.model, dict(self.settings)),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,26 +166,23 @@ class Population:
             for case, some in peaks.items()
             for event, limit in self.limits.items()
         ]
-        blocks: list[Block] = []
-        if "" in peaks:
-            blocks += lines_of([one.label for one in played], peaks[""], self.levels, self.across)
-        if curves:
-            blocks += blocks_of(curves, self.across, self.other)
-        unit = self.across.unit
+        names, unit = [one.label for one in played], self.across.unit
         medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
-        motions = Table(
-            "motions",
-            [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
-            [[name, own] for name, _, own in self.motions],
-            "Motions",
-            on="page",
-            folded=True,
-        )
-        answer = (
+        return (
             f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
             f" Median {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}."
-        )
-        return answer, [*blocks, motions]
+        ), [
+            *(lines_of(names, peaks[""], self.levels, self.across) if "" in peaks else ()),
+            *(blocks_of(curves, self.across, self.other) if curves else ()),
+            Table(
+                "motions",
+                [text("motion"), Column("own", f"{self.across.label} as it is", unit)],
+                [[name, own] for name, _, own in self.motions],
+                "Motions",
+                on="page",
+                folded=True,
+            ),
+        ]
 
 
 def blocks_of(
@@ -200,12 +201,7 @@ def blocks_of(
         Column("motions", brief=False),
         Column("undecided", "undecided runs", brief=False),
     ]
-    rows = [
-        [getattr(one, "label" if c.name == "case" else c.name) for c in columns] for one in curves
-    ]
-    if other:
-        columns.append(Column(f"median_{other['other_unit']}", "median", other["other_unit"]))
-        rows = [[*row, other["per_unit"] * row[1]] for row in rows]
+    unit = [other["other_unit"]] if other else []
     series = []
     for one in curves:
         level, share, low, high, fit = zip(*one.points, strict=True)
@@ -213,7 +209,6 @@ def blocks_of(
             Series(one.label, level, share, low, high, style="smooth"),
             Series(one.label, level, fit, style="dots"),
         ]
-    names = ("intensity", "share", "band_low", "band_high", "lognormal_fit")
     return [
         Plot(
             "fragility",
@@ -228,13 +223,22 @@ def blocks_of(
         ),
         Table(
             "fits",
-            columns,
-            rows,
+            [*columns, *(Column(f"median_{one}", "median", one) for one in unit)],
+            [
+                [
+                    *(getattr(one, "label" if c.name == "case" else c.name) for c in columns),
+                    *([other["per_unit"] * one.median] if other else ()),
+                ]
+                for one in curves
+            ],
             note="Lognormal fits; the interval of the median is from drawing the motions anew.",
         ),
         Table(
             "fragility",
-            [text("case"), *map(Column, names)],
+            [
+                text("case"),
+                *map(Column, ("intensity", "share", "band_low", "band_high", "lognormal_fit")),
+            ],
             [[one.label, *point] for one in curves for point in one.points],
             on="file",
         ),
@@ -250,28 +254,33 @@ def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Colu
     x, signs = levels.tolist(), (1, -1)
     quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
     known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
-    names = ("direction", "intensity", "peak_rotation_alpha", "overturned")
     lines = [
         (name, sign, line)
         for name, both in zip(motions, known.tolist(), strict=True)
         for sign, line in zip(signs, both, strict=True)
-    ]
-    series = [
-        *(
-            Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
-            for name, sign, line in lines
-        ),
-        *(
-            Series(f"{100.0 * share:g} %", x, line, style=style)
-            for (share, style), line in zip(BAND.items(), quantiles.tolist(), strict=True)
-        ),
     ]
     fell = iter(np.isinf(peaks).ravel().tolist())
     return [
         Plot(
             "lines",
             f"Peak rotation against {across.label}",
-            panels=[Panel("", series)],
+            panels=[
+                Panel(
+                    "",
+                    [
+                        *(
+                            Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
+                            for name, sign, line in lines
+                        ),
+                        *(
+                            Series(f"{100.0 * share:g} %", x, line, style=style)
+                            for (share, style), line in zip(
+                                BAND.items(), quantiles.tolist(), strict=True
+                            )
+                        ),
+                    ],
+                )
+            ],
             x=Axis(across.head),
             y=Axis("peak |θ|/α", limits=(0.0, FALLEN)),
             note="A grey line a motion; it ends where the block falls. Coloured: the peak that 16,"
@@ -280,7 +289,10 @@ def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Colu
         ),
         Table(
             "ida",
-            [text("record"), *map(Column, names)],
+            [
+                text("record"),
+                *map(Column, ("direction", "intensity", "peak_rotation_alpha", "overturned")),
+            ],
             [
                 [name, sign, level, peak, int(next(fell))]
                 for name, sign, line in lines

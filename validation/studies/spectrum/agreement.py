@@ -46,8 +46,10 @@ def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.i
     """
     from scipy import ndimage
 
-    filters = ndimage.maximum_filter, ndimage.minimum_filter
-    most, least = (one(spectrum.outcomes, 2 * NEAR + 1, mode="nearest") for one in filters)
+    most, least = (
+        filtered(spectrum.outcomes, 2 * NEAR + 1, mode="nearest")
+        for filtered in (ndimage.maximum_filter, ndimage.minimum_filter)
+    )
     near: NDArray[np.bool_] = most != least
     random = np.random.default_rng(zlib.crc32(name.encode()))
     decided = np.ones(near.shape, dtype=bool)
@@ -67,8 +69,9 @@ def plays(request: Request, panel: Panel) -> bool:
     """
     model = build(request.model, request.settings)
     lacks = model.lacks() if isinstance(model, Engine) else ()
-    struck = [panel.scene.floor.restitution, *(wall.restitution for wall in panel.scene.walls)]
-    return "restitution" not in lacks or not any(struck)
+    return "restitution" not in lacks or not any(
+        [panel.scene.floor.restitution, *(wall.restitution for wall in panel.scene.walls)]
+    )
 
 
 def agree(
@@ -100,16 +103,14 @@ def agree(
     if book.wanted:
         return None
     fewer = [one.model for one in others if one.model in PLAYED_SHARE]
-    about = (
-        f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
+    return {
+        "about": f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
         f" {request.size} nodes. Half of them are at most {NEAR} nodes from a boundary (near), the"
         " others further away. Models are held against the paper's bilateral event-based model and"
         " against the unilateral one, which lets the block hop as the other models do. Runs of the"
         " other models end with the pulse where the block then lacks the energy to tip over,"
         f" otherwise {SETTLE:g} s later. A block that then stands counts as safe."
-    )
-    return {
-        "about": about + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
+        + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
         "date": datetime.now(UTC).date().isoformat(),
         "versions": provenance.versions(),
         "settings": {model: dict(one.settings) for model, one in requests.items()},
@@ -128,9 +129,11 @@ def _shares(
     for one in others:
         # at least two, one on each side
         number = max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count))
-        halves = number // 2, number - number // 2
-        if number >= sum(map(len, chosen)):
-            halves = len(chosen[0]), len(chosen[1])
+        halves = (
+            [number // 2, number - number // 2]
+            if number < sum(map(len, chosen))
+            else [*map(len, chosen)]
+        )
         i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
         how = panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
         if not plays(one, panel) or (found := book.outcomes(*how)) is None:
@@ -189,20 +192,26 @@ def _maps(
 
 def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:
     """The agreement as text, tables and maps; `came`: whether it came with the package."""
-    origin = f"Computed on {found['date']}"
-    if came:
-        origin = (
-            f"Not computed in this run: it came with the package, from a run on {found['date']} by"
-            f" rockcheck {found['versions'].get('rockcheck', '')}. --agreement 200 computes it anew"
-        )
+    origin = (
+        f"Not computed in this run: it came with the package, from a run on {found['date']} by"
+        f" rockcheck {found['versions'].get('rockcheck', '')}. --agreement 200 computes it anew"
+        if came
+        else f"Computed on {found['date']}"
+    )
     settings = "; ".join(
         f"{model} {', '.join(f'{key} {value}' for key, value in chosen.items()) or 'as it comes'}"
         for model, chosen in found["settings"].items()
     )
-    engines = {"mujoco", "pybullet", "pymunk", "dartpy", "drake"} & found["versions"].keys()
-    versions = ", ".join(f"{name} {found['versions'][name]}" for name in sorted(engines))
-    about = f"{found['about']} {origin}. Settings: {settings}. {versions}."
-    yield Text(about, "The same spectra by the other models", on="page")
+    versions = ", ".join(
+        f"{name} {found['versions'][name]}"
+        for name in ("dartpy", "drake", "mujoco", "pybullet", "pymunk")
+        if name in found["versions"]
+    )
+    yield Text(
+        f"{found['about']} {origin}. Settings: {settings}. {versions}.",
+        "The same spectra by the other models",
+        on="page",
+    )
     model = Column("model", kind="model")
     yield _table("agreement", found["shares"], [model])
     yield _table(
@@ -214,7 +223,36 @@ def blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Bl
         folded=True,
     )
     if found["maps"]:
-        yield _drawn(found, panels)
+        equal = ", ".join(
+            f"{one['model']} {one['equal']} of {one['nodes']}"
+            for one in found["maps"]
+            if one["model"] != "ebm-unilateral"
+        )
+        size = len(found["map_frequencies"])
+        yield Plot(
+            "models",
+            f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
+            kind="spectra",
+            note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
+            f" {equal}.",
+            data={
+                "frequencies": found["map_frequencies"],
+                "amplitudes": found["map_amplitudes"],
+                "record": False,
+                "panels": [
+                    {
+                        "title": panel.title.replace(", ", "\n") if row == 0 else "",
+                        "free": panel.wall is None,
+                        "outcomes": "".join(one["outcomes"][panel.name]),
+                        "place": [row, 1, column],
+                        "row": one["model"],
+                    }
+                    for row, one in enumerate(found["maps"])
+                    for column, panel in enumerate(panels)
+                ],
+                "height": 0.4 + 0.92 * len(found["maps"]),
+            },
+        )
 
 
 def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
@@ -227,52 +265,22 @@ def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) 
     groups: dict[tuple[str, ...], list[Any]] = {}
     for one in shares:
         groups.setdefault(tuple(one[column.name] for column in by), []).append(one)
-    rows = [
+    return Table(
+        name,
+        [*by, *columns, Column("nodes"), Column("failed")],
         [
-            *at,
-            *(_equal(some, near, one) for one in REFERENCES for near in (True, False)),
-            *(sum(one[count] for one in some) for count in ("nodes", "failed")),
-        ]
-        for at, some in groups.items()
-    ]
-    return Table(name, [*by, *columns, Column("nodes"), Column("failed")], rows, **more)
+            [
+                *at,
+                *(_equal(some, near, one) for one in REFERENCES for near in (True, False)),
+                *(sum(one[count] for one in some) for count in ("nodes", "failed")),
+            ]
+            for at, some in groups.items()
+        ],
+        **more,
+    )
 
 
 def _equal(shares: Sequence[Any], near: bool, reference: str) -> float | None:
     mine = [share for share in shares if share["near"] == near and reference in share["equal"]]
     nodes = sum(share["nodes"] for share in mine)
     return sum(share["equal"][reference] for share in mine) / nodes if nodes else None
-
-
-def _drawn(found: Agreement, panels: Sequence[Panel]) -> Plot:
-    equal = ", ".join(
-        f"{one['model']} {one['equal']} of {one['nodes']}"
-        for one in found["maps"]
-        if one["model"] != "ebm-unilateral"
-    )
-    shown = [
-        {
-            "title": panel.title.replace(", ", "\n") if row == 0 else "",
-            "free": panel.wall is None,
-            "outcomes": "".join(one["outcomes"][panel.name]),
-            "place": [row, 1, column],
-            "row": one["model"],
-        }
-        for row, one in enumerate(found["maps"])
-        for column, panel in enumerate(panels)
-    ]
-    size = len(found["map_frequencies"])
-    return Plot(
-        "models",
-        f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
-        kind="spectra",
-        note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
-        f" {equal}.",
-        data={
-            "frequencies": found["map_frequencies"],
-            "amplitudes": found["map_amplitudes"],
-            "record": False,
-            "panels": shown,
-            "height": 0.4 + 0.92 * len(found["maps"]),
-        },
-    )

@@ -28,7 +28,6 @@ from rockcheck.validation.paper import (
     title_of,
 )
 from rockcheck.validation.studies.spectrum import agreement, tiles
-from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing
 from rockcheck.validation.study import Study
 from rockcheck.validation.uncertainty.population import compiled
 
@@ -69,7 +68,7 @@ class Spectra(Study):
     """
 
     panels: tuple[Panel, ...]
-    request: Request = field(default_factory=Request)
+    request: tiles.Request = field(default_factory=tiles.Request)
     compared: int = 0
     name = "spectrum"
     record = tiles.Played
@@ -81,18 +80,20 @@ class Spectra(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
         """The nodes that are still to be played."""
-        book = Book(done)
+        book = tiles.Book(done)
         self._found(book)
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The complete spectra, and the findings from them."""
-        found = self._found(Book(done))
+        found = self._found(tiles.Book(done))
         panels, spectra = list(found.spectra), list(found.spectra.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
-        answer = f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
-        if len(self.panels) == len(spectra) == 1:
-            answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
+        answer = (
+            f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
+            if len(self.panels) == len(spectra) == 1
+            else f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
+        )
         laws = any(one.depends_on_law is not None for one in spectra)
         blocks: list[Block] = [
             Text(ABOUT, on="page"),
@@ -112,8 +113,7 @@ class Spectra(Study):
         if self._papers and not self.compared:
             compared, panels = read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
-            mapped = agreement.mapped(panels)
-            blocks += agreement.blocks(compared, mapped, came=not self.compared)
+            blocks += agreement.blocks(compared, agreement.mapped(panels), came=not self.compared)
         return Finding(
             self.name,
             "Overturning spectra" if len(self.panels) > 1 else self.panels[0].title,
@@ -134,15 +134,16 @@ class Spectra(Study):
 
     @property
     def _papers(self) -> bool:
-        names = {panel.name for panel in self.panels}
-        return self.request.model == "ebm" and names >= {panel.name for panel in paper_panels()}
+        return self.request.model == "ebm" and (
+            {panel.name for panel in self.panels} >= {panel.name for panel in paper_panels()}
+        )
 
     def _stem(self, panel: Panel) -> str:
         """The name of a spectrum's files: the panel's, and the model's unless it is the paper's."""
         model = self.request.model
         return panel.name if model == "ebm" else f"{panel.name}--{model}"
 
-    def _found(self, book: Book) -> _Found:
+    def _found(self, book: tiles.Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
         found, fast = _Found(), compiled(build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
@@ -160,7 +161,7 @@ class Spectra(Study):
             found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
         return found
 
-    def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
+    def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
         one = book.spectrum(panel, self.request)
         laws = [
@@ -169,18 +170,23 @@ class Spectra(Study):
         known = [law for law in laws if law is not None]
         if one is None or not laws or len(known) < len(laws):
             return one
-        return replace(one, depends_on_law=differing(one, known))
+        return replace(one, depends_on_law=tiles.differing(one, known))
 
     def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
-        request = self.request
-        nodes = request.amplitudes[i], request.frequencies[j]
-        return tiles.nodes_of(scene, *nodes, request.model, request.settings, what)
+        one = self.request
+        return tiles.nodes_of(
+            scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings, what
+        )
 
-    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
-        scan = measures.SCANNED, np.full(len(measures.SCANNED), measures.SCANNED_AT)
-        how = self.request.model, self.request.settings
+    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
         scanned: dict[Any, Any] = {
-            measures.SCANNED_WALLS[one.scene.name]: book.outcomes(one.scene, *scan, *how)
+            measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
+                one.scene,
+                measures.SCANNED,
+                np.full(len(measures.SCANNED), measures.SCANNED_AT),
+                self.request.model,
+                self.request.settings,
+            )
             for one in spectra
             if one.scene.name in measures.SCANNED_WALLS
         }
@@ -190,61 +196,66 @@ class Spectra(Study):
         ]
         if book.wanted:
             return None
-        least = {
-            wall: float(measures.SCANNED[sides != SAFE].min(initial=np.inf))
-            for wall, (sides, _) in scanned.items()
-        }
         tongues = {}
         for (one, i, j), some in zip(struck, records, strict=True):
             mask = np.zeros(one.outcomes.shape, dtype=bool)
             mask[i, j] = [letter == "Y" for record in some for letter in record.letters]
             tongues[one.scene.floor.friction] = mask
-        return measures.Paper(spectra, least, tongues)
+        return measures.Paper(
+            spectra,
+            {
+                wall: float(measures.SCANNED[sides != SAFE].min(initial=np.inf))
+                for wall, (sides, _) in scanned.items()
+            },
+            tongues,
+        )
 
     def _shares(self, spectra: Mapping[Panel, Spectrum], laws: bool) -> Table:
-        columns = [
-            text("spectrum"),
-            text("title", brief=False),
-            Column("figure", brief=False),
-            Column("safe", kind="percent", digits=4),
-            Column("left", kind="percent", digits=4, help="overturned counterclockwise"),
-            Column("right", kind="percent", digits=4, help="overturned clockwise"),
-            Column("undecided"),
-            *([Column("depends_on_law")] if laws else []),
-            Column("runs"),
-            text("csv", brief=False),
-            text("npz", brief=False),
-        ]
-        rows = [
+        return Table(
+            "spectra",
             [
-                panel.name,
-                panel.title,
-                panel.figure,
-                one.safe_area,
-                *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
-                len(one.undecided),
-                *(
-                    [None if one.depends_on_law is None else len(one.depends_on_law)]
-                    if laws
-                    else []
-                ),
-                one.evaluations,
-                *(Mark(k.upper(), link=f"{self._stem(panel)}.{k}") for k in ("csv", "npz")),
-            ]
-            for panel, one in spectra.items()
-        ]
-        return Table("spectra", columns, rows, "Shares of outcomes")
+                text("spectrum"),
+                text("title", brief=False),
+                Column("figure", brief=False),
+                Column("safe", kind="percent", digits=4),
+                Column("left", kind="percent", digits=4, help="overturned counterclockwise"),
+                Column("right", kind="percent", digits=4, help="overturned clockwise"),
+                Column("undecided"),
+                *([Column("depends_on_law")] if laws else []),
+                Column("runs"),
+                text("csv", brief=False),
+                text("npz", brief=False),
+            ],
+            [
+                [
+                    panel.name,
+                    panel.title,
+                    panel.figure,
+                    one.safe_area,
+                    *(float(np.mean(one.outcomes == side)) for side in (LEFT, RIGHT)),
+                    len(one.undecided),
+                    *(
+                        [None if one.depends_on_law is None else len(one.depends_on_law)]
+                        if laws
+                        else []
+                    ),
+                    one.evaluations,
+                    *(Mark(k.upper(), link=f"{self._stem(panel)}.{k}") for k in ("csv", "npz")),
+                ]
+                for panel, one in spectra.items()
+            ],
+            "Shares of outcomes",
+        )
 
     def _figures(self, found: _Found) -> Iterator[Plot]:
         request = self.request
-        by = "" if request.model == "ebm" else f", by {request.model}"
         for number in dict.fromkeys(panel.figure for panel in found.spectra):
             mine = [panel for panel in found.spectra if panel.figure == number]
             first = mine[0]
-            name = f"figure-{number}" if number else first.name
             yield Plot(
-                self._stem(first).replace(first.name, name),
-                (title_of(number) if number else first.title) + by,
+                self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
+                (title_of(number) if number else first.title)
+                + ("" if request.model == "ebm" else f", by {request.model}"),
                 kind="spectra",
                 live=True,
                 note=f"{request.size} x {request.size} nodes, {request.model}"
@@ -257,7 +268,16 @@ class Spectra(Study):
                     "panels": [self._panel(panel, found.spectra[panel], found) for panel in mine],
                     "height": 4.0,
                 },
-                played=[self._played(panel, found) for panel in mine],
+                played=[
+                    {
+                        "block": [panel.scene.block.half_width, panel.scene.block.half_height],
+                        "alpha": panel.scene.block.alpha,
+                        "walls": [{"side": w.side, "gap": w.gap} for w in panel.scene.walls],
+                        "ends": found.motions[panel].ends,
+                        "rows": found.motions[panel].rows,
+                    }
+                    for panel in mine
+                ],
             )
 
     def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
@@ -277,31 +297,19 @@ class Spectra(Study):
             ],
         }
 
-    def _played(self, panel: Panel, found: _Found) -> dict[str, Any]:
-        """The motions of a panel's nodes, for the page."""
-        block, motions = panel.scene.block, found.motions[panel]
-        return {
-            "block": [block.half_width, block.half_height],
-            "alpha": block.alpha,
-            "walls": [{"side": one.side, "gap": one.gap} for one in panel.scene.walls],
-            "ends": motions.ends,
-            "rows": motions.rows,
-        }
-
     def _about(self, panel: Panel, one: Spectrum) -> str:
         """The settings of a spectrum's files, as JSON.
 
         A record's samples are left out: its name identifies it.
         """
-        scene = panel.scene.model_dump(mode="json")
-        for part in ("excitation", "vertical"):
-            scene[part].pop("unscaled", None)
         return json.dumps(
             {
                 "name": self._stem(panel),
                 "title": panel.title,
                 "figure": panel.figure,
-                "scene": scene,
+                "scene": panel.scene.model_dump(
+                    mode="json", exclude={"excitation": {"unscaled"}, "vertical": {"unscaled"}}
+                ),
                 "model": self.request.model,
                 "settings": dict(self.request.settings),
                 "refined": self.request.refine,
@@ -312,11 +320,10 @@ class Spectra(Study):
 
 
 def _spread(size: int) -> NDArray[np.int64]:
-    spread = np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))
-    return np.unique(np.round(spread).astype(np.int64))
+    return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
 
 
-def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
+def _pulse(panel: Panel, request: tiles.Request) -> dict[str, Any] | None:
     """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record.
 
     `own` has the frequency and amplitude ratio of the user's own pulse; None for the paper's.
@@ -327,11 +334,15 @@ def _pulse(panel: Panel, request: Request) -> dict[str, Any] | None:
     f, a = request.frequencies, request.amplitudes
     amplitudes = [node_pulse(panel.scene, one, f[0])[0] for one in a]
     periods = [node_pulse(panel.scene, a[0], one)[1] for one in f]
-    own = float(f[0]) * periods[0] / pulse.period, float(a[0]) * pulse.amplitude / amplitudes[0]
     return {
         "amplitude": amplitudes,
         "period": periods,
-        "own": [*own] if panel.figure is None else None,
+        "own": [
+            float(f[0]) * periods[0] / pulse.period,
+            float(a[0]) * pulse.amplitude / amplitudes[0],
+        ]
+        if panel.figure is None
+        else None,
     }
 
 
@@ -355,7 +366,9 @@ def _csv(spectrum: Spectrum, about: str) -> bytes:
 
     -1 overturned left, 0 safe, 1 overturned right.
     """
-    columns = ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())]
     rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
-    table = table_text(columns, ([amplitude, *row] for amplitude, row in rows))
+    table = table_text(
+        ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())],
+        ([amplitude, *row] for amplitude, row in rows),
+    )
     return f"# rockcheck spectrum {about}\n{table}".encode()

@@ -30,7 +30,6 @@ from rockcheck.validation.execute.pool import Failure, cores
 from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
 from rockcheck.validation.study import Task
 from rockcheck.validation.uncertainty import population
-from rockcheck.validation.uncertainty.population import compiled
 
 What = Literal["outcomes", "motions", "one impact"]
 #: Nodes of a tile of the compiled event-based models, and of a model that is simulated one by one.
@@ -73,8 +72,10 @@ class Nodes(Task):
     @property
     def label(self) -> str:
         """The scene, and the first of its nodes."""
-        first = f"{self.frequencies[0]:.4g}, {self.amplitudes[0]:.4g}"
-        return f"{self.scene.name} by {self.model}, {self.what} from {first}"
+        return (
+            f"{self.scene.name} by {self.model}, {self.what} from"
+            f" {self.frequencies[0]:.4g}, {self.amplitudes[0]:.4g}"
+        )
 
     def depends(self) -> str:
         """Its hash."""
@@ -82,21 +83,24 @@ class Nodes(Task):
 
     def scenes(self) -> list[Scene]:
         """The scene of each node."""
-        nodes = zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
-        return [node_scene(self.scene, *node) for node in nodes]
+        return [
+            node_scene(self.scene, *node)
+            for node in zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
+        ]
 
     def play(self) -> Played:
         """Outcomes or motions of the nodes, or whether they overturn after one impact."""
         player: Any = build(self.model, self.settings)
         where = self.scene, self.amplitudes, self.frequencies
         if self.what == "motions":
-            motions = play_motions(*where, model=player, parts=PARTS, jobs=cores())
-            return _motions(motions)
+            return _motions(play_motions(*where, model=player, parts=PARTS, jobs=cores()))
         if self.what == "one impact":
-            scenes = (one.replace(output_step=one.duration) for one in self.scenes())
-            kinds = [[event.kind for event in player.simulate(one).event_list] for one in scenes]
+            kinds = [
+                [event.kind for event in player.simulate(one).event_list]
+                for one in (each.replace(output_step=each.duration) for each in self.scenes())
+            ]
             return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
-        if compiled(player):
+        if population.compiled(player):
             sides, failed = play_nodes(*where, model=player, jobs=cores())
         else:
             runs = population.play(self.scenes(), player)
@@ -113,11 +117,10 @@ def nodes_of(
     what: What = "outcomes",
 ) -> list[Nodes]:
     """The tasks that play nodes (1-D arrays of one length) of a spectrum, in order."""
-    fast = compiled(build(model, settings))
+    fast = population.compiled(build(model, settings))
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
     how = provenance.code_digest(__name__) if fast else f"{population.SETTLE} {population.ENOUGH}"
     base = provenance.cell_key(neutral, model, settings) + what + how
-    where: Literal["here", "worker"] = "here" if fast else "worker"
     size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
     one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
     found = []
@@ -125,9 +128,18 @@ def nodes_of(
         a, f = (
             np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)
         )
-        key = provenance.digest(base + a.tobytes().hex() + f.tobytes().hex())
         found.append(
-            Nodes(key, what, scene, a, f, model, settings, expected=one * len(a), where=where)
+            Nodes(
+                provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
+                what,
+                scene,
+                a,
+                f,
+                model,
+                settings,
+                expected=one * len(a),
+                where="here" if fast else "worker",
+            )
         )
     return found
 
@@ -149,8 +161,12 @@ def _motions(found: Sequence[Motion | None]) -> Played:
         values = rows[:, 1:] / np.repeat(size, np.diff(ends, prepend=0), axis=0)
         chosen = enough(rows[:, 0], values, ends, COARSE)
         kept, content = np.cumsum(chosen)[ends - 1], rows[chosen].astype("<f4").tobytes()
-    played = tuple(number for number, motion in enumerate(found) if motion is not None)
-    return Played("", played, tuple(kept.tolist()), base64.b64encode(content).decode("ascii"))
+    return Played(
+        "",
+        tuple(number for number, motion in enumerate(found) if motion is not None),
+        tuple(kept.tolist()),
+        base64.b64encode(content).decode("ascii"),
+    )
 
 
 def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) -> NDArray[np.bool_]:
@@ -219,8 +235,10 @@ class Request:
         settings = {**SETTINGS.get(self.model, {}), **self.settings}
         object.__setattr__(self, "settings", settings)
         build(self.model, settings)
-        ranges = {"frequencies": self.frequency_range, "amplitudes": self.amplitude_range}
-        for name, (low, high) in ranges.items():
+        for name, (low, high) in (
+            ("frequencies", self.frequency_range),
+            ("amplitudes", self.amplitude_range),
+        ):
             said = f"{low:g} to {high:g} is not allowed"
             if not (0.0 < low < math.inf and math.isfinite(high)):
                 raise InputError(f"{said}: give positive finite numbers", f"--{name}")
@@ -233,9 +251,14 @@ class Request:
         player = build(self.model, self.settings)
         if not isinstance(player, EventBasedModel):
             return []
-        bounces = any(wall.restitution > 0.0 for wall in scene.walls)
-        laws = other_laws(player, walls=bounces, flat=may_fly(scene))
-        return [{**self.settings, "impacts": law} for law in laws]
+        return [
+            {**self.settings, "impacts": law}
+            for law in other_laws(
+                player,
+                walls=any(wall.restitution > 0.0 for wall in scene.walls),
+                flat=may_fly(scene),
+            )
+        ]
 
 
 class _Waiting(Exception):
@@ -269,8 +292,9 @@ class Book:
         if found is None:
             return None
         letters = np.array([*"".join(one.letters for one in found)])
-        sides = [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)]
-        return np.select(sides, [LEFT, RIGHT], SAFE).astype(np.int8), letters == UNDECIDED
+        return np.select(
+            [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)], [LEFT, RIGHT], SAFE
+        ).astype(np.int8), letters == UNDECIDED
 
     def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
         """A spectrum; None where nodes are still to be played.
@@ -284,9 +308,14 @@ class Book:
                 raise _Waiting
             return found
 
-        axes = request.frequencies, request.amplitudes
         try:
-            return overturning_spectrum(panel.scene, *axes, refine=request.refine, play=known)
+            return overturning_spectrum(
+                panel.scene,
+                request.frequencies,
+                request.amplitudes,
+                refine=request.refine,
+                play=known,
+            )
         except _Waiting:
             return None
 

@@ -84,9 +84,11 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     ]
     own_period = 2.0 * math.pi / block.weaker_pivot.frequency_parameter(gravity)
     excitation = _excitation(r, gravity * min(block.slope, max(mu, 0.05)), own_period)
-    vertical: Excitation = Rest()
-    if r.random() < 0.3:
-        vertical = _excitation(r, gravity * (0.3 if r.random() < 0.5 else 0.03), own_period)
+    vertical = (
+        _excitation(r, gravity * (0.3 if r.random() < 0.5 else 0.03), own_period)
+        if r.random() < 0.3
+        else Rest()
+    )
     lasts = max(excitation.quiet_after, vertical.quiet_after) + unit * float(r.uniform(1.0, 20.0))
     duration = min(lasts, unit * LONGEST * float(r.uniform(0.1, 1.0)) ** 2 + unit)
     balance = block.pivot("left").alpha, -block.pivot("right").alpha
@@ -313,9 +315,11 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
             0.5 * gravity,
         ),
     )
-    vertical: Excitation = Rest()
-    if r.random() < 0.3:
-        vertical = _exact_excitation(r, (0.0, gravity, gravity, 0.5 * gravity, 2.0 * gravity))
+    vertical = (
+        _exact_excitation(r, (0.0, gravity, gravity, 0.5 * gravity, 2.0 * gravity))
+        if r.random() < 0.3
+        else Rest()
+    )
     walls = _exact_walls(r, block)
     unit = math.sqrt(block.radius / gravity)
     duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * unit, 2)

@@ -160,7 +160,7 @@ def check_run(
     figures |= {"outcome": float(_contradicts(played, history)), **conditions(model, motion)}
     if audit:  # at the finer tolerance, whose error does not disturb the balance
         with suppress(ModelFailure):
-            energy = _energy(finer(model), played)
+            energy = _energy(model.finer(), played)
             figures |= {"energy": energy} if energy is not None else {}
         with suppress(ModelFailure):
             figures["clearance"] = float(_wrong_clearance(model, played, seed))
@@ -172,7 +172,7 @@ def check_run(
     later = {
         "mirror": lambda: _mirror(model, motion),
         "similarity": lambda: horizon.apart(similar(played, seed)),
-        "tolerance": lambda: horizon.apart(played, finer(model)),
+        "tolerance": lambda: horizon.apart(played, model.finer()),
     }
     figures |= {name: figure() for name, figure in later.items() if only in ("", name)}
     return CheckedRun(
@@ -213,15 +213,14 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     room = float(np.max(np.abs(np.diff(gaps)))) + 2.0 * SETTLE * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
         return False
-    struck = [
+    return [
         "lands along a wall" in one.cost.rules
         or any(event.kind == "wall impact" for event in one.event_list)
         for one in (
             model.simulate(scene.replace(walls=(Wall(side=side, gap=gap),)))
             for gap in (reach + room, reach - room)
         )
-    ]
-    return struck != [False, True]
+    ] != [False, True]
 
 
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:
@@ -238,20 +237,17 @@ def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     return error
 
 
-def finer(model: EventBasedModel, times: float = 100.0) -> EventBasedModel:
-    """The same model at a tolerance that is finer by the factor `times`."""
-    return model.model_copy(update={"tolerance": model.tolerance / times})
-
-
 def audited(scene: Scene) -> Scene:
     """The scene with rows so dense that integrals over them are exact to 1e-10.
 
     It is cut after `MOST_ROWS` rows.
     """
-    unit = math.sqrt(scene.block.radius / scene.gravity)
     bases = scene.excitation, scene.vertical
     step = min(
-        [0.03 * unit, *(one.period / FINE for one in bases if isinstance(one, Ricker | Sine))]
+        [
+            0.03 * math.sqrt(scene.block.radius / scene.gravity),
+            *(one.period / FINE for one in bases if isinstance(one, Ricker | Sine)),
+        ]
     )
     if records := [one.time_step for one in bases if isinstance(one, Record)]:
         step = records[0] / (GROUP * max(1, math.ceil(records[0] / (GROUP * step))))
@@ -283,13 +279,15 @@ def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
         return found
     drift = 1e-6 * np.abs(motion.channels["x_dot"]) * motion.unit / motion.radius
     speed = np.abs(motion.slip) / (1.0 + drift + np.abs(motion.w))
-    found["stick"] = _largest(speed, motion.within("rest", "rock", "lean"))
     friction, push = _force_conditions(model, motion)
-    return found | {"coulomb": friction, "push": push}
+    return found | {
+        "stick": _largest(speed, motion.within("rest", "rock", "lean")),
+        "coulomb": friction,
+        "push": push,
+    }
 
 
 def _largest(values: Floats, rows: Mask) -> float:
-    """The largest of these rows, at least 0."""
     return float(np.max(values[rows], initial=0.0))
 
 
@@ -303,8 +301,10 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
     """Largest friction beyond the cone, and largest tension, relative to 1 + |u| + |vg| + w^2."""
     scene, t, theta = motion.scene, motion.channels["t"], motion.channels["theta"]
     bases = [one for one in (scene.excitation, scene.vertical) if one.kind != "rest"]
-    breaks = [event.t for event in motion.history.event_list]
-    breaks += [time for one in bases for time in (0.0, one.quiet_after)]
+    breaks = [
+        *(event.t for event in motion.history.event_list),
+        *(time for one in bases for time in (0.0, one.quiet_after)),
+    ]
     near = NEAR * motion.unit + 1e-12 * np.abs(t)
     clear = _free(breaks, t - near, t + near)
     u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
@@ -317,10 +317,14 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
     rest = clear & motion.within("rest") & ~(motion.tip | motion.far)
     excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)
     tension = _largest(-g / scale, clear & motion.within("rest", "slide") & unilateral)
-    tilted = clear & motion.within("rock", "slide-rock", "lean", "ladder") & (theta != 0.0)
-    tilted &= ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
     slides = motion.within("slide-rock", "ladder")
-    tilted &= ~(slides & (np.abs(motion.slip) < SLIPS))
+    tilted = (
+        clear
+        & motion.within("rock", "slide-rock", "lean", "ladder")
+        & (theta != 0.0)
+        & ~(motion.within("lean", "ladder") & (motion.tip == motion.far))
+        & ~(slides & (np.abs(motion.slip) < SLIPS))
+    )
     direction = np.where(slides, np.sign(motion.sign * motion.slip), 0.0)
     beyond, pulls = [], []
     # What happens within NEAR is one event, in the core and here: a spinning block passes through
@@ -353,11 +357,10 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     whole, quiet = _whole_groups(scene, motion.history)
     step = scene.output_step / motion.unit
     work, moved = integrals(step, power), integrals(step, np.abs(power))
-    rough = integrals(step, power, BOOLE)
     before, after = energy[:-1:GROUP][: len(work)], energy[GROUP::GROUP][: len(work)]
     size = 1.0 + np.maximum(after, moved)
     off = (after - before - work) / size
-    doubt = np.where(whole, np.abs(work - rough) / size, 0.0)
+    doubt = np.where(whole, np.abs(work - integrals(step, power, BOOLE)) / size, 0.0)
     # Checked in the groups before and after, too: the difference of the two rules says nothing
     # where it changes its sign.
     beside = np.append(doubt[1:], 0.0), np.append(0.0, doubt[:-1])
@@ -384,8 +387,10 @@ def energy_without_source(motion: Motion) -> float:
     """
     scene, energy = motion.scene, motion.energy
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
-    bases = scene.excitation, scene.vertical
-    for excitation, velocity in zip(bases, (motion.across, motion.up), strict=True):
+    for excitation, velocity in (
+        (scene.excitation, motion.across),
+        (scene.vertical, motion.up),
+    ):
         impulse = -np.diff(_base_velocity(excitation, motion.channels["t"]))
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
@@ -434,9 +439,11 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
 
     # An event at an edge itself: the row there is from before or after it. The base acceleration
     # jumps where a record ends.
-    whole = _free([*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near)
-    jumps = [one.quiet_after for one in records]
-    whole &= _free([*events, *jumps], edges[:-1] - 1e3 * near, edges[1:] + 1e3 * near)
+    whole = _free([*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near) & _free(
+        [*events, *(one.quiet_after for one in records)],
+        edges[:-1] - 1e3 * near,
+        edges[1:] + 1e3 * near,
+    )
     nodes = mode[np.arange(groups)[:, None] * GROUP + np.arange(GROUP + 1)]
     return whole, np.all(nodes == nodes[:, :1], axis=1)
 
@@ -454,13 +461,17 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
     ours, theirs = ((len(one.channels["t"]), len(one.event_list)) for one in (history, image))
     if ours != theirs:
         return math.inf
-    mirrored = {name: image.channels[name] for name in ("t", "y", "y_dot", "mode")}
     odd = ("x", "theta", "x_dot", "theta_dot", "slip", "slip_rate")
-    mirrored |= {name: -image.channels[name] for name in odd}
-    differ = [np.sum(motion.channels[name] != values) for name, values in mirrored.items()]
-    differ += [
-        replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
-        for a, b in zip(history.event_list, image.event_list, strict=True)
+    mirrored = {
+        name: -image.channels[name] if name in odd else image.channels[name]
+        for name in ("t", "y", "y_dot", "mode", *odd)
+    }
+    differ = [
+        *(np.sum(motion.channels[name] != values) for name, values in mirrored.items()),
+        *(
+            replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
+            for a, b in zip(history.event_list, image.event_list, strict=True)
+        ),
     ]
     return float(sum(differ) + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
 
@@ -511,9 +522,9 @@ class _Horizon:
             self.failure = f"{self.failure}; {error}".strip("; ")
             return math.inf
         difference = _differences(history, other)
-        ended = len(history.channels["t"]) == len(other.channels["t"])
-        whole = ended and not np.any(difference > SEEN)
-        return float(np.max(difference if whole else difference[: self.row], initial=0.0))
+        if len(history.channels["t"]) != len(other.channels["t"]) or np.any(difference > SEEN):
+            difference = difference[: self.row]
+        return float(np.max(difference, initial=0.0))
 
     @cached_property
     def row(self) -> int:
@@ -522,10 +533,12 @@ class _Horizon:
         rows = [len(history.channels["t"])]
         # The horizon belongs to the scene, however coarse the model is. Rounding is a disturbance,
         # too: finer tolerances must agree on the answer.
-        exact = self.model.model_copy(update={"tolerance": EXACT})
         for by in (10.0, 100.0):
             with suppress(ModelFailure):
-                a, b = (finer(exact, times).simulate(scene) for times in (by, 100.0 * by))
+                a, b = (
+                    self.model.model_copy(update={"tolerance": EXACT / times}).simulate(scene)
+                    for times in (by, 100.0 * by)
+                )
                 rows.append(_agree(a, b, 0.1 * SEEN))
         for disturbed in _disturbed(scene, self.seed):
             with suppress(ModelFailure):
@@ -575,7 +588,6 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
         )
 
     block, floor = scene.block, scene.floor
-    bases = {"excitation": scene.excitation, "vertical": scene.vertical}
     for _ in range(DISTURBED):
         kinetic = by(floor.friction)
         static = None if floor.static_friction is None else max(by(floor.static_friction), kinetic)
@@ -596,7 +608,10 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
                 ),
                 **{
                     name: base if base.kind == "rest" else base.scaled(by(1.0))
-                    for name, base in bases.items()
+                    for name, base in (
+                        ("excitation", scene.excitation),
+                        ("vertical", scene.vertical),
+                    )
                 },
                 **{
                     name: by(getattr(scene, name))

@@ -162,8 +162,9 @@ class Motion:
             for wall in scene.walls
         }
         self.deepest = max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
-        nowhere = np.full(len(t), np.inf)
-        left, right = (self.gaps.get(side, nowhere) < CLOSED for side in ("left", "right"))
+        left, right = (
+            self.gaps.get(side, np.full(len(t), np.inf)) < CLOSED for side in ("left", "right")
+        )
         self.tip = np.where(sign < 0.0, right, left)
         self.far = np.where(sign < 0.0, left, right)
 

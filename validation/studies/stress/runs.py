@@ -91,8 +91,13 @@ class EventBased(Player):
             "most_events": MOST_EVENTS,
             **self.settings(scene, number),
         }
-        audit = only in ("energy", "clearance") or (not only and number % AUDIT == 0)
-        return check_run(EventBasedModel(**settings), scene, seed=seed, audit=audit, only=only)
+        return check_run(
+            EventBasedModel(**settings),
+            scene,
+            seed=seed,
+            audit=only in ("energy", "clearance") or (not only and number % AUDIT == 0),
+            only=only,
+        )
 
 
 @dataclass(frozen=True)
@@ -136,12 +141,14 @@ class Approximate(Player):
             finer = replace(self, step=0.5 * self.step)._check(
                 scene.replace(output_step=0.5 * scene.output_step), number
             )
-            words = (
-                f"{name} {played.figures[name]:.2g}, with half the step"
-                f" {finer.figures.get(name, math.nan):.2g}"
-                for name in broken
+            return replace(
+                played,
+                failure="; ".join(
+                    f"{name} {played.figures[name]:.2g}, with half the step"
+                    f" {finer.figures.get(name, math.nan):.2g}"
+                    for name in broken
+                ),
             )
-            return replace(played, failure="; ".join(words))
         return played
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
@@ -165,8 +172,10 @@ class Approximate(Player):
         spin = float(np.max(np.abs(motion.channels["theta_dot"])))
         ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
         speed = ways * motion.unit / motion.radius + spin * motion.unit
-        bases = motion.scene.excitation, motion.scene.vertical
-        shaken = sum(np.max(np.abs(base.acceleration(motion.channels["t"]))) for base in bases)
+        shaken = sum(
+            np.max(np.abs(base.acceleration(motion.channels["t"])))
+            for base in (motion.scene.excitation, motion.scene.vertical)
+        )
         level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
         way = math.sqrt(DEPTH) if self.label == "cm" else self.step
         stated = speed * way + level * way**2
@@ -341,8 +350,9 @@ def scene_text(scene: Scene, remarks: str) -> str:
         ((key, value) for key, value in _tables(scene).items() if key != "name"),
         key=lambda item: isinstance(item[1], dict | list),
     )
-    lines = "".join(f"# {line}\n" for line in remarks.splitlines())
-    return lines + tomlkit.dumps(dict(ordered))
+    return "".join(
+        [*(f"# {line}\n" for line in remarks.splitlines()), tomlkit.dumps(dict(ordered))]
+    )
 
 
 #: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
@@ -482,8 +492,10 @@ def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") ->
     try:
         return PLAYERS[label].check(scene, seed, number, only)
     except Exception as error:  # the other runs go on, and this one is reported with its message
-        failure = printable(f"{type(error).__name__}: {error}", 300)
-        return CheckedRun(figures={"ends": math.inf}, failure=failure)
+        return CheckedRun(
+            figures={"ends": math.inf},
+            failure=printable(f"{type(error).__name__}: {error}", 300),
+        )
 
 
 @dataclass(frozen=True)
@@ -513,12 +525,12 @@ class Shrinking(Task):
         if not shows(broken.scene):
             return broken.text(broken.scene, "as it was found: it does not fail again")
         scene, complete = shrink(broken.scene, shows, trials=self.trials, seconds=self.budget)
-        remark = (
+        return broken.text(
+            scene,
             ""
             if complete
-            else "not the smallest: time was over before all that is simpler was tried"
+            else "not the smallest: time was over before all that is simpler was tried",
         )
-        return broken.text(scene, remark)
 
 
 def chunk(model: str, seed: int, first: int, count: int) -> Chunk:

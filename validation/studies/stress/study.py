@@ -283,7 +283,7 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
     ]
     # A place takes far less than its time limit.
     how: dict[str, Any] = {"seconds": 600.0, "expected": 0.5 if quick else 4.0}
-    still = [
+    return [
         Place(
             line,
             case,
@@ -291,14 +291,11 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
             **how,
         )
         for case, line in itertools.product(CASES, lines)
-    ]
-    values = [
-        (axis, one)
-        for axis, (_, _, some) in AXES.items()
-        for one in (some[:: max(1, len(some) // QUICK_VALUES)] if quick else some)
-    ]
-    return still + [
-        Place(line, axis, value, quick, **how) for axis, value in values for line in lines
+    ] + [
+        Place(line, axis, value, quick, **how)
+        for axis, (_, _, values) in AXES.items()
+        for value in (values[:: max(1, len(values) // QUICK_VALUES)] if quick else values)
+        for line in lines
     ]
 
 
@@ -331,10 +328,11 @@ class Stress(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """Chunks and places; smaller tasks for those that are lost; then failures are shrunk."""
         lost = [task for task, one in done.items() if isinstance(one, Failure)]
-        work: list[Task] = [*self._chunks()]
-        if self.what != "runs":
-            work += places(self.quick, self.models)
-        work += [part for task in lost for part in parts(task)]
+        work: list[Task] = [
+            *self._chunks(),
+            *(places(self.quick, self.models) if self.what != "runs" else ()),
+            *(part for task in lost for part in parts(task)),
+        ]
         if any(task not in done for task in work):
             return work
         gone = {(one.model, one.first) for one in lost if isinstance(one, Chunk) and one.count == 1}
@@ -344,16 +342,20 @@ class Stress(Study):
             for one in totals.shown
             if (one.model, one.number) not in gone
         ]
-        share = min(ONE_FAILURE, 1.0 / max(1, len(small)))
-        budget = share * (SHRINKING_QUICK if self.quick else SHRINKING)
+        budget = (SHRINKING_QUICK if self.quick else SHRINKING) * min(
+            ONE_FAILURE, 1.0 / max(1, len(small))
+        )
         return work + [
             Shrinking(one, budget, seconds=budget + HANGING, expected=0.5 * budget) for one in small
         ]
 
     def _chunks(self) -> Iterator[Chunk]:
         """The runs, the slowest models first, so that all cores end together."""
-        every = [label for label in PLAYERS if not not_installed(label.split()[0])]
-        labels = () if self.what == "maps" else self.models or every
+        labels: Sequence[str] = (
+            ()
+            if self.what == "maps"
+            else self.models or [label for label in PLAYERS if not not_installed(label.split()[0])]
+        )
         for label in sorted(labels, key=lambda label: isinstance(PLAYERS[label], EventBased)):
             player = PLAYERS[label]
             count = self.runs or (player.quick if self.quick else player.runs)
@@ -369,28 +371,32 @@ class Stress(Study):
             if isinstance(one, RunTotals):
                 found[task.model].add(one)
             elif isinstance(task, Chunk) and task.count == 1:
-                lost = CheckedRun(figures={"ends": math.inf}, failure=one.reason)
-                found[task.model].see(lost, task.seed, task.first)
+                found[task.model].see(
+                    CheckedRun(figures={"ends": math.inf}, failure=one.reason),
+                    task.seed,
+                    task.first,
+                )
         return [totals for totals in found.values() if totals.counts]
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables, the maps, and the scenes of failures."""
         totals = self._totals(done)
         small = {task.broken: one for task, one in done.items() if isinstance(one, str)}
-        at = list(map(done.get, places(self.quick, self.models)))
-        stable = [one for one in at if isinstance(one, Stable)]
-        still = [one for one in at if isinstance(one, Still)]
-        ours = [one for one in totals if isinstance(PLAYERS[one.model], EventBased)]
-        broken = sum(len(one.failures) for one in ours)
-        said = f"failures of event-based models: {broken}"
+        broken = sum(
+            len(one.failures) for one in totals if isinstance(PLAYERS[one.model], EventBased)
+        )
         return Finding(
             self.name,
             "Stress: random scenes against what must always hold",
-            f"seed {self.seed}: {sum(one.counts['runs'] for one in totals):,} runs,"
-            f" {said if broken else 'no failure of an event-based model'}",
+            f"seed {self.seed}: {sum(one.counts['runs'] for one in totals):,} runs, "
+            + (
+                f"failures of event-based models: {broken}"
+                if broken
+                else "no failure of an event-based model"
+            ),
             [
                 *(_runs(totals) if totals else ()),
-                *_maps(stable, still, self.quick),
+                *_maps(list(map(done.get, places(self.quick, self.models))), self.quick),
             ],
             data={
                 "seed": self.seed,
@@ -500,8 +506,10 @@ def _runs(totals: Sequence[RunTotals]) -> Iterator[Table]:
 
 
 def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
-    known = [(*one.worst[name], one.model) for one in totals if name in one.worst]
-    worst, run, model = max(known, default=(None, "", ""))
+    worst, run, model = max(
+        ((*one.worst[name], one.model) for one in totals if name in one.worst),
+        default=(None, "", ""),
+    )
     failed = [sum(failure.invariant == name for failure in one.failures) for one in totals]
     return [
         name,
@@ -522,10 +530,11 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     ]
 
 
-def _maps(stable: Sequence[Stable], still: Sequence[Still], quick: bool) -> Iterator[Plot | Table]:
+def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
+    stable = [one for one in found if isinstance(one, Stable)]
+    still = [one for one in found if isinstance(one, Still)]
     if stable:
         steps = QUICK_STEPS if quick else STEPS
-        adaptive = min(one for one in steps if one >= ADAPTIVE_FINEST)
         lines = list(dict.fromkeys(one.line for one in stable))
         drawn = [_by_axis(axis, lines, stable) for axis in AXES]
         yield Plot(
@@ -538,7 +547,8 @@ def _maps(stable: Sequence[Stable], still: Sequence[Still], quick: bool) -> Iter
             " 3 g tan α, one thing changed. A run is stable if it does not blow up, no corner sinks"
             " deeper than 0.02 R and the distance of a step, and the energy gained without a source"
             " is below a tenth of all work. “none”: not even the finest step is stable"
-            f" ({steps[-1]:g}, with adaptive steps {adaptive:g}).",
+            f" ({steps[-1]:g}, with adaptive steps"
+            f" {min(one for one in steps if one >= ADAPTIVE_FINEST):g}).",
         )
         yield from (table for _, table in drawn)
         yield table_of("stable-steps", Stable, stable)
@@ -569,7 +579,7 @@ def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[
     values = list(dict.fromkeys(value for _, value in of))
     rows = [[of.get((line, value)) for value in values] for line in lines]
     words, _, _ = AXES[axis]
-    table = Table(
+    return [words, values, [[one and one.step for one in row] for row in rows]], Table(
         f"steps-{axis}",
         [text("line", "model"), *(text(f"{value:g}") for value in values)],
         [
@@ -579,4 +589,3 @@ def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[
         f"Largest stable step, √(R/g), by {words}",
         folded=True,
     )
-    return [words, values, [[one and one.step for one in row] for row in rows]], table

@@ -42,8 +42,10 @@ class SceneFamily:
 
 def pulse_of(scene: Scene, frequency_ratio: Any, amplitude_ratio: Any) -> tuple[Any, Any]:
     """Amplitude (m/s^2) and period (s) of pulses of omega_p = ratio p, a_p = ratio g tan alpha."""
-    strength = amplitude_ratio * scene.gravity * math.tan(scene.block.alpha)
-    return strength, 2.0 * math.pi / (frequency_ratio * scene.frequency_parameter)
+    return (
+        amplitude_ratio * scene.gravity * math.tan(scene.block.alpha),
+        2.0 * math.pi / (frequency_ratio * scene.frequency_parameter),
+    )
 
 
 def pulse(
@@ -71,13 +73,10 @@ def _pulses(
     name: str, frequency_ratio: float, amplitude_ratio: float, friction: float, *walls: Wall
 ) -> SceneFamily:
     beside = "".join(f", wall at {1e3 * wall.gap:g} mm, e {wall.restitution:g}" for wall in walls)
-    words = (
-        f"Ricker pulse, ω_p = {frequency_ratio:g} p, a_p = {amplitude_ratio:g} g tan α,"
-        f" μ {friction:g}{beside}"
-    )
     return SceneFamily(
         name,
-        words,
+        f"Ricker pulse, ω_p = {frequency_ratio:g} p, a_p = {amplitude_ratio:g} g tan α,"
+        f" μ {friction:g}{beside}",
         lambda k: pulse(
             frequency_ratio,
             amplitude_ratio * (1.0 + 0.01 * (k - 4.5)),
@@ -91,8 +90,11 @@ def _pulses(
 def _record(name: str, words: str) -> SceneFamily:
     def member(k: int) -> Scene:
         scene = load_scene(name)
-        louder = scene.excitation.scaled((1.5 + 0.02 * k) / 1.6)
-        return scene.replace(name=f"{name} {k}", excitation=louder, duration=RECORD_DURATION)
+        return scene.replace(
+            name=f"{name} {k}",
+            excitation=scene.excitation.scaled((1.5 + 0.02 * k) / 1.6),
+            duration=RECORD_DURATION,
+        )
 
     return SceneFamily(name, f"El Centro × 1.5 to 1.68, {words}", member)
 
@@ -142,16 +144,13 @@ GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 0.5)
 DURATION = 5.0
 
 
-def _beside_a_wall(name: str, gap: float, restitution: float) -> SceneFamily:
-    wall = Wall(side="left", gap=gap, restitution=restitution)
-    label = f"{name} {1e3 * gap:g} mm e {restitution:g}"
-    scene = pulse(*PULSES[name], walls=(wall,), name=label).replace(duration=DURATION)
-    return SceneFamily(label, "", lambda k: scene)
-
-
 WALLS = {
-    one.name: one
-    for one in itertools.starmap(_beside_a_wall, itertools.product(PULSES, GAPS, RESTITUTIONS))
+    f"{name} {1e3 * gap:g} mm e {e:g}": pulse(
+        *PULSES[name],
+        walls=(Wall(side="left", gap=gap, restitution=e),),
+        name=f"{name} {1e3 * gap:g} mm e {e:g}",
+    ).replace(duration=DURATION)
+    for name, gap, e in itertools.product(PULSES, GAPS, RESTITUTIONS)
 }
 QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 
@@ -170,8 +169,11 @@ class Prepared:
 
 @cache
 def prepared(family: str, member: int) -> Prepared:
-    """Cuts a member at its horizon and plays its references; they take milliseconds."""
-    whole = (FAMILIES | WALLS)[family].member(member)
+    """Cuts a member, or a scene of `WALLS`, at its horizon and plays its references.
+
+    They take milliseconds.
+    """
+    whole = WALLS.get(family) or FAMILIES[family].member(member)
     scene = whole.replace(duration=predictability_horizon(whole))
     references = {
         model.name: model.simulate(scene)
@@ -180,10 +182,13 @@ def prepared(family: str, member: int) -> Prepared:
             EventBasedModel(tolerance=REFERENCE_TOLERANCE, pivot="bilateral"),
         )
     }
-    model_form = compare(
-        references["ebm"], references["ebm-unilateral"], scene=scene, measures=["theta_rms"]
-    )["theta_rms"]
-    return Prepared(scene, references, model_form)
+    return Prepared(
+        scene,
+        references,
+        compare(
+            references["ebm"], references["ebm-unilateral"], scene=scene, measures=["theta_rms"]
+        )["theta_rms"],
+    )
 
 
 REFERENCES = ("ebm-unilateral", "ebm")
@@ -359,8 +364,14 @@ class Play(Task):
 
     def record(self, **found: Any) -> BenchmarkRun:
         """The row of the run, with what was found."""
-        horizon = prepared(self.family, self.member).scene.duration
-        return BenchmarkRun(self.family, self.member, self.line, self.value, horizon, **found)
+        return BenchmarkRun(
+            self.family,
+            self.member,
+            self.line,
+            self.value,
+            prepared(self.family, self.member).scene.duration,
+            **found,
+        )
 
     def play(self) -> list[BenchmarkRun]:
         """Plays the member with the setting; short runs several times, for the median time."""
@@ -372,26 +383,29 @@ class Play(Task):
             costs.append(model.simulate(ready.scene).cost)
         reference = ready.references[line.reference]
         errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
-        paper = compare(ready.references["ebm"], history, measures=["theta_rms"])["theta_rms"]
         first = [
             min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
             for h in (reference, history)
         ]
-        found = self.record(
-            rms=errors["theta_rms"],
-            largest=errors["theta_peak"],
-            peak=abs(history.peak_rotation - reference.peak_rotation) / (reference.alpha or 1.0),
-            first_impact=abs(first[1] - first[0]),
-            against_ebm=paper,
-            step=float(history.settings.get("time_step", math.nan))
-            if line.knob != "largest_step"
-            else self.value,
-            cpu=median(cost.cpu_seconds for cost in costs),
-            wall=median(cost.wall_seconds for cost in costs),
-            set_up=median(cost.set_up for cost in costs),
-            steps=costs[0].steps,
-        )
-        return [found]
+        return [
+            self.record(
+                rms=errors["theta_rms"],
+                largest=errors["theta_peak"],
+                peak=abs(history.peak_rotation - reference.peak_rotation)
+                / (reference.alpha or 1.0),
+                first_impact=abs(first[1] - first[0]),
+                against_ebm=compare(ready.references["ebm"], history, measures=["theta_rms"])[
+                    "theta_rms"
+                ],
+                step=float(history.settings.get("time_step", math.nan))
+                if line.knob != "largest_step"
+                else self.value,
+                cpu=median(cost.cpu_seconds for cost in costs),
+                wall=median(cost.wall_seconds for cost in costs),
+                set_up=median(cost.set_up for cost in costs),
+                steps=costs[0].steps,
+            )
+        ]
 
 
 def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:
@@ -409,8 +423,7 @@ def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:
 
 def _ordered(frame: pd.DataFrame, *names: str) -> pd.DataFrame:
     order = [*names, "value"]
-    falling = [name != "value" for name in order]
-    return frame.sort_values(order, ascending=falling, kind="stable")
+    return frame.sort_values(order, ascending=[name != "value" for name in order], kind="stable")
 
 
 def grouped(frame: pd.DataFrame, *names: str) -> list[tuple[Any, pd.DataFrame]]:
@@ -431,20 +444,18 @@ def points_of(frame: pd.DataFrame) -> pd.DataFrame:
     The errors come with their 10-90 % band and the worst; the cost is that of a simulated second. A
     run that failed counts as infinitely wrong.
     """
-    names = "family", "line", "value"
-    rows = [(*at, *_point(some)) for at, some in grouped(frame, *names)]
-    return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
-
-
-def _point(samples: pd.DataFrame) -> tuple[float, ...]:
-    good = samples[samples.failure == ""]
-    rates = good[[*RATES]].div(good.horizon, axis=0)
-    medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
-    errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
+    names, rows = ("family", "line", "value"), []
     # halfway between two values where a share lies between them; infinite ones are not averaged
     sides = np.add.outer([-TINY, TINY], [*SHARES.values()])
-    shares = np.quantile(errors, sides, method="inverted_cdf").mean(axis=0).tolist()
-    return len(samples), failed, *shares, *medians, math.inf if failed else good.rms.max()
+    for at, samples in grouped(frame, *names):
+        good = samples[samples.failure == ""]
+        rates = good[[*RATES]].div(good.horizon, axis=0)
+        medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
+        errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
+        shares = np.quantile(errors, sides, method="inverted_cdf").mean(axis=0).tolist()
+        worst = math.inf if failed else good.rms.max()
+        rows.append((*at, len(samples), failed, *shares, *medians, worst))
+    return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
 
 
 def trends_of(points: pd.DataFrame) -> pd.DataFrame:
@@ -456,26 +467,29 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
     """
     lines = dict(grouped(points, "family", "line"))
     costs = {at: cost_at(line) for at, line in lines.items()}
-    rows = [
-        (
-            *at,
-            slope(line.value, line.rms, FITTED),
-            *costs[at],
-            costs[at][0] / costs.get((at[0], "ebm"), NOTHING)[0],
-        )
-        for at, line in lines.items()
-    ]
-    return pd.DataFrame(rows, columns=["family", "line", "order", "cpu", "at_coarsest", "ratio"])
+    return pd.DataFrame(
+        [
+            (
+                *at,
+                slope(line.value, line.rms, FITTED),
+                *costs[at],
+                costs[at][0] / costs.get((at[0], "ebm"), NOTHING)[0],
+            )
+            for at, line in lines.items()
+        ],
+        columns=["family", "line", "order", "cpu", "at_coarsest", "ratio"],
+    )
 
 
 def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind; `family` is the kind."""
     engines = _ordered(frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]], "line")
-    parts = [
-        engines[engines.family.str.startswith(starts)].assign(family=kind)
-        for kind, starts in kinds.items()
-    ]
-    return points_of(pd.concat(parts))
+    return points_of(
+        pd.concat(
+            engines[engines.family.str.startswith(starts)].assign(family=kind)
+            for kind, starts in kinds.items()
+        )
+    )
 
 
 def at_the_cost(points: pd.DataFrame) -> list[float]:
@@ -502,8 +516,8 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     for (label,), mine in grouped(found[found.family == next(iter(KINDS))], "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
             best = good.loc[good.rms.idxmin()]
-            least = float(best.rms), float(best.cpu)
-            rows.append((label, cost_at(mine)[0], error_at(mine, EQUAL_COST), *least))
+            reached = cost_at(mine)[0], error_at(mine, EQUAL_COST)
+            rows.append((label, *reached, float(best.rms), float(best.cpu)))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 
@@ -518,8 +532,13 @@ def first_steps(frame: pd.DataFrame) -> list[tuple[str, dict[str, float], float]
         good = line[line.rms <= LEVEL]
         met = {kind: set(good.value[good.family == kind]) for kind in LEAGUE}
         met["all"] = set.intersection(*met.values())
-        largest = {kind: max(values, default=math.nan) for kind, values in met.items()}
-        rows.append((label, largest, line.value.min()))
+        rows.append(
+            (
+                label,
+                {kind: max(values, default=math.nan) for kind, values in met.items()},
+                line.value.min(),
+            )
+        )
     return rows
 
 
@@ -580,7 +599,6 @@ def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
 
     `within` is the number of runs whose error is at most `LEVEL`.
     """
-    groups = [*grouped(_ordered(frame, "line"), "line", "value")]
     return pd.DataFrame(
         {
             "model": model,
@@ -592,7 +610,9 @@ def levels_of(frame: pd.DataFrame) -> pd.DataFrame:
             "runs": len(runs),
             "within": int((runs[reference] <= LEVEL).sum()),
         }
-        for reference, ((model, value), runs) in itertools.product(REFERENCES, groups)
+        for reference, ((model, value), runs) in itertools.product(
+            REFERENCES, grouped(_ordered(frame, "line"), "line", "value")
+        )
     )
 
 
@@ -605,11 +625,13 @@ def orders_of(frame: pd.DataFrame, levels: pd.DataFrame) -> pd.DataFrame:
     settings = dict(grouped(levels, "model", "reference"))
     for model, reference in itertools.product(dict.fromkeys(levels.model), REFERENCES):
         mine = settings[model, reference]
-        rows.append((model, reference, slope(mine.step, mine["median"]), ""))
         rows += [
-            (model, reference, slope(one.step, one[reference]), scene)
-            for scene in WALLS
-            if (one := lines.get((model, scene))) is not None
+            (model, reference, slope(mine.step, mine["median"]), ""),
+            *(
+                (model, reference, slope(one.step, one[reference]), scene)
+                for scene in WALLS
+                if (one := lines.get((model, scene))) is not None
+            ),
         ]
     return pd.DataFrame(rows, columns=["model", "reference", "order", "scene"])
 

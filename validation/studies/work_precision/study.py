@@ -3,7 +3,7 @@
 import itertools
 import math
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 from typing import Any, Literal, get_args
@@ -72,11 +72,11 @@ class Measure(Task):
 
     def play(self) -> Sequence[Any]:
         """The rows of the timing."""
-        return TIMED[self.kind](self.name, self.size)
+        return [*TIMED[self.kind](self.name, self.size)]
 
 
 #: Timings by kind: a name and a size give rows.
-TIMED: Mapping[str, Callable[[str, int], Sequence[Any]]] = {
+TIMED: Mapping[str, Callable[[str, int], Iterable[Any]]] = {
     "batch": timings.batch_times,
     "size": lambda name, size: [timings.batch_size(size, int(name))],
     "cold start": lambda name, size: [timings.cold_start(cached=name == "filled", times=size)],
@@ -96,14 +96,16 @@ class WorkPrecision(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """All at once; what is timed first."""
-        parts = {
-            "ebm": self._batches,
-            "skipping": self._savings,
-            "models": self._models,
-            "convergence": self._convergence,
-        }
         return [
-            task for name, part in parts.items() if self.what in ("all", name) for task in part()
+            task
+            for name, part in (
+                ("ebm", self._batches),
+                ("skipping", self._savings),
+                ("models", self._models),
+                ("convergence", self._convergence),
+            )
+            if self.what in ("all", name)
+            for task in part()
         ]
 
     def _batches(self) -> Iterator[Task]:
@@ -134,7 +136,6 @@ class WorkPrecision(Study):
         An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
         s, and the adaptive ones of DART, which cost as much.
         """
-        members = range(QUICK_MEMBERS if self.quick else MEMBERS)
         lines = [
             (line, value)
             for line in LINES.values()
@@ -142,7 +143,9 @@ class WorkPrecision(Study):
             for value in (line.quick if self.quick else line.values)
         ]
         for member, family, (line, value) in itertools.product(
-            members, QUICK if self.quick else FAMILIES, lines
+            range(QUICK_MEMBERS if self.quick else MEMBERS),
+            QUICK if self.quick else FAMILIES,
+            lines,
         ):
             step = value if line.knob == "time_step" else math.inf
             if not (self.quick and member and (step <= 1e-4 or line.label == "dart adaptive")):
@@ -160,7 +163,7 @@ class WorkPrecision(Study):
         for place, line, name in itertools.product(
             (1, 0) if self.quick else (2, 1, 0), lines, QUICK_WALLS if self.quick else WALLS
         ):
-            bounces = WALLS[name].member(0).walls[0].restitution > 0.0
+            bounces = WALLS[name].walls[0].restitution > 0.0
             if place < len(line.converge) and not (line.model == "drake" and bounces):
                 value = line.converge[place]
                 yield Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
@@ -168,11 +171,13 @@ class WorkPrecision(Study):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
         played = (one for one in done.values() if not isinstance(one, Failure))
-        rows = list(itertools.chain.from_iterable(played))
-        rows += [
-            task.record(failure=one.reason)
-            for task, one in done.items()
-            if isinstance(task, Play) and isinstance(one, Failure)
+        rows = [
+            *itertools.chain.from_iterable(played),
+            *(
+                task.record(failure=one.reason)
+                for task, one in done.items()
+                if isinstance(task, Play) and isinstance(one, Failure)
+            ),
         ]
         samples, times, sizes, starts, saved = (
             [row for row in rows if isinstance(row, kind)] for kind in get_args(Row)
@@ -308,10 +313,14 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         folded=True,
     )
     kept = ["family", "line", "value", "runs", "failed", "cpu", "rms", "rms_worst"]
-    costs = runs.at_the_cost(pooled)
-    engines = pooled[kept].assign(at_the_cost=costs).rename(columns={"family": "kind"})
+    engines = pooled[kept].assign(at_the_cost=runs.at_the_cost(pooled))
     how: Any = {"on": "page", "folded": True}
-    yield _table("engines", engines, title="Engines over whole kinds of scenes", **how)
+    yield _table(
+        "engines",
+        engines.rename(columns={"family": "kind"}),
+        title="Engines over whole kinds of scenes",
+        **how,
+    )
     # The worst error is shown for engines only.
     yield _table("work-precision", points.drop(columns="rms_worst"), title="All settings", **how)
     yield _table("orders-and-ratios", trends)
@@ -325,8 +334,12 @@ def _about(family: str) -> tuple[float, float]:
 
 
 def _table(name: str, frame: pd.DataFrame, **more: Any) -> Table:
-    rows = list(frame.itertuples(index=False, name=None))
-    return Table(name, [*map(Column, frame)], rows, **{"on": "file", **more})
+    return Table(
+        name,
+        [*map(Column, frame)],
+        list(frame.itertuples(index=False, name=None)),
+        **{"on": "file", **more},
+    )
 
 
 def _spread(label: str, trends: pd.DataFrame) -> list[Any]:
@@ -378,25 +391,10 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
     frame = runs.frame_of(samples)
     levels = runs.levels_of(frame)
     orders = runs.orders_of(frame, levels)
-    exceptions = list(runs.exceptions_of(frame, orders))
     form = median(
         prepared(name, 0).model_form for name in dict.fromkeys(one.family for one in samples)
     )
     slopes = {(o.model, o.reference): o.order for o in orders.itertuples() if not o.scene}
-    columns = [
-        Column("model", kind="model"),
-        Column("value", "setting", brief=False),
-        Column("step", "step", "s", digits=2),
-        *itertools.chain.from_iterable(
-            (
-                Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
-                Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
-                text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
-                Column(f"order_{reference}", "order", digits=3),
-            )
-            for reference in REFERENCES
-        ),
-    ]
     rows = []
     for (model, value), both in runs.grouped(levels, "model", "value"):
         cells = [
@@ -406,14 +404,30 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         rows.append([model, value, both.step.iloc[0], *itertools.chain(*cells)])
     yield Table(
         "levels",
-        columns,
+        [
+            Column("model", kind="model"),
+            Column("value", "setting", brief=False),
+            Column("step", "step", "s", digits=2),
+            *itertools.chain.from_iterable(
+                (
+                    Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
+                    Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
+                    text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
+                    Column(f"order_{reference}", "order", digits=3),
+                )
+                for reference in REFERENCES
+            ),
+        ],
         rows,
         "What engines and CM converge to beside a wall",
         "As the step falls they tend to the model whose floor can only push. Against the paper's"
         f" model the error ends at the difference in form, {form:.1e} alpha.",
     )
     yield _over_step(frame, levels, form)
-    yield Text(title="What does not converge", items=exceptions or ["Nothing."])
+    yield Text(
+        title="What does not converge",
+        items=[*runs.exceptions_of(frame, orders)] or ["Nothing."],
+    )
     yield _table("orders", orders)
     yield table_of("wall-runs", BenchmarkRun, samples)
 
@@ -424,15 +438,15 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
         good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
         series = []
         for (model,), mine in runs.grouped(levels[levels.reference == reference], "model"):
-            lines = [good.get((model, name), frame[:0]) for name in WALLS]
             series += [
                 Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
-                for one in lines
+                for one in (good.get((model, name), frame[:0]) for name in WALLS)
             ]
             medians = mine["median"].clip(upper=3.0).tolist()
             series.append(Series(model, mine.step.tolist(), medians, look=model))
-        form_of = [_form_of(form)] if reference == "ebm" else []
-        panels.append(Panel(f"against {reference}", [*series, *form_of]))
+        if reference == "ebm":
+            series.append(_form_of(form))
+        panels.append(Panel(f"against {reference}", series))
     return Plot(
         "error-over-step",
         panels=panels,
@@ -468,17 +482,22 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
         f"The cheapest tolerance with a p95 error of the peak of at most {timings.LEVEL:g} rad."
         f" One right-hand side: {1e9 * median(row.right_hand_side for row in times):.1f} ns.",
     )
-    series = [
-        Series(
-            f"{case.name}: {case.words}",
-            [row.error_95 for row in times if row.case == case.name and row.error_95 > 0.0],
-            [1e6 * row.cpu for row in times if row.case == case.name and row.error_95 > 0.0],
-        )
-        for case in timings.CASES
-    ]
+    shown = [row for row in times if row.error_95 > 0.0]
     yield Plot(
         "batches",
-        panels=[Panel("", series)],
+        panels=[
+            Panel(
+                "",
+                [
+                    Series(
+                        f"{case.name}: {case.words}",
+                        [row.error_95 for row in shown if row.case == case.name],
+                        [1e6 * row.cpu for row in shown if row.case == case.name],
+                    )
+                    for case in timings.CASES
+                ],
+            )
+        ],
         x=Axis("p95 error of the peak, rad", log=True),
         y=Axis("CPU μs a run, one core", log=True),
     )
@@ -539,7 +558,7 @@ def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
                 one.cost_with,
                 one.cost_without,
                 one.unit,
-                one.ratio,
+                one.cost_with / one.cost_without,
                 one.change,
                 one.remark,
             ]

@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.ebm.spectrum import Floats
@@ -35,6 +36,8 @@ from rockcheck.validation.studies.work_precision.runs import pulse, pulse_of
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
 TOLERANCES = (1e-6, 1e-7, 4e-8, 1e-8, 1e-9, 1e-10, 1e-12)
 REFERENCE_TOLERANCE, ROUNDS = 1e-14, 3
+#: Evaluations of the right-hand side that are timed together.
+EVALUATIONS = 400_000
 #: The error at which a trajectory's cost is given: 95th percentile of the peak's error, rad.
 LEVEL = 1e-8
 #: Runs of a batch whose cost is taken whole, packing included; and in a quick benchmark.
@@ -135,9 +138,8 @@ def packed_of(case: BatchCase, model: EventBasedModel, nodes: int) -> Packed:
         return pack_pulses(case.scene, model, *grid(case.scene, nodes))
     scene = load_scene("fig4a")
     motion, scales = scene.excitation, np.linspace(1.4, 1.8, nodes).tolist()
-    louder = [motion.scaled(scale / 1.6) for scale in scales]
-    scenes = [scene.replace(excitation=one, duration=motion.quiet_after) for one in louder]
-    return pack(scenes, model)
+    whole = scene.replace(duration=motion.quiet_after)
+    return pack([whole.replace(excitation=motion.scaled(one / 1.6)) for one in scales], model)
 
 
 def batch_size(runs: int, threads: int) -> BatchSize:
@@ -163,13 +165,17 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
     packed = packed_of(case, reference_model, nodes)
-    decided = case.scene is not None
-    play = partial(run_batch, packed, until_decided=decided, strict=False, jobs=1)
+    play = partial(run_batch, packed, until_decided=case.scene is not None, strict=False, jobs=1)
     reference = play(reference_model)
     costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
+    ground = natural.base_of(PLAIN).horizontal
+    _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
+    right_hand_side = _timed(
+        lambda _: _right_hand_sides(ground, PAPER_BLOCK.alpha, EVALUATIONS), EVALUATIONS
+    )
     found, ones, rows = {}, [], []
     for _ in range(ROUNDS):
-        ones.append(right_hand_side_seconds())
+        ones.append(1e-6 * median(right_hand_side() for _ in range(5)))
         for tolerance in TOLERANCES:
             model = EventBasedModel(tolerance=tolerance, **case.settings)
             began, began_cpu = time.perf_counter(), time.process_time()
@@ -198,7 +204,10 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
 
 @kernel
 def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
-    """(3) in natural units, `count` times, each at a place that depends on the one before."""
+    """(3) in natural units, `count` times, each at a place that depends on the one before.
+
+    Under a Ricker pulse it has sin, cos, exp and a polynomial.
+    """
     theta = 0.1 * alpha
     for k in range(count):
         turn = 0.75 * (
@@ -206,19 +215,6 @@ def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
         )
         theta += 1e-12 * turn
     return theta
-
-
-def right_hand_side_seconds(count: int = 400_000) -> float:
-    """CPU seconds of one evaluation of the rocking equation under a Ricker pulse.
-
-    It has sin, cos, exp and a polynomial.
-    """
-    from rockcheck.ebm import natural
-
-    ground = natural.base_of(PLAIN).horizontal
-    _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
-    cost = _timed(lambda _: _right_hand_sides(ground, PAPER_BLOCK.alpha, count), count)
-    return 1e-6 * median(cost() for _ in range(5))
 
 
 _FRESH = """
@@ -241,11 +237,10 @@ def cold_start(*, cached: bool, times: int = 1) -> ColdStart:
     """
     starts = []
     with tempfile.TemporaryDirectory() as folder:
-        fresh = dict(os.environ) if cached else {**os.environ, "NUMBA_CACHE_DIR": folder}
         for _ in range(1 + times if cached else 1):
             played = subprocess.run(
                 [sys.executable, "-c", _FRESH],
-                env=fresh,
+                env=os.environ | ({} if cached else {"NUMBA_CACHE_DIR": folder}),
                 capture_output=True,
                 text=True,
                 check=False,
@@ -288,28 +283,21 @@ class Saving:
     change: float = math.nan
     remark: str = ""
 
-    @property
-    def ratio(self) -> float:
-        """How many times dearer the thing makes it."""
-        return self.cost_with / self.cost_without
-
 
 Play = Callable[[], float]
 #: A saving to measure: model, thing, unit, the plays with it and without it, change and remark.
 Pair = tuple[str, str, str, Play, Play, float, str]
 
 
-def measured(name: str, rounds: int = SAVING_ROUNDS) -> list[Saving]:
+def measured(name: str, rounds: int = SAVING_ROUNDS) -> Iterator[Saving]:
     """The savings of one of `KINDS`: median costs with and without.
 
     The two are played in turn, after a first round that warms up.
     """
-    found = []
     for model, thing, unit, dear, cheap, change, remark in KINDS[name]():
         costs = [(dear(), cheap()) for _ in range(rounds + 1)][1:]
         first, second = map(median, zip(*costs, strict=True))
-        found.append(Saving(model, thing, unit, first, second, change, remark))
-    return found
+        yield Saving(model, thing, unit, first, second, change, remark)
 
 
 # --- the event-based model, in batches over a grid of pulses
@@ -326,7 +314,6 @@ def _batches(nodes: int) -> Iterator[Pair]:
         return _timed(lambda _: run(), len(packed)), run
 
     sticky = PLAIN.replace(floor=Floor(friction=1.3))
-    still = Record.from_samples(np.zeros(1001), 0.01)
     basis = batch(PLAIN)
     for thing, dear, cheap, remark in (
         (
@@ -355,7 +342,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
         ),
         (
             "vertical motion",
-            batch(PLAIN.replace(vertical=still)),
+            batch(PLAIN.replace(vertical=Record.from_samples(np.zeros(1001), 0.01))),
             basis,
             "a record of zeros against none",
         ),
@@ -387,8 +374,6 @@ def _timed(
 
 def _histories() -> Iterator[Pair]:
     scene = pulse(6.0, 6.0, 0.3)
-    scarce = scene.replace(output_step=scene.duration)
-    dense = scene.replace(output_step=0.001)
     slow: dict[str, Any] = {"time_step": 1e-3}
     for name, settings in (
         ("ebm", {}),
@@ -413,8 +398,8 @@ def _histories() -> Iterator[Pair]:
             yield _of_histories(
                 label,
                 "dense output",
-                (model, dense),
-                (model, scarce),
+                (model, scene.replace(output_step=0.001)),
+                (model, scene.replace(output_step=scene.duration)),
                 "a row each 1 ms against two rows in all",
             )
     for step in (1e-3, "adaptive"):
@@ -450,9 +435,16 @@ def _of_histories(
         dict(zip(found["t"].round(9).tolist(), found["theta"].tolist(), strict=True))
         for found in (model.simulate(scene).channels for model, scene in (dear, cheap))
     )
-    common = first.keys() & second.keys()
-    change = max(abs(first[t] - second[t]) for t in common) / PAPER_BLOCK.alpha
-    return label, thing, "ms a simulated s", cost(*dear), cost(*cheap), change, remark
+    apart = max(abs(first[t] - second[t]) for t in first.keys() & second.keys())
+    return (
+        label,
+        thing,
+        "ms a simulated s",
+        cost(*dear),
+        cost(*cheap),
+        apart / PAPER_BLOCK.alpha,
+        remark,
+    )
 
 
 # --- steps of the engines themselves, in a row without anything between them
@@ -495,7 +487,6 @@ def _mujoco_steps() -> Iterator[Pair]:
         for thing, model in models.items()
     }
     whole, lean = played[""], played["contact pairs"]
-    swift = _timed(native, _STEPS, partial(_started, bare))
     for thing, dear, cheap, remark in (
         ("contact pairs", whole, lean, "wall pairs out of reach against none"),
         (
@@ -516,7 +507,12 @@ def _mujoco_steps() -> Iterator[Pair]:
             whole,
             "energies, accelerometer and gyro that nobody reads",
         ),
-        ("Python between steps", lean, swift, "against mujoco.rollout"),
+        (
+            "Python between steps",
+            lean,
+            _timed(native, _STEPS, partial(_started, bare)),
+            "against mujoco.rollout",
+        ),
     ):
         yield "mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark
 
@@ -599,13 +595,11 @@ def _pybullet_steps() -> Iterator[Pair]:
                     bullet.stepSimulation(**options)
                     after()
 
-            try:
+            with closing(world):
                 world.place(*_TILTED.initial_state)
                 bullet.setTimeStep(1e-3, **options)
                 bullet.setGravity(0.0, 0.0, -9.81, **options)
                 return _timed(stepped, count)()
-            finally:
-                world.close()
 
         return play
 
