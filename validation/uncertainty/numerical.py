@@ -215,11 +215,10 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
     if _side(history):
         return [("end_time", "s", float(history.channels["t"][-1]))]
-    slips = [history.channels["slip"]] if "slip" in history.channels else []
-    return [
-        ("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha),
-        *(("last_slip", "m", float(slip[-1])) for slip in slips),
-    ]
+    found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
+    if "slip" in history.channels:
+        found.append(("last_slip", "m", float(history.channels["slip"][-1])))
+    return found
 
 
 def _side(history: History) -> str:
