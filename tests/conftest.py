@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import Block, Event, History
-from rockcheck.scenes.errors import NotInstalled
+from rockcheck.scenes.errors import InputError, NotInstalled
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import not_installed
 
@@ -60,19 +60,6 @@ ARGUMENTS = [
 ]
 
 
-def _judged(report: Any) -> None:
-    """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
-    if not os.environ.get("CI") or not report.skipped or hasattr(report, "wasxfail"):
-        return
-    reason = str(
-        report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
-    ).removeprefix("Skipped: ")
-    allowed = tuple(words for words, listed in MAY_BE_SKIPPED.items() if listed)
-    if not reason.startswith(allowed):
-        report.outcome = "failed"
-        report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
-
-
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """A test that is marked as needing what is not here is skipped."""
     for name in (name for mark in item.iter_markers("needs") for name in mark.args):
@@ -91,9 +78,15 @@ def pytest_runtest_call() -> Iterator[None]:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport() -> Iterator[None]:
+def pytest_runtest_makereport() -> Generator[None, Any, Any]:
+    """In CI a test, or a whole file, that is skipped without a listed reason has failed."""
     report = yield
-    _judged(report)
+    if os.environ.get("CI") and report.skipped and not hasattr(report, "wasxfail"):
+        told = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+        reason = str(told).removeprefix("Skipped: ")
+        if not reason.startswith(tuple(why for why, listed in MAY_BE_SKIPPED.items() if listed)):
+            report.outcome = "failed"
+            report.longrepr = f"skipped in CI, and tests/conftest.py lists no such reason: {reason}"
     return report
 
 
@@ -146,6 +139,31 @@ def refused(typed: Callable[..., tuple[str, str]]) -> Callable[..., str]:
         return line
 
     return say
+
+
+@pytest.fixture
+def written(tmp_path: Path) -> Callable[[str, str | bytes], Path]:
+    """The path of a file of this name and content."""
+
+    def write(name: str, content: str | bytes) -> Path:
+        path = tmp_path / name
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def fault_of() -> Callable[..., InputError]:
+    """The error, in one line, of a call that refuses what it is given."""
+
+    def fault(act: Callable[..., object], *given: Any, **more: Any) -> InputError:
+        with pytest.raises(InputError) as refused:
+            act(*given, **more)
+        assert str(refused.value).isprintable()
+        return refused.value
+
+    return fault
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
@@ -37,14 +38,15 @@ def integrated_restitution(xi: float) -> float:
     return -run.y_events[0][0][1]
 
 
-@pytest.mark.parametrize("xi", [0.05, 0.3, 0.7072, 0.95, 1.0, 1.05, 3.0, 6.9])
+@pytest.mark.parametrize(
+    "xi", [0.05, 0.3, 0.7072, 0.95, 1.0 - 2e-6, 1.0 - 5e-7, 1.0, 1.05, 3.0, 6.9]
+)
 def test_restitution_of_clamped_contact_is_the_integrated_one(xi):
     assert restitution_of(xi) == pytest.approx(integrated_restitution(xi), rel=1e-8)
 
 
-def test_restitution_is_smooth_through_critical_damping():
+def test_restitution_at_critical_damping():
     assert restitution_of(1.0) == pytest.approx(math.exp(-2.0), rel=1e-12)
-    assert restitution_of(1.0 - 2e-6) == pytest.approx(restitution_of(1.0 - 0.5e-6), rel=2e-6)
 
 
 @pytest.mark.parametrize("e", [0.005, 0.05, 0.25, 0.5, 0.75, 0.99, 1.0])
@@ -70,22 +72,20 @@ def test_damping_ratio_of_paper_suits_the_contact_that_may_pull(e):
     assert restitution_of(xi) >= e  # so the clamped contact rebounds faster
 
 
-def test_normal_forces_only_push():
-    apart = {"d1": 0.0, "d2": 0.0, "k11": 1.2, "k12": 0.8, "k21": 0.8, "k22": 1.2}
-    for one in (2.0, -2.0):
-        for other in (3.0, -3.0):
-            pushes = (max(one, 0.0), max(other, 0.0))
-            assert normal_forces(one, other, **apart) == pushes
+@pytest.mark.parametrize("one", [2.0, -2.0])
+@pytest.mark.parametrize("other", [3.0, -3.0])
+def test_normal_forces_only_push(one, other):
+    pushes = (max(one, 0.0), max(other, 0.0))
+    assert normal_forces(one, other, 0.0, 0.0, 1.2, 0.8, 0.8, 1.2) == pushes
 
 
 def test_normal_forces_feel_each_other():
-    f1, f2, d1, d2, k11, k12, k21, k22 = 2.0, 3.0, 0.4, 0.7, 1.2, 0.8, 0.5, 1.3
-    force1, force2 = normal_forces(f1, f2, d1, d2, k11, k12, k21, k22)
-    assert force1 + d1 * (k11 * force1 + k12 * force2) == pytest.approx(f1)
-    assert force2 + d2 * (k21 * force1 + k22 * force2) == pytest.approx(f2)
-    assert normal_forces(0.1, 9.0, d1, d2, k11, k12, k21, k22) == (
+    free, dampings, mobilities = np.array([2.0, 3.0]), [0.4, 0.7], [[1.2, 0.8], [0.5, 1.3]]
+    forces = np.array(normal_forces(*free, *dampings, *np.ravel(mobilities)))
+    assert forces + dampings * (mobilities @ forces) == pytest.approx(free)
+    assert normal_forces(0.1, 9.0, *dampings, *np.ravel(mobilities)) == (
         0.0,
-        pytest.approx(9.0 / (1.0 + d2 * k22)),
+        pytest.approx(9.0 / (1.0 + 0.7 * 1.3)),
     )
 
 
@@ -97,22 +97,22 @@ def test_damper_stops_a_corner_without_overshoot(x):
     assert speed + step * mobility * force == pytest.approx(speed / (1.0 + x + 0.5 * x * x))
 
 
-def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction():
-    law = {
-        "stiffness": 100.0,
-        "damping": 0.0,
-        "mobility": 0.0,
-        "mu_k": 0.3,
-        "normal": 10.0,
-        "rate": 0.0,
-    }
-    assert friction_force(stretch=0.04, holds=0.5, **law) == (pytest.approx(-4.0), False)
-    assert friction_force(stretch=0.04, holds=0.3, **law) == (pytest.approx(-3.0), True)
-    assert friction_force(stretch=-0.06, holds=0.5, **law) == (pytest.approx(3.0), True)
-    assert friction_force(stretch=0.02, holds=0.3, **law) == (pytest.approx(-2.0), False)
+@pytest.mark.parametrize(
+    ("stretch", "holds", "force", "slips"),
+    [
+        (0.04, 0.5, -4.0, False),
+        (0.04, 0.3, -3.0, True),
+        (-0.06, 0.5, 3.0, True),
+        (0.02, 0.3, -2.0, False),
+    ],
+)
+def test_friction_sticks_up_to_static_and_slips_at_kinetic_friction(stretch, holds, force, slips):
+    law = {"stiffness": 100.0, "damping": 0.0, "mobility": 0.0, "mu_k": 0.3, "normal": 10.0}
+    expected = (pytest.approx(force), slips)
+    assert friction_force(stretch=stretch, holds=holds, rate=0.0, **law) == expected
 
 
-def impact_velocity(k_n, k_t, k_c, normal, tangential, mu, e):
+def push_of_impact(k_n, k_t, k_c, normal, tangential, mu, e):
     """Push of the rigid impact with Newton's restitution by sweeping (Gauss-Seidel) over the two
     unknown impulses."""
     push = shear = 0.0
@@ -127,8 +127,8 @@ def impact_velocity(k_n, k_t, k_c, normal, tangential, mu, e):
 @pytest.mark.parametrize("k_c", [-0.7, 0.0, 0.7])
 def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c, sliding):
     k_n, k_t, e = 1.2, 3.8, 0.5
-    push = impact_velocity(k_n, k_t, k_c, -1.0, sliding, mu, e)
-    mass = effective_mass(k_n, k_t, k_c, -1.0, sliding, mu, e)
-    assert mass == pytest.approx(push / (1.0 + e), rel=1e-9)
+    impact = (k_n, k_t, k_c, -1.0, sliding, mu, e)
+    mass = effective_mass(*impact)
+    assert mass == pytest.approx(push_of_impact(*impact) / (1.0 + e), rel=1e-9)
     if sliding:
         assert mass == pytest.approx(1.0 / (k_n - math.copysign(mu, sliding) * k_c))

@@ -6,12 +6,8 @@ import pytest
 from cases import UNAMBIGUOUS, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
-from rockcheck.cm import ContinuousModel
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, Scene, Sine, load_scene
+from rockcheck import ContinuousModel, EventBasedModel, Floor, Scene, Sine, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
-
-G = 9.81
 
 
 def rms(history, theta):
@@ -26,35 +22,36 @@ def rigid(scene):
     return EventBasedModel(pivot="unilateral").simulate(scene).channels["theta"]
 
 
-def test_error_falls_with_the_penetration_in_rocking():
-    scene = Scene(
-        name="rocking",
-        block=PAPER_BLOCK,
-        floor=Floor(friction=0.9),
-        excitation=Sine(amplitude=1.0, period=0.7, cycles=4),
-        initial_rotation=0.4 * PAPER_BLOCK.alpha,
-        duration=3.0,
-    )
-    exact = PaperModel(scene).run().at(scene.output_times)[:, 1]
-    errors = [
-        rms(ContinuousModel(penetration=depth).simulate(scene), exact)
-        for depth in (1e-6, 1e-7, 1e-8, 1e-9)
-    ]
-    orders = -np.diff(np.log10(errors))
-    assert errors[-1] < 1e-7
-    assert np.all(orders > 0.8), errors
+ROCKING = Scene(
+    name="rocking",
+    block=PAPER_BLOCK,
+    floor=Floor(friction=0.9),
+    excitation=Sine(amplitude=1.0, period=0.7, cycles=4),
+    initial_rotation=0.4 * PAPER_BLOCK.alpha,
+    duration=3.0,
+)
+BESIDE_A_WALL = pulse_scene(6.0, 3.0, 0.6, ("left", 0.003, 0.5), duration=4.0)
 
 
-def test_error_falls_with_the_duration_of_a_wall_contact():
-    scene = pulse_scene(6.0, 3.0, 0.6, ("left", 0.003, 0.5), duration=4.0)
-    exact = rigid(scene)
-    errors = [
-        rms(ContinuousModel(penetration=depth).simulate(scene), exact)
-        for depth in (1e-5, 1e-7, 1e-9)
-    ]
-    orders = -np.diff(np.log10(errors)) / 2.0
-    assert np.all(orders > 0.35), errors
-    assert errors[-1] < 2e-4
+@pytest.mark.parametrize(
+    ("scene", "play", "depths", "order", "least"),
+    [
+        (
+            ROCKING,
+            lambda scene: PaperModel(scene).run().at(scene.output_times)[:, 1],
+            (1e-6, 1e-7, 1e-8, 1e-9),
+            0.8,
+            1e-7,
+        ),
+        (BESIDE_A_WALL, rigid, (1e-5, 1e-7, 1e-9), 0.35, 2e-4),
+    ],
+    ids=["with the penetration in rocking", "with the duration of a wall contact"],
+)
+def test_error_falls(scene, play, depths, order, least):
+    exact = play(scene)
+    errors = [rms(ContinuousModel(penetration=depth).simulate(scene), exact) for depth in depths]
+    assert np.all(np.diff(np.log10(errors)) / np.diff(np.log10(depths)) > order), errors
+    assert errors[-1] < least
 
 
 def test_shorter_steps_change_nothing_that_matters():
@@ -88,9 +85,8 @@ def test_paper_rule_is_further_off():
     ("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)]
 )
 def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
-    duration = 4.0 * ricker(omega, amplitude).period + 3.0
-    beside = {"wall": ("left", gap, e), "duration": duration, "output_step": 0.001}
-    scene = pulse_scene(omega, amplitude, mu, **beside)
+    ends = {"duration": 4.0 * ricker(omega, amplitude).period + 3.0, "output_step": 0.001}
+    scene = pulse_scene(omega, amplitude, mu, ("left", gap, e), **ends)
     assert rms(ContinuousModel().simulate(scene), rigid(scene)) < 1e-3
 
 

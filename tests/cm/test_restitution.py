@@ -5,24 +5,28 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.cm import ContinuousModel, measured_restitution
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    EventBasedModel,
+    Floor,
+    Scene,
+    Wall,
+    measured_restitution,
+)
 from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Block, Floor, InputError, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
 def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change):
-    walls = [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)]
-    floor = Floor(friction=friction, restitution=floor)
     return Scene(
         **{
             "name": "strike",
             "block": PAPER_BLOCK,
-            "floor": floor,
-            "walls": walls,
+            "floor": Floor(friction=friction, restitution=floor),
+            "walls": [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)],
             "duration": 0.7,
             "output_step": 0.001,
         }
@@ -75,8 +79,8 @@ def test_floor_and_wall_have_the_restitution_asked_for(struck, case, e):
     strike = scene(**{struck: e} | (FLOOR | WALL)[case])
     assert measured_restitution(ContinuousModel(), strike) == pytest.approx(e, abs=1e-3)
     if case in ("rocking block", "top corner"):
-        soft = ContinuousModel(penetration=1e-6)
-        assert measured_restitution(soft, strike) == pytest.approx(e, abs=0.01)
+        soft = measured_restitution(ContinuousModel(penetration=1e-6), strike)
+        assert soft == pytest.approx(e, abs=0.01)
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)
@@ -91,9 +95,8 @@ def test_paper_rule_misses_as_its_formula_says(e):
     )
 
 
-def test_scene_without_an_impact_has_no_restitution():
-    with pytest.raises(InputError, match="strikes"):
-        measured_restitution(ContinuousModel(), scene())
+def test_scene_without_an_impact_has_no_restitution(fault_of):
+    assert "strikes" in str(fault_of(measured_restitution, ContinuousModel(), scene()))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
@@ -101,23 +104,21 @@ def test_scene_without_an_impact_has_no_restitution():
 def test_both_corners_of_a_side_leave_as_asked_wherever_the_mass_lies(e, side):
     """A side that strikes a wall flat leaves as flat, whatever the stiffness: unlike springs do not
     turn the block."""
-    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.0, 0.3))
-    toward = -0.6 if side == "left" else 0.6
     strikes = scene(
         wall=e,
         gap=0.02,
         side=side,
         friction=0.2,
-        block=block,
-        initial_velocity=toward,
+        block=Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.0, 0.3)),
+        initial_velocity=-0.6 if side == "left" else 0.6,
         duration=0.1,
     )
     history = ContinuousModel(penetration=1e-10).simulate(strikes)
-    speed = math.sqrt(0.6**2 - 2.0 * 0.2 * 9.81 * 0.02)
     assert np.max(np.abs(history.channels["theta_dot"])) < 1e-4
     if e:
         struck = next(event.t for event in history.event_list if event.kind == "wall impact")
         row = math.ceil(struck / strikes.output_step) + 1
+        speed = math.sqrt(0.6**2 - 2.0 * 0.2 * 9.81 * 0.02)
         left = abs(history.channels["x_dot"][row]) + 0.2 * 9.81 * (
             row * strikes.output_step - struck
         )

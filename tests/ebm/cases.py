@@ -43,24 +43,39 @@ def pulse_scene(
     **more: Any,
 ) -> Scene:
     """The paper's block under a Ricker pulse, perhaps beside a wall: its side, gap, restitution."""
-    walls = [dict(zip(("side", "gap", "restitution"), wall, strict=True))] if wall else []
-    fields = {
-        "name": "pulse",
-        "block": PAPER_BLOCK,
-        "floor": Floor(friction=mu),
-        "walls": walls,
-        "excitation": ricker(frequency, amplitude),
-        "duration": 5.0,
-    }
-    return Scene(**fields | more)
+    return Scene(
+        **{
+            "name": "pulse",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=mu),
+            "walls": [dict(zip(("side", "gap", "restitution"), wall, strict=True))] if wall else [],
+            "excitation": ricker(frequency, amplitude),
+            "duration": 5.0,
+        }
+        | more
+    )
+
+
+def free_rocking(tilt: float, **more: Any) -> Scene:
+    """The paper's block from a tilt, given in alpha, on a floor that holds the pivot."""
+    return Scene(
+        **{
+            "name": "free rocking",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=1.0),
+            "initial_rotation": tilt * PAPER_BLOCK.alpha,
+            "duration": 4.0,
+        }
+        | more
+    )
 
 
 def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
     """The scene of a run, up to a time after its pulse."""
     frequency, amplitude, mu = (float(row[name]) for name in ("wp_over_p", "ap_ratio", "mu"))
     wall = (row["side"], float(row["gap"]), float(row["e_w"])) if row["gap"] else None
-    duration = 4.0 * ricker(frequency, amplitude).period + rest
-    return pulse_scene(frequency, amplitude, mu, wall, duration=duration, **more)
+    ends = 4.0 * ricker(frequency, amplitude).period + rest
+    return pulse_scene(frequency, amplitude, mu, wall, duration=ends, **more)
 
 
 def peak_errors(
@@ -115,11 +130,10 @@ def places(block: Block, theta: float, sense: int, case: int) -> tuple[np.ndarra
 
 def random_scene(rng: np.random.Generator) -> Scene:
     b, h = rng.uniform(0.1, 0.5), rng.uniform(0.4, 1.5)
-    place = (rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h)
     block = Block(
         half_width=b,
         half_height=h,
-        centre_of_mass=place,
+        centre_of_mass=(rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h),
         moment_of_inertia=rng.uniform(0.2, 0.5) * (b * b + h * h),
     )
     mu = rng.uniform(0.1, 0.9) * block.least_painleve_friction

@@ -137,27 +137,19 @@ class PaperModel:
             return rock
         if not closed:
             return self.with_sense(Mode(S, -sign(Q)), t, y)
-        found = [
-            ladder
-            for ladder in (Mode(S, 1, Sw), Mode(S, -1, Sw))
-            if self.starts_down_the_wall(ladder, t, y)
-        ]
-        found += [
-            sliding
-            for sliding in (Mode(S, 1), Mode(S, -1))
-            if self.starts_off_the_wall(sliding, t, y)
-        ]
+        slips = (Mode(S, 1, Sw), Mode(S, -1, Sw), Mode(S, 1), Mode(S, -1))
+        found = [mode for mode in slips if self.starts(mode, t, y)]
         assert len(found) == 1, found
         return found[0]
 
     def C(self, S: int, y: State) -> float:
         return S * self.side * math.cos(self.alpha + abs(y[1]))
 
-    def starts_down_the_wall(self, m: Mode, t: float, y: State) -> bool:
-        _, turn, _, _, N = self.motion(m, t, y)
-        return m.d * turn > 0.0 and N >= 0.0
-
-    def starts_off_the_wall(self, m: Mode, t: float, y: State) -> bool:
+    def starts(self, m: Mode, t: float, y: State) -> bool:
+        """Whether a slip from rest, down the wall or off it, begins as its mode says."""
+        if m.Sw:
+            _, turn, _, _, N = self.motion(m, t, y)
+            return m.d * turn > 0.0 and N >= 0.0
         return m.d * self.slip_rate_change(m, t, y) > 0.0 and self.gap_change(m, t, y) > 0.0
 
     def with_sense(self, m: Mode, t: float, y: State) -> Mode:
@@ -175,15 +167,14 @@ class PaperModel:
             out["release"] = lambda t, y: self.motion(m, t, y)[4]
         elif self.wall:
             out["wall impact"] = lambda t, y: self.gap(y)
-        if not m.d:
+        if m.d:
+            out["stick"] = lambda t, y: m.d * self.slip(y)
+        else:
             out["slip"] = lambda t, y: (
                 self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
             )
-        elif not m.Sw:
-            out["stick"] = lambda t, y: m.d * self.slip(y)
+        if m.d and not m.Sw:
             out["sense"] = lambda t, y: m.sense * self.motion(m, t, y)[2]
-        else:
-            out["stick"] = lambda t, y: m.d * self.slip(y)
         return out
 
     def impact(
@@ -320,10 +311,8 @@ class PaperModel:
             y, stays = self.hit_wall(mode, y)
             return self.tilted(t, y, closed=stays), y
         if kind == "stick":
-            c = math.cos(self.alpha - abs(y[1]))
-            if mode.Sw:
-                y = np.array([y[0], y[1], 0.0, 0.0])
-            y = np.array([y[0], y[1], -self.R * c * y[3], y[3]])
+            w = 0.0 if mode.Sw else y[3]
+            y = np.array([y[0], y[1], -self.R * math.cos(self.alpha - abs(y[1])) * w, w])
             return self.tilted(t, y, closed=mode.Sw != 0), y
         if kind == "slip":
             Q = self.motion(mode, t, y)[3]
@@ -338,24 +327,15 @@ class PaperModel:
         return np.array([y[0], y[1], y[2] - V, y[3]]) if abs(V) < 1e-12 else y
 
     def step(self, m: Mode, t: float, y: State) -> tuple[float, State, str]:
-        def rates(t: float, y: State) -> list[float]:
-            x2, turn, _, _, _ = self.motion(m, t, y)
-            return [y[2], y[3], x2, turn]
-
         named = self.guards(m)
         for function in named.values():
             function.terminal, function.direction = True, -1.0  # type: ignore[attr-defined]
-        ends = [self.scene.duration]
-        excitation = self.scene.excitation
-        if isinstance(excitation, Record):  # stop at the samples, where the motion has kinks
-            ends = [
-                s
-                for s in excitation.time_step * np.arange(1, len(excitation.unscaled))
-                if s > t + 1e-12 and s < ends[0]
-            ] + ends
-        for end in ends:
+        last, record, kinks = self.scene.duration, self.scene.excitation, np.empty(0)
+        if isinstance(record, Record):  # stop at the samples, where the motion has kinks
+            kinks = record.time_step * np.arange(1, len(record.unscaled))
+        for end in (*kinks[(kinks > t + 1e-12) & (kinks < last)], last):
             run = solve_ivp(
-                rates,
+                lambda t, y: [y[2], y[3], *self.motion(m, t, y)[:2]],
                 (t, end),
                 y,
                 method="DOP853",

@@ -136,10 +136,15 @@ class Core:
         if not selected or run.state.rules[Rule.LEAST_CONTRADICTION]:
             return None
         mode = run.state.mode
-        floor = {Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot]
-        at = (bool(mode.tip), bool(mode.far))
-        tilted = bool(mode.family == Family.TILT)
-        return Mode(tilted, int(mode.sense), floor, int(mode.slip), int(mode.pull), *at)
+        return Mode(
+            tilted=bool(mode.family == Family.TILT),
+            side=int(mode.sense),
+            floor={Pivot.OFF: "off", Pivot.STICK: "stick", Pivot.SLIPPING: "slip"}[mode.pivot],
+            slip=int(mode.slip),
+            pull=int(mode.pull),
+            tip=bool(mode.tip),
+            far=bool(mode.far),
+        )
 
     def guards(self, mode: Mode, state) -> tuple[dict[str, Polynomial], dict[str, Polynomial]]:
         """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
@@ -278,8 +283,9 @@ def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, t
         if gap < 0.0:
             xi += wall * (gap - 0.01)
             gap = 0.01
-        toward = side if touch == "tip" else -side
-        walls = (Wall(side="left" if toward > 0 else "right", gap=gap),)
+        walls = (
+            Wall(side="left" if (side if touch == "tip" else -side) > 0 else "right", gap=gap),
+        )
         v = (wall * cp + c) * w  # along the wall
     state = (side * xi, c, side * phi, side * (v - c * w), s * w, side * w)
     # 0.3 g to 2 g, seldom a floor that falls away

@@ -9,6 +9,7 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
+from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
 from rockcheck.ebm.packed import pack, state_for
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
@@ -41,8 +42,13 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     """The state after the compiled loop has played the scene, without rows."""
     packed = pack([scene], model)
     states = state_for(model, model.most_steps)
-    records = Records(*(part[None] for part in nothing()))
-    march.play(packed.rows, states, work or workspace(), records, np.empty(1, FOUND))
+    march.play(
+        packed.rows,
+        states,
+        work or workspace(),
+        Records(*(part[None] for part in nothing())),
+        np.empty(1, FOUND),
+    )
     return states[0]
 
 
@@ -53,6 +59,13 @@ def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) ->
     assert np.min(kinematics.pivot_height(scene.block, y, theta)) > -reach
     for wall in scene.walls:
         assert np.min(kinematics.wall_gap(scene, wall.side, x, theta)) > -reach
+
+
+def row_of(coefficients: Sequence[float]) -> np.ndarray:
+    """The terms of a series, and behind them what must not be seen."""
+    row = np.full((1, WIDTH), np.nan)
+    row[0, : len(coefficients)] = coefficients
+    return row
 
 
 TILTED = {"family": Family.TILT, "pull": 1}
@@ -71,8 +84,12 @@ def setting_of(
     **how: Any,
 ) -> Any:
     """A block, or one of R = 1 m and this alpha, as the compiled code has it: free to hop."""
-    shape = block if isinstance(block, Block) else block_of(block)
-    floor = Floor(friction=friction, restitution=restitution)
-    scene = Scene(name="block", block=shape, floor=floor, walls=walls, duration=1.0)
+    scene = Scene(
+        name="block",
+        block=block if isinstance(block, Block) else block_of(block),
+        floor=Floor(friction=friction, restitution=restitution),
+        walls=walls,
+        duration=1.0,
+    )
     free = {"unilateral": True, "no_slip": False, "energy_cap": False}
     return natural.setting_of(scene, **free | how)

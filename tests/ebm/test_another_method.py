@@ -11,8 +11,7 @@ import pytest
 from cases import pulse_scene
 from paper_model import PaperModel
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floor, Sine, load_scene
+from rockcheck import EventBasedModel, Floor, Sine, load_scene
 
 SCENES = [
     pulse_scene(2.0, 1.1, 1.0, name="rocking"),

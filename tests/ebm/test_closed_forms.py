@@ -44,8 +44,8 @@ def quarter_period(block: Block, tilt: float) -> float:
 
 
 def first_impact(scene: Scene, **settings: object) -> float:
-    history = EventBasedModel(tolerance=1e-13, **settings).simulate(scene)
-    return next(e.t for e in history.event_list if e.kind == "floor impact")
+    events = EventBasedModel(tolerance=1e-13, **settings).simulate(scene).event_list
+    return next(e.t for e in events if e.kind == "floor impact")
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
@@ -74,8 +74,9 @@ def test_quarter_period_of_a_needle_is_housners(tilt):
 def test_energy_is_conserved_between_impacts_and_falls_by_housners_ratio(tilt, pivot, block):
     """Angular velocity after over before an impact, 1 - 1.5 sin^2 alpha, from the energy of the
     rows around it."""
-    scene = block_scene(block, 1.0, duration=10.0, initial_rotation=tilt * block.alpha)
-    history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(scene)
+    history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(
+        block_scene(block, 1.0, duration=10.0, initial_rotation=tilt * block.alpha)
+    )
     motion = history.channels
     energy = kinematics.energy(
         block, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
@@ -91,9 +92,10 @@ def test_energy_is_conserved_between_impacts_and_falls_by_housners_ratio(tilt, p
         assert ratio == pytest.approx(1.0 - 1.5 * math.sin(block.alpha) ** 2, abs=1e-12)
 
 
+@pytest.mark.parametrize("factor", [1.0 - 1e-9, 1.0 + 1e-9])
 @pytest.mark.parametrize("ratio", [1.05, 1.5, 3.0, 10.0])
 @pytest.mark.parametrize("alpha", [0.05, 0.25, 0.5])
-def test_least_rectangular_pulse_that_overturns(alpha, ratio):
+def test_least_rectangular_pulse_that_overturns(alpha, ratio, factor):
     """A constant acceleration of `ratio` g tan(alpha) overturns if it lasts longer than a time that
     energy gives.
 
@@ -119,11 +121,10 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio):
         r = a / (G * alpha)
         housner = math.acosh(1.0 + 0.5 / (r * (r - 1.0))) / math.sqrt(0.75 * G / block.radius)
         assert least == pytest.approx(housner, rel=2.0 * alpha**2)
-    model = EventBasedModel(tolerance=1e-13, friction="no-slip")
-    for factor in (1.0 - 1e-9, 1.0 + 1e-9):
-        pulse = Record.from_samples([a, a], time_step=factor * least)
-        scene = block_scene(block, 1.0, duration=60.0, excitation=pulse, output_step=1.0)
-        assert (model.simulate(scene).outcome == "overturned left") is (factor > 1.0)
+    pulse = Record.from_samples([a, a], time_step=factor * least)
+    scene = block_scene(block, 1.0, duration=60.0, excitation=pulse, output_step=1.0)
+    history = EventBasedModel(tolerance=1e-13, friction="no-slip").simulate(scene)
+    assert (history.outcome == "overturned left") is (factor > 1.0)
 
 
 # --- sliding and bouncing
@@ -150,10 +151,15 @@ def test_bounce_heights(restitution, block):
     """A flat drop from h rises to e^(2n) h after its n-th bounce, and hits the floor when a ball
     would."""
     drop = 0.1
-    scene = block_scene(block, 0.5, duration=3.0, initial_height=drop, output_step=0.005).replace(
-        floor=Floor(friction=0.5, restitution=restitution)
+    history = EventBasedModel(pivot="unilateral").simulate(
+        block_scene(
+            block,
+            floor=Floor(friction=0.5, restitution=restitution),
+            duration=3.0,
+            initial_height=drop,
+            output_step=0.005,
+        )
     )
-    history = EventBasedModel(pivot="unilateral").simulate(scene)
     motion = history.channels
     height = motion["y_dot"] ** 2 / (2.0 * G) + motion["y"] - block.half_height
     rises = restitution ** np.arange(5)
@@ -178,11 +184,13 @@ class Lagrangian:
     """
 
     def __init__(self, block: Block, side: str) -> None:
-        dx, dz = block.offset
         corner = np.array(
             [-block.half_width if side == "left" else block.half_width, -block.half_height]
         )
-        self.arm, self.inertia = np.array([dx, dz]) - corner, block.moment_of_inertia / block.mass
+        self.arm, self.inertia = (
+            np.array(block.offset) - corner,
+            block.moment_of_inertia / block.mass,
+        )
         self.sense = 1.0 if side == "left" else -1.0
 
     def place(self, theta: float, turns: int = 0) -> np.ndarray:
@@ -225,9 +233,8 @@ def rocking_by_lagrange(scene: Scene) -> Callable[[np.ndarray], np.ndarray]:
             return float(q[0])
 
         lands.terminal, lands.direction = True, -body.sense  # type: ignore[attr-defined]
-        motion = body.motion(lambda t: float(scene.excitation.acceleration(t)))
         found = solve_ivp(
-            motion,
+            body.motion(lambda t: float(scene.excitation.acceleration(t))),
             (t, scene.duration),
             [theta, w],
             "DOP853",
@@ -266,15 +273,18 @@ def test_free_rocking_is_lagranges(tilt, pivot):
     first, second, *_ = (event.t for event in history.event_list if event.kind == "floor impact")
     assert np.ptp(energy[c["t"] < first]) < 1e-11
     assert np.ptp(energy[(c["t"] > first) & (c["t"] < second)]) < 1e-11
-    begins = Lagrangian(RACK, "left" if tilt > 0 else "right").energy(tilt, 0.0)
-    assert energy[0] == pytest.approx(begins, abs=1e-12)
+    body = Lagrangian(RACK, "left" if tilt > 0 else "right")
+    assert energy[0] == pytest.approx(body.energy(tilt, 0.0), abs=1e-12)
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_pulse_is_lagranges(sense):
     """Rocking on both pivots and landings under a pulse, to 1e-8 rad."""
-    pulse = Sine(amplitude=sense * 6.0, period=0.7)
-    scene = block_scene(duration=1.4, excitation=pulse, initial_rotation=-0.05 * sense)
+    scene = block_scene(
+        duration=1.4,
+        excitation=Sine(amplitude=sense * 6.0, period=0.7),
+        initial_rotation=-0.05 * sense,
+    )
     c = EventBasedModel(friction="no-slip", tolerance=1e-13).simulate(scene).channels
     assert min(np.max(c["theta"]), -np.min(c["theta"])) > 0.02
     np.testing.assert_allclose(c["theta"], rocking_by_lagrange(scene)(c["t"]), rtol=0.0, atol=1e-8)
@@ -308,8 +318,11 @@ def test_uplift_at_the_least_acceleration_of_each_side(sense, mu, settings):
     """On a base whose acceleration rises evenly the block leaves the floor where it passes g tan
     alpha of that side's pivot, whatever its friction if it cannot slip."""
     side = RACK.pivot("left" if sense > 0.0 else "right")
-    ramp = Record.from_samples(sense * np.linspace(0.0, 0.6 * G, 601), 0.01)
-    scene = block_scene(mu=mu, duration=6.0, excitation=ramp)
+    scene = block_scene(
+        mu=mu,
+        duration=6.0,
+        excitation=Record.from_samples(sense * np.linspace(0.0, 0.6 * G, 601), 0.01),
+    )
     uplift = EventBasedModel(tolerance=1e-12, **settings).simulate(scene).event_list[0]
     assert uplift.kind == "uplift"
     assert uplift.t == pytest.approx(side.arm / side.height / 0.6 * 6.0, abs=1e-9)

@@ -89,8 +89,8 @@ def test_error_estimate_is_the_error():
     """`cost.error_estimate` (in alpha) is the distance to a tighter run, hence the error to within
     a factor of two."""
     scene = pulse_scene(4.5, 4.0, 0.3)
-    model = EventBasedModel(tolerance=1e-7, estimate_error=True)
-    estimated, truth = model.simulate(scene), EventBasedModel(tolerance=1e-14).simulate(scene)
+    estimated = EventBasedModel(tolerance=1e-7, estimate_error=True).simulate(scene)
+    truth = EventBasedModel(tolerance=1e-14).simulate(scene)
     apart = estimated.channels["theta"] - truth.channels["theta"]
     error = np.max(np.abs(apart)) / scene.block.alpha
     assert 0.5 * error <= estimated.cost.error_estimate <= 2.0 * error
@@ -115,13 +115,12 @@ def test_a_run_leaves_no_trace(pivot):
 def test_compiled_scratch_is_scratch():
     scene = pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0))
     model = EventBasedModel(pivot="unilateral")
-    found = []
+    found = set()
     for filling in (0.0, np.nan, 1e300):
-        a, stack = workspace()
-        a[:], stack[:] = filling, filling
-        end = play(scene, model, (a, stack))
-        found.append((end.peak, end.steps, end.events, end.t, *six(end.motion)))
-    assert found[0] == found[1] == found[2]
+        work = tuple(np.full_like(array, filling) for array in workspace())
+        end = play(scene, model, work)
+        found.add((end.peak, end.steps, end.events, end.t, *six(end.motion)))
+    assert len(found) == 1, found
 
 
 @pytest.mark.parametrize(
@@ -140,28 +139,26 @@ def test_a_cap_ends_in_a_failure(cap, said):
 UNILATERAL = EventBasedModel(pivot="unilateral", tolerance=1e-9)
 
 
-@pytest.fixture(scope="module")
-def scenes() -> list[Scene]:
-    """Blocks of four sizes, at rest, moving and fallen in the end."""
-    return [
-        Scene(
-            name=f"{size} {amplitude}",
-            block=Block(half_width=0.397 * size, half_height=1.555 * size),
-            floor=Floor(friction=0.4),
-            walls=[Wall(side="left", gap=0.053, restitution=0.5)],
-            excitation=Ricker(amplitude=amplitude, period=1.2),
-            duration=4.0,
-            output_step=0.02,
-        )
-        for size in (0.25, 0.5, 1.0, 1.7)
-        for amplitude in (3.0, 5.0, 7.0, 14.0)
-    ]
+#: Blocks of four sizes, at rest, moving and fallen in the end.
+ENSEMBLE = [
+    Scene(
+        name=f"{size} {amplitude}",
+        block=Block(half_width=0.397 * size, half_height=1.555 * size),
+        floor=Floor(friction=0.4),
+        walls=[Wall(side="left", gap=0.053, restitution=0.5)],
+        excitation=Ricker(amplitude=amplitude, period=1.2),
+        duration=4.0,
+        output_step=0.02,
+    )
+    for size in (0.25, 0.5, 1.0, 1.7)
+    for amplitude in (3.0, 5.0, 7.0, 14.0)
+]
 
 
-def test_as_one_at_a_time(scenes):
-    found = play_ensemble(scenes, UNILATERAL, rows=1000, jobs=3)
+def test_as_one_at_a_time():
+    found = play_ensemble(ENSEMBLE, UNILATERAL, rows=1000, jobs=3)
     assert {-1, 0, 1} >= set(found.side.tolist()) > {0}
-    for i, scene in enumerate(scenes):
+    for i, scene in enumerate(ENSEMBLE):
         history = UNILATERAL.simulate(scene)
         theta = history.channels["theta"]
         assert np.array_equal(found.t[: len(theta)], history.channels["t"])
@@ -177,17 +174,22 @@ def test_as_one_at_a_time(scenes):
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
-def test_threads_change_nothing(scenes, jobs):
+def test_threads_change_nothing(jobs):
     once, again = (
-        play_ensemble(scenes, UNILATERAL, rows=50),
-        play_ensemble(scenes * 5, UNILATERAL, rows=50, jobs=jobs),
+        play_ensemble(ENSEMBLE, UNILATERAL, rows=50),
+        play_ensemble(ENSEMBLE * 5, UNILATERAL, rows=50, jobs=jobs),
     )
     assert np.array_equal(np.tile(once.theta, (5, 1)), again.theta)
     assert np.array_equal(np.tile(once.peak, 5), again.peak)
 
 
-def test_what_fails_is_told(scenes):
-    with pytest.raises(ModelFailure, match="scene 0 of the ensemble: the cap on steps was reached"):
-        play_ensemble(scenes, UNILATERAL.model_copy(update={"most_steps": 3}))
-    with pytest.raises(InputError, match="Coulomb"):
-        play_ensemble(scenes, EventBasedModel(friction="bouc-wen"))
+@pytest.mark.parametrize(
+    ("settings", "error", "said"),
+    [
+        ({"most_steps": 3}, ModelFailure, "scene 0 of the ensemble: the cap on steps was reached"),
+        ({"friction": "bouc-wen"}, InputError, "Coulomb"),
+    ],
+)
+def test_what_fails_is_told(settings, error, said):
+    with pytest.raises(error, match=said):
+        play_ensemble(ENSEMBLE, EventBasedModel(**settings))

@@ -7,20 +7,14 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, packed
-from rockcheck.scenes import Floor, InputError, Record, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.progress import one_run
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-
-def scene_of(**change: object) -> Scene:
-    rest = {
-        "name": "model",
-        "block": PAPER_BLOCK,
-        "floor": Floor(friction=0.3),
-        "excitation": Rest(),
-        "duration": 1.0,
-    }
-    return Scene(**(rest | change))
+#: A scene with what is changed in it.
+scene_of = Scene(
+    name="model", block=PAPER_BLOCK, floor=Floor(friction=0.3), excitation=Rest(), duration=1.0
+).replace
 
 
 @pytest.mark.parametrize(
@@ -55,12 +49,9 @@ def scene_of(**change: object) -> Scene:
         ),
     ],
 )
-def test_physics_that_is_refused(settings, change, said):
+def test_physics_that_is_refused(fault_of, settings, change, said):
     model = EventBasedModel(**settings)
-    with pytest.raises(InputError) as fault:
-        model.simulate(scene_of(**change))
-    assert str(fault.value).startswith(said)
-    assert "\n" not in str(fault.value)
+    assert str(fault_of(model.simulate, scene_of(**change))).startswith(said)
 
 
 @pytest.mark.parametrize(
@@ -77,11 +68,8 @@ def test_physics_that_is_refused(settings, change, said):
         ({"tol": 1e-8}, "tol"),
     ],
 )
-def test_settings_that_are_refused(settings, key):
-    with pytest.raises(InputError) as fault:
-        EventBasedModel(**settings)
-    assert fault.value.key == key
-    assert "\n" not in str(fault.value)
+def test_settings_that_are_refused(fault_of, settings, key):
+    assert fault_of(EventBasedModel, **settings).key == key
 
 
 def test_history_of_a_paper_scene():
@@ -96,7 +84,6 @@ def test_history_of_a_paper_scene():
     assert events["t"].is_monotonic_increasing
     assert events["kind"].iloc[0] == "uplift"
     assert (events["impulse"] >= 0.0).all()
-    assert (events.loc[events["kind"] == "floor impact", "impulse"] > 0.0).all()
     assert history.cost.evaluations >= history.cost.steps > 0
     assert history.settings == EventBasedModel().model_dump()
 
@@ -140,9 +127,9 @@ def test_note_where_a_record_is_short():
     record = Record.from_samples(np.full(11, 0.2), time_step=0.1)
     model = EventBasedModel()
     assert model.simulate(scene_of(excitation=record, duration=0.9)).notes == ()
-    notes = model.simulate(scene_of(excitation=record, vertical=record, duration=2.0)).notes
     ends = "record ends at 1 s, before the scene's 2 s; the base is at rest after it"
-    assert notes == (f"the horizontal {ends}", f"the vertical {ends}")
+    both = scene_of(excitation=record, vertical=record, duration=2.0)
+    assert model.simulate(both).notes == (f"the horizontal {ends}", f"the vertical {ends}")
 
 
 @pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
@@ -166,11 +153,11 @@ def test_overturning_ends_the_history(tilt, spin, settings, side, sign):
     assert {len(channel) for channel in history.channels.values()} == {len(t)}
 
 
-def test_events_of_a_flight_are_not_floor_impacts():
+@pytest.mark.parametrize(("pivot", "name"), [("bilateral", "fig4a"), ("unilateral", "fig5b")])
+def test_events_of_a_flight_are_not_floor_impacts(pivot, name):
     """A floor impact has an impulse. A block that flies through theta = 0 strikes nothing."""
-    history = EventBasedModel(pivot="unilateral").simulate(load_scene("fig5b"))
-    impacts = [e.impulse for e in history.event_list if e.kind in ("floor impact", "wall impact")]
-    assert min(impacts) > 0.0
+    events = EventBasedModel(pivot=pivot).simulate(load_scene(name)).event_list
+    assert min(e.impulse for e in events if e.kind in ("floor impact", "wall impact")) > 0.0
 
 
 @pytest.mark.parametrize("mu", [0.0, 1e-12])
@@ -178,8 +165,9 @@ def test_events_of_a_flight_are_not_floor_impacts():
 def test_ice(pivot, mu):
     """On a floor without friction the centroid keeps its place above the shaking ground: x =
     -(ground displacement)."""
-    record = Record.from_samples([1.0, 1.0], time_step=2.0)
-    scene = scene_of(floor=Floor(friction=mu), excitation=record)
+    scene = scene_of(
+        floor=Floor(friction=mu), excitation=Record.from_samples([1.0, 1.0], time_step=2.0)
+    )
     motion = EventBasedModel(pivot=pivot).simulate(scene).channels
     np.testing.assert_allclose(motion["x"], -0.5 * motion["t"] ** 2, rtol=0.0, atol=1e-10)
 
@@ -188,10 +176,13 @@ def test_ice(pivot, mu):
 def test_restitution_of_one_and_walls_that_touch(pivot):
     """A block that slides to and fro between elastic walls on ice keeps its speed, and hits them
     when it must."""
-    gaps = {"left": 0.1, "right": 0.3}
-    walls = [Wall(side=side, gap=gap, restitution=1.0) for side, gap in gaps.items()]
-    scene = scene_of(floor=Floor(friction=0.0), walls=walls, initial_velocity=1.0, duration=2.0)
-    history = EventBasedModel(pivot=pivot).simulate(scene)
+    walls = [
+        Wall(side="left", gap=0.1, restitution=1.0),
+        Wall(side="right", gap=0.3, restitution=1.0),
+    ]
+    history = EventBasedModel(pivot=pivot).simulate(
+        scene_of(floor=Floor(friction=0.0), walls=walls, initial_velocity=1.0, duration=2.0)
+    )
     hits = [e.t for e in history.event_list if e.kind == "wall impact"]
     np.testing.assert_allclose(hits, [0.3, 0.7, 1.1, 1.5, 1.9], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(np.abs(history.channels["x_dot"]), 1.0, rtol=0.0, atol=1e-12)

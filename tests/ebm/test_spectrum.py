@@ -12,7 +12,7 @@ from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
-from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
+from rockcheck.scenes import Floor, Record, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
@@ -20,13 +20,12 @@ SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 
 def scene(*walls, friction=0.3, excitation=None):
-    pulse = excitation or Ricker(amplitude=1.0, period=1.0)
     return Scene(
         name="spectrum",
         block=PAPER_BLOCK,
         floor=Floor(friction=friction),
         walls=walls,
-        excitation=pulse,
+        excitation=excitation or Ricker(amplitude=1.0, period=1.0),
         duration=1.0,
     )
 
@@ -62,52 +61,45 @@ def test_refinement_finds_the_full_grid_where_the_boundary_is_smooth(walls):
     assert refined.evaluations < 0.35 * full.evaluations
 
 
-def disc(a, f):
-    return np.hypot(a - 5.0, f - 5.0) < 3.0
-
-
-def tongue(a, f):
-    return (a < 2.0) | (np.abs(a - f) < 0.05)
-
-
-def hair(a, f):
-    """64 dots: of some 180 columns that it crosses."""
-    return (a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0))
+#: Where a block falls, by amplitude and frequency. The hair has 64 dots: of some 180 columns that
+#: it crosses.
+SHAPES = {
+    "disc": lambda a, f: np.hypot(a - 5.0, f - 5.0) < 3.0,
+    "tongue": lambda a, f: (a < 2.0) | (np.abs(a - f) < 0.05),
+    "hair": lambda a, f: (a < 2.0) | ((np.abs(a - 1.5 - 0.36 * f) < 0.006) & (a < 4.0)),
+}
 
 
 @pytest.mark.parametrize(
-    ("shape", "grid", "share"),
+    ("name", "grid", "share"),
     [
-        (disc, (257, 257), 0.12),
-        (disc, (100, 130), 1.0),
-        (disc, (9, 8), 1.0),
-        (disc, (2, 2), 1.0),
-        (tongue, (257, 257), 0.15),
-        (hair, (257, 257), 0.999),
+        ("disc", (257, 257), 0.12),
+        ("disc", (100, 130), 1.0),
+        ("disc", (9, 8), 1.0),
+        ("disc", (2, 2), 1.0),
+        ("tongue", (257, 257), 0.15),
+        ("hair", (257, 257), 0.999),
     ],
 )
-def test_refinement_finds_all_of_a_shape(shape, grid, share):
+def test_refinement_finds_all_of_a_shape(name, grid, share):
     """A thin tongue to its tip, and the dots of a hair, without a node played twice."""
     amplitudes, frequencies = (np.linspace(1.0, 9.0, n) for n in grid)
     played = []
 
     def play(scene, a, f):
         played.extend(zip(a.tolist(), f.tolist(), strict=True))
-        return shape(a, f).astype(np.int8), np.zeros(len(a), dtype=bool)
+        return SHAPES[name](a, f).astype(np.int8), np.zeros(len(a), dtype=bool)
 
     spectrum = overturning_spectrum(scene(), frequencies, amplitudes, refine=True, play=play)
-    full = shape(*np.broadcast_arrays(amplitudes[:, None], frequencies))
-    assert shape is not hair or np.count_nonzero(full[amplitudes >= 2.0]) == 64
+    full = SHAPES[name](*np.broadcast_arrays(amplitudes[:, None], frequencies))
+    assert name != "hair" or np.count_nonzero(full[amplitudes >= 2.0]) == 64
     np.testing.assert_array_equal(spectrum.outcomes, full)
     assert spectrum.evaluations == len(played) == len(set(played)) <= share * full.size
 
 
 def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
-    a, f, model = (
-        np.array([2.0, 4.0, 6.0]),
-        np.array([1.0, 2.0, 2.0]),
-        EventBasedModel(tolerance=1e-8),
-    )
+    a, f = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 2.0])
+    model = EventBasedModel(tolerance=1e-8)
     whole, _ = play_nodes(scene(), a, f, model=model)
     run, tolerances = batch.run_batch, []
 
@@ -119,10 +111,8 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
         return found
 
     monkeypatch.setattr(batch, "run_batch", failing)
-    sides, failed = play_nodes(scene(), a, f, model=model)
+    np.testing.assert_array_equal(play_nodes(scene(), a, f, model=model), [whole, np.zeros(3)])
     assert tolerances == [(3, 1e-8), (1, 1e-10)]
-    assert not failed.any()
-    np.testing.assert_array_equal(sides, whole)
     assert whole[1] != 0
 
 
@@ -139,9 +129,7 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
         np.array([0.5 + 7.5 * j / 99 for j in (17, 19, 20)]),
     )
     for beside, sign in ((scene(wall), 1.0), (scene(wall).mirrored(), -1.0)):
-        sides, failed = play_nodes(beside, sign * a, f, model=model)
-        assert not failed.any()
-        assert not sides.any()
+        np.testing.assert_array_equal(play_nodes(beside, sign * a, f, model=model), 0)
     nodes = [node_scene(scene(wall), *node, settle=300.0) for node in zip(a, f, strict=True)]
     early = batch.run_batch(batch.pack(nodes, model), model)
     fine = EventBasedModel(tolerance=1e-13)
@@ -173,16 +161,15 @@ def decided_early(scenes, tolerance, **near):
 
 def grid_beside(wall, most):
     """Scenes of a grid of pulses beside a wall."""
-    axes = np.meshgrid(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
-    nodes = zip(*map(np.ravel, axes), strict=True)
+    nodes = itertools.product(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
     return [node_scene(scene(wall), *node, settle=60.0) for node in nodes]
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
 def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
-    """Beside walls that return nearly all."""
-    wall = Wall(side="right", gap=0.053, restitution=restitution)
-    decided_early(grid_beside(wall, 9.0), 1e-9, rtol=1e-6)
+    decided_early(
+        grid_beside(Wall(side="right", gap=0.053, restitution=restitution), 9.0), 1e-9, rtol=1e-6
+    )
 
 
 def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
@@ -197,8 +184,8 @@ def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
 def test_what_is_decided_early_of_loaded_blocks():
     rng = np.random.default_rng(13)
     scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
-    early = decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11)
-    assert {-1, 0, 1} == set(early.side.tolist())
+    sides = decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11).side.tolist()
+    assert {-1, 0, 1} == set(sides)
 
 
 def test_a_record_is_scaled_and_the_block_resized():
@@ -238,8 +225,13 @@ def test_motions_at_nodes_are_those_that_the_model_simulates():
 
 
 def test_a_motion_that_fails_is_none():
-    model = EventBasedModel(tolerance=1e-8, most_steps=5)
-    assert play_motions(scene(), np.array([4.0]), np.array([2.0]), model=model, parts=10) == [None]
+    assert play_motions(
+        scene(),
+        np.array([4.0]),
+        np.array([2.0]),
+        model=EventBasedModel(tolerance=1e-8, most_steps=5),
+        parts=10,
+    ) == [None]
 
 
 def test_least_overturning_amplitude_and_area():
@@ -267,6 +259,5 @@ STILL = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), durati
         (STILL, [1.0], [1.0], "ricker or sine pulse, or a record"),
     ],
 )
-def test_what_has_no_spectrum(start, frequencies, amplitudes, said):
-    with pytest.raises(InputError, match=said):
-        overturning_spectrum(start, frequencies, amplitudes)
+def test_what_has_no_spectrum(fault_of, start, frequencies, amplitudes, said):
+    assert said in str(fault_of(overturning_spectrum, start, frequencies, amplitudes))

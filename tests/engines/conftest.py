@@ -1,16 +1,10 @@
-"""Exact motions to hold the engines against."""
+"""The engines that are installed, and the continuous model, as tests ask for them."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np
 import pytest
-from cases import ricker
-from numpy.typing import NDArray
-from paper_model import PaperModel
 
-from rockcheck import ContinuousModel, Floor, Scene, Wall, engines
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck import ContinuousModel, engines
 
 ALL = [
     engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()
@@ -47,56 +41,3 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
                 f"{one.name} {one.time_step}" if "model" in name else one.name for one in models
             ]
             metafunc.parametrize(name, parameters(models), ids=words)
-
-
-@pytest.fixture(scope="session")
-def free_rocking() -> Callable[[float], Scene]:
-    """Free rocking from a tilt, given in alpha, on a floor that holds the pivot."""
-
-    def scene(tilt: float) -> Scene:
-        return Scene(
-            name="free rocking",
-            block=PAPER_BLOCK,
-            floor=Floor(friction=1.0),
-            initial_rotation=tilt * PAPER_BLOCK.alpha,
-            duration=4.0,
-        )
-
-    return scene
-
-
-@pytest.fixture(scope="session")
-def pulse() -> Callable[..., Scene]:
-    """A Ricker pulse: amplitude in g tan(alpha), frequency in p; friction and walls as given."""
-
-    def scene(
-        amplitude: float,
-        frequency: float,
-        friction: float = 1.0,
-        walls: Sequence[Wall] = (),
-        duration: float = 4.0,
-    ) -> Scene:
-        return Scene(
-            name="pulse",
-            block=PAPER_BLOCK,
-            floor=Floor(friction=friction),
-            walls=walls,
-            excitation=ricker(frequency, amplitude),
-            duration=duration,
-        )
-
-    return scene
-
-
-@pytest.fixture(scope="session")
-def rotation_error() -> Callable[[NDArray[np.float64], Scene], float]:
-    """RMS of theta against the paper's equations, in alpha."""
-    known: dict[Scene, NDArray[np.float64]] = {}
-
-    def error(theta: NDArray[np.float64], scene: Scene) -> float:
-        if scene not in known:
-            known[scene] = PaperModel(scene).run().at(scene.output_times)[:, 1]
-        assert len(theta) == len(known[scene])
-        return float(np.sqrt(np.mean((theta - known[scene]) ** 2))) / scene.block.alpha
-
-    return error

@@ -67,11 +67,12 @@ def tiny(tmp_path):
 def replay(tmp_path, tiny, monkeypatch, capsys):
     monkeypatch.setenv("HOME", str(tmp_path))
 
-    def replay(said: str, cache_dir: str | None = None, user_wide: str = "") -> str:
+    def replay(said: str, cache_dir: str = "cache", user_wide: str = "") -> str:
         """Play the kernel as a new process would, its functions made anew; returns its stderr."""
         monkeypatch.setenv("XDG_CACHE_HOME", user_wide)
-        folder = str(tmp_path / "cache") if cache_dir is None else cache_dir
-        monkeypatch.setattr(compiled.config, "CACHE_DIR", folder)
+        monkeypatch.setattr(
+            compiled.config, "CACHE_DIR", str(tmp_path / cache_dir) if cache_dir else ""
+        )
         compiled._cache_folder.cache_clear()
         runpy.run_path(str(tiny), run_name="__main__")
         out, err = capsys.readouterr()
@@ -98,8 +99,12 @@ def test_the_compiler_does_nothing_twice(monkeypatch):
         "_finalize_specific",
         lambda self: self.name.rpartition(".")[2],
     )
-    calls = numba.types.functions.BaseFunction
-    asked = recorded(monkeypatch, calls, "get_call_type", lambda self, _, *types: f"{self} {types}")
+    asked = recorded(
+        monkeypatch,
+        numba.types.functions.BaseFunction,
+        "get_call_type",
+        lambda self, _, *types: f"{self} {types}",
+    )
 
     @compiled.inner_kernel
     def fourth(x):
@@ -211,19 +216,19 @@ def test_everything_can_be_imported_without_the_compiler():
         "scene = rockcheck.load_scene('fig4a').replace(duration=0.2);"
         "print(rockcheck.EventBasedModel().simulate(scene).outcome)"
     )
-    place = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    assert (
-        subprocess.check_output([sys.executable, "-c", code], text=True, env=place) == "at rest\n"
+    said = subprocess.check_output(
+        [sys.executable, "-c", code], text=True, env={**os.environ, "NUMBA_DISABLE_JIT": "1"}
     )
+    assert said == "at rest\n"
 
 
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("how", ["one", "many"])
 def test_the_wait_for_compiled_code_can_be_interrupted(tmp_path, how):
     """Ctrl-C while a kernel runs for minutes: the process ends at once, with 130."""
-    command = [sys.executable, str(tmp_path / "slow.py"), how]
     (tmp_path / "slow.py").write_text(_SLOW)
     place = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    command = [sys.executable, str(tmp_path / "slow.py"), how]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=place) as running:
         try:
             assert running.stdout.readline() == "begins\n"
@@ -270,7 +275,7 @@ def test_a_long_compilation_is_announced_once_a_package(tmp_path, replay, monkey
     with announcing(heard.append):
         for patience in (60.0, 0.0, 0.0):
             monkeypatch.setattr(compiled, "_SILENT", patience)
-            replay(COMPILED, cache_dir=str(tmp_path / f"cache{len(counts)}"))
+            replay(COMPILED, cache_dir=f"cache{len(counts)}")
             counts.append(len(heard))
     assert counts == [0, 1, 1]
     assert heard[0].startswith("compiling __main__ for this machine")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import rockcheck
-from rockcheck.scenes import History, InputError, load_scene
+from rockcheck.scenes import History, load_scene
 from rockcheck.scenes.errors import inert
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.reading import (
@@ -56,12 +56,11 @@ def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
     assert sorted(one.name for one in tmp_path.iterdir()) == ["result", "victim"]
 
 
-def test_a_folder_of_results_is_no_link(tmp_path):
+def test_a_folder_of_results_is_no_link(tmp_path, fault_of):
     for name in ("elsewhere", "run"):
         (tmp_path / name).mkdir()
     (tmp_path / "run" / "pages").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="pages: a link"):
-        made(tmp_path / "run", "pages", "data")
+    assert "pages: a link" in str(fault_of(made, tmp_path / "run", "pages", "data"))
     assert not list((tmp_path / "elsewhere").iterdir())
     (tmp_path / "mine").symlink_to(tmp_path / "run")  # the folder that the user names may be one
     assert made(tmp_path / "mine", "data").is_dir()
@@ -72,24 +71,22 @@ def test_a_folder_of_results_is_no_link(tmp_path):
     "read", [open_regular, read_bytes, read_text, read_json, read_table, read_arrays]
 )
 @pytest.mark.parametrize("trap", ["a link to a device", "a link to itself", "a pipe"])
-def test_what_is_no_file_is_not_opened(tmp_path, monkeypatch, trap, read):
+def test_what_is_no_file_is_not_opened(tmp_path, monkeypatch, trap, read, fault_of):
     path = tmp_path / "given"
     TRAPS[trap](path, tmp_path)
     monkeypatch.setattr(os, "open", lambda *_: pytest.fail("it was opened"))
-    with pytest.raises(InputError, match="given"):
-        read(path)
+    assert "given" in str(fault_of(read, path))
     assert head_of(path, 100) == ""
 
 
-def test_a_link_may_not_lead_out_of_a_folder_that_was_sent(tmp_path):
+def test_a_link_may_not_lead_out_of_a_folder_that_was_sent(tmp_path, fault_of):
     (tmp_path / "secret").write_text("1")
     folder = made(tmp_path / "run")
     (folder / "out").symlink_to(tmp_path)
     (folder / "inside").symlink_to(folder / "kept")
     assert within(folder, "inside") == folder / "inside"
     for name in ("out", "out/secret", "../secret"):
-        with pytest.raises(InputError, match="lies outside"):
-            within(folder, name)
+        assert "lies outside" in str(fault_of(within, folder, name))
 
 
 #: Where a file may be written or read without the doors: the doors themselves, the cache of machine
@@ -123,10 +120,9 @@ DOORS = {
 @pytest.mark.parametrize("calls", DOORS)
 def test_files_are_written_and_read_by_the_doors_alone(calls):
     home = Path(rockcheck.__file__).parent
-    folders = ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands")
     texts = {
         path.relative_to(home).as_posix(): path.read_text(encoding="utf-8")
-        for folder in folders
+        for folder in ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands")
         for path in (home / folder).rglob("*.py")
     }
     found = {
@@ -143,8 +139,7 @@ def test_files_are_written_and_read_by_the_doors_alone(calls):
     [lambda text: table_text([text], [[text]]), lambda text: columns_text({text: [text, text]})],
 )
 def test_no_cell_of_text_is_a_formula(lead, table):
-    for line in table(f"{lead}1+1").splitlines():
-        assert line == f"'{lead}1+1"
+    assert set(table(f"{lead}1+1").splitlines()) == {f"'{lead}1+1"}
 
 
 @pytest.mark.parametrize("plain", ["-", "-1.5", "-1e-3", "+2", "-inf", "a=b", "", "a-b"])
@@ -168,12 +163,11 @@ TURNING = [chr(code) for code in _CODES]
 
 
 @pytest.mark.parametrize("sign", TURNING)
-def test_text_neither_turns_around_nor_steers(tmp_path, sign):
+def test_text_neither_turns_around_nor_steers(written, sign):
     assert inert(f"a{sign}b\nc\u202fd") == "a?b\nc\u202fd"
     assert table_text([f"a{sign}b"], [[f"a{sign}b"]]) == "a?b\na?b\n"
-    path = tmp_path / "a.json"
-    path.write_text(f'{{"a\\u{ord(sign):04x}b": ["a\\u{ord(sign):04x}b"]}}')
-    assert read_json(path) == {"a?b": ["a?b"]}
+    code = f"\\u{ord(sign):04x}"
+    assert read_json(written("a.json", f'{{"a{code}b": ["a{code}b"]}}')) == {"a?b": ["a?b"]}
 
 
 #: Files of 100 kB and more that took over a minute each, by the square of a repetition.
@@ -244,8 +238,7 @@ def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, 
         timeout=120,
         check=False,
     )
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert done.stdout == "read or refused\n"
+    assert (done.returncode, done.stdout) == (0, "read or refused\n"), done.stderr[-2000:]
 
 
 READERS = (History.load, read_measured, read_record, load_scene, read_toml)
@@ -263,45 +256,49 @@ NO_FILES = {
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize("kind", NO_FILES)
-def test_only_regular_files_of_text_are_read(tmp_path, read, kind):
+def test_only_regular_files_of_text_are_read(tmp_path, read, kind, fault_of):
     path = tmp_path / ("a.toml" if read in (load_scene, read_toml) else "a.csv")
     make, said = NO_FILES[kind]
     make(path)
-    with pytest.raises(InputError, match=rf"{path.name}: {said}"):
-        read(path)
+    assert re.search(f"{path.name}: {said}", str(fault_of(read, path)))
 
 
 @pytest.mark.needs("POSIX")
-def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path):
+def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path, fault_of):
     (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
-    for read, beside in (
-        (lambda: History.load(tmp_path / "h.csv"), "h.events.csv"),
-        (lambda: Run.load(tmp_path), "run.json"),
+    for read, path, beside in (
+        (History.load, tmp_path / "h.csv", "h.events.csv"),
+        (Run.load, tmp_path, "run.json"),
     ):
         os.mkfifo(tmp_path / beside)
-        with pytest.raises(InputError, match="not a file"):
-            read()
+        assert "not a file" in str(fault_of(read, path))
 
 
-def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
-    """As some editors write it: scene, suite, record and history are read as without it."""
-    for name, text in {
-        "a.toml": "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\n"
-        'floor = { friction = 0.4 }\nname = "b"\n',
-        "a.csv": "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n",
-    }.items():
-        (tmp_path / name).write_text(text, encoding="utf-8-sig")
-    assert load_scene(tmp_path / "a.toml").name == "b"
-    assert read_record(tmp_path / "a.csv").time_step == 0.5
-    path = tmp_path / "h.csv"
-    for text, outcome in (
-        ("t,theta\n0,0.5\n1,0.25\n", "moving"),
-        ('t,theta,rockcheck_history\n0,0.5,"{""outcome"": ""at rest""}"\n1,0.25,\n', "at rest"),
-    ):
-        path.write_text(text, encoding="utf-8-sig")
-        history = History.load(path)
-        assert history.channels["theta"].tolist() == [0.5, 0.25]
-        assert history.outcome == outcome
+SCENE = (
+    "duration = 1.0\nblock = { half_width = 0.3, half_height = 1.0 }\nfloor = { friction = 0.4 }\n"
+    'name = "b"\n'
+)
+SAYS = 't,theta,rockcheck_history\n0,0.5,"{""outcome"": ""at rest""}"\n1,0.25,\n'
+
+
+@pytest.mark.parametrize(
+    ("read", "name", "text", "about"),
+    [
+        (load_scene, "a.toml", SCENE, {"name": "b"}),
+        (read_record, "a.csv", "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", {"time_step": 0.5}),
+        (
+            History.load,
+            "h.csv",
+            "t,theta\n0,0.5\n1,0.25\n",
+            {"outcome": "moving", "peak_rotation": 0.5},
+        ),
+        (History.load, "h.csv", SAYS, {"outcome": "at rest", "peak_rotation": 0.5}),
+    ],
+)
+def test_a_byte_order_mark_is_no_part_of_the_text(written, read, name, text, about):
+    """As some editors write it: scene, record and history are read as without it."""
+    found = read(written(name, text.encode("utf-8-sig")))
+    assert {key: getattr(found, key) for key in about} == about
 
 
 @pytest.mark.parametrize(
@@ -314,29 +311,26 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path):
         '"a."' + ".'.'" * 50,
     ],
 )
-def test_a_key_of_many_parts_is_refused(tmp_path, key):
-    (tmp_path / "a.toml").write_text(key if key.startswith("[") else f"{key} = 1")
-    with pytest.raises(InputError, match="a key of more than 50 parts"):
-        read_toml(tmp_path / "a.toml")
+def test_a_key_of_many_parts_is_refused(written, key, fault_of):
+    path = written("a.toml", key if key.startswith("[") else f"{key} = 1")
+    assert "a key of more than 50 parts" in str(fault_of(read_toml, path))
 
 
 @pytest.mark.parametrize(
     "line",
     ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'],
 )
-def test_a_key_of_few_parts_is_read(tmp_path, line):
-    (tmp_path / "a.toml").write_text(line)
-    assert read_toml(tmp_path / "a.toml")
+def test_a_key_of_few_parts_is_read(written, line):
+    assert read_toml(written("a.toml", line))
 
 
-def test_a_file_that_is_too_large_is_not_read(tmp_path):
+def test_a_file_that_is_too_large_is_not_read(tmp_path, fault_of):
     (tmp_path / "a.toml").touch()
     os.truncate(tmp_path / "a.toml", 10_000_001)
-    with pytest.raises(InputError, match="larger than 10000000 bytes"):
-        read_toml(tmp_path / "a.toml")
+    assert "larger than 10000000 bytes" in str(fault_of(read_toml, tmp_path / "a.toml"))
 
 
-def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
+def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path, fault_of):
     """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file
     and a bomb are one line each."""
     path = tmp_path / "a.npz"
@@ -349,5 +343,4 @@ def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path):
         (Path.unlink, "cannot be read"),
     ):
         spoil(path)
-        with pytest.raises(InputError, match=said):
-            read_arrays(path, most=10_000)
+        assert said in str(fault_of(read_arrays, path, most=10_000))

@@ -6,6 +6,7 @@ Each time: a clear end in one line, nothing that was computed is lost, and the n
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -80,8 +81,7 @@ def test_disk_full_whatever_is_written(tmp_path, size, words):
     out = tmp_path / "out.toml"
     done = limited(size, *words, str(out))
     assert done.returncode == 2
-    assert f"{out}" in one_line(done.stderr)
-    assert "File too large" in done.stderr
+    assert re.search(f"{re.escape(str(out))}.*File too large", one_line(done.stderr))
     written = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert all(path.name.startswith(".lock") or path.stat().st_size for path in written), written
     assert not any(path.suffix == ".part" or path.name == "index.html" for path in written)
@@ -100,21 +100,10 @@ def test_what_is_no_file_is_written_as_it_is(tmp_path):
     assert (tmp_path / "out.csv").read_text().startswith("t,x,y,theta,")
     command = [*ROCKCHECK, "simulate", "fig4a", "--model", "ebm", "-q", "-o", "/dev/stdout"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
-    lines = (tmp_path / "out.csv").read_text().splitlines()
-    assert (
-        done.stdout.splitlines()[2:] == lines[2:]
-    )  # the first row also says how long the run took
-    assert done.stdout.splitlines()[0] == lines[0]
+    heading, _, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    # The first row also says how long the run took.
+    assert done.stdout.splitlines()[:1] + done.stdout.splitlines()[2:] == [heading, *rows]
     assert Path("/dev/stdout").is_symlink()
-
-
-@pytest.fixture
-def interruptible():
-    """What is started here hears SIGINT, also where these tests run in the background of a shell,
-    which makes it ignore that."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
@@ -129,25 +118,29 @@ def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
     return children
 
 
-def started(folder: Path) -> subprocess.Popen:
-    words = ("stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out")
-    pipes = {"stderr": subprocess.PIPE, "stdout": subprocess.DEVNULL, "text": True}
-    return subprocess.Popen([*ROCKCHECK, *words, str(folder)], start_new_session=True, **pipes)
-
-
 @pytest.mark.needs("Linux")
-@pytest.mark.usefixtures("interruptible")
 @pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6, 3.0])
 def test_interrupted(tmp_path, later):
     """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all.
     It reaches a worker, too, before that can say that it is not meant."""
-    running = started(tmp_path)
+    words = ("stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out")
+    # What is started hears SIGINT, also where these tests run in the background of a shell, which
+    # makes it ignore that.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    running = subprocess.Popen(
+        [*ROCKCHECK, *words, str(tmp_path)],
+        start_new_session=True,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+    )
     try:
         assert len(workers(running, settled=later)) >= 2
         os.killpg(running.pid, signal.SIGINT)
         _, said = running.communicate(timeout=60)
     finally:
         running.kill()
+        signal.signal(signal.SIGINT, before)
     assert running.returncode == 130
     assert "interrupted" in one_line(said)
     data = json.loads((tmp_path / "run.json").read_text())

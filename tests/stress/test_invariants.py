@@ -71,16 +71,15 @@ def test_a_run_that_keeps_all_invariants(label, scene):
 
 def test_a_similar_scene_has_another_size():
     """That it moves alike is an invariant of each run."""
-    ratio = similar(LOADED, 3).block.half_width / LOADED.block.half_width
-    assert ratio != pytest.approx(1.0)
+    assert similar(LOADED, 3).block.half_width != pytest.approx(LOADED.block.half_width)
 
 
 def test_disturbed_scenes_differ_a_little():
     (x, z), block = LOADED.block.offset, LOADED.block
     changed = [scene.block for scene in invariants._disturbed(LOADED, 1)]
     assert len(changed) == invariants.DISTURBED
-    news = [(*one.offset, one.moment_of_inertia) for one in changed]
-    off = np.abs(np.array(news) / (x, z, block.moment_of_inertia) - 1.0)
+    news = np.array([(*one.offset, one.moment_of_inertia) for one in changed])
+    off = np.abs(news / (x, z, block.moment_of_inertia) - 1.0)
     assert 0.0 < off.min() < off.max() <= 1.01 * invariants.DISTURBANCE
     most = 0.4**2 + 1.2**2 - x * x - z * z  # as much as there can be
     full = LOADED.replace(block=block.replace(moment_of_inertia=most))
@@ -99,22 +98,17 @@ def test_forces_of_a_block_that_starts_from_a_tilt(block, sign, side):
     def forces(tip, slip):
         touching = np.array([[True], [tip], [False]])
         tilt, felt = (np.array([sign]), np.array([phi])), (np.array([u]), np.ones(1))
-        slips = np.array([slip], dtype=np.int8)
-        found, _ = tilted_forces(block, tilt, 0.3, np.zeros(1), felt, touching, slips)
+        found, _ = tilted_forces(
+            block, tilt, 0.3, np.zeros(1), felt, touching, np.array([slip], dtype=np.int8)
+        )
         return found[:3, 0]
 
-    inertia = block.gyration_squared + pivot.radius**2
+    spin = (u * c - s) / (block.gyration_squared + pivot.radius**2)
+    assert forces(False, 0)[:2] == pytest.approx([1.0 + s * spin, u - c * spin], rel=1e-13)
     top = 2.0 * block.half_height * math.cos(phi)  # of the top corner over the floor
-    spin = (u * c - s) / inertia
-    normal, friction, _ = forces(False, 0)
-    assert (normal, friction) == pytest.approx((1.0 + s * spin, u - c * spin), rel=1e-13)
-    normal, _, tip = forces(True, 0)
-    assert (normal, tip) == pytest.approx((1.0, (u * c - s) / top), rel=1e-13)
-    normal, friction, _ = forces(False, 1)
-    lifts = s * (s + 0.3 * c) / block.gyration_squared
-    assert (normal, friction) == pytest.approx(
-        (1.0 / (1.0 + lifts), -0.3 / (1.0 + lifts)), rel=1e-13
-    )
+    assert forces(True, 0)[[0, 2]] == pytest.approx([1.0, (u * c - s) / top], rel=1e-13)
+    push = 1.0 / (1.0 + s * (s + 0.3 * c) / block.gyration_squared)
+    assert forces(False, 1)[:2] == pytest.approx([push, -0.3 * push], rel=1e-13)
 
 
 def test_rules_of_integration():
@@ -177,11 +171,11 @@ def test_a_coarse_model_breaks_the_comparison_with_a_finer_one():
     assert played.figures["tolerance"] > INVARIANTS["tolerance"].bound
 
 
-def test_energy_balance_is_exact_to_rounding():
-    for vertical in (Rest(), Sine(amplitude=3.0, period=0.4, cycles=5)):
-        fine = audited(SLIDES_AND_HITS.replace(vertical=vertical))
-        model = EventBasedModel(tolerance=1e-13)
-        assert energy_error(model, Motion(fine, model.simulate(fine))) < 1e-11
+@pytest.mark.parametrize("vertical", [Rest(), Sine(amplitude=3.0, period=0.4, cycles=5)], ids=str)
+def test_energy_balance_is_exact_to_rounding(vertical):
+    fine = audited(SLIDES_AND_HITS.replace(vertical=vertical))
+    model = EventBasedModel(tolerance=1e-13)
+    assert energy_error(model, Motion(fine, model.simulate(fine))) < 1e-11
 
 
 def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_push_changes():
@@ -222,37 +216,15 @@ def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
     assert (totals.unjudged["energy"], totals.looked_at["energy"]) == (1, 0)
 
 
-def test_a_block_that_hangs_is_its_own_mirror_image():
-    """At rest, symmetric, and the floor falls away faster than g: the pivot that cannot let go has
-    no corner to choose."""
-    hangs = SLIDES_AND_HITS.replace(
-        walls=(),
-        excitation=Rest(),
-        vertical=Record.from_samples([0.0, -20.0, -20.0], time_step=0.1),
-        duration=0.3,
-        output_step=0.01,
-    )
-    for settings in (
-        {},
-        {"friction": "no-slip"},
-        {"friction": "bouc-wen"},
-        {"pivot": "unilateral"},
-    ):
-        played = check_run(EventBasedModel(**settings), hangs)
-        assert played.broken == [], settings
-        assert played.figures["mirror"] == 0.0
-    assert EventBasedModel().simulate(hangs).cost.rules == {"hangs flat": 1}
-
-
+@pytest.mark.parametrize("number", [1, 2, 3])
 @pytest.mark.parametrize(
     "label", ["cm", "mujoco", pytest.param("pybullet", marks=pytest.mark.needs("pybullet"))]
 )
-def test_approximate_models_keep_what_they_state(label):
+def test_approximate_models_keep_what_they_state(label, number):
     player = PLAYERS[label]
-    for number in (1, 2, 3):
-        played = player.check(player.scene(1, number), 1, number)
-        assert played.broken == []
-        assert {"depth", "source"} <= played.figures.keys()
+    played = player.check(player.scene(1, number), 1, number)
+    assert played.broken == []
+    assert {"depth", "source"} <= played.figures.keys()
 
 
 def test_work_of_the_base_on_a_block_that_stands_or_flies():
@@ -268,13 +240,10 @@ def test_work_of_the_base_on_a_block_that_stands_or_flies():
     slides = EventBasedModel().simulate(scene)
     assert np.ptp(slides.channels["x_dot"]) > 0.05
     assert abs(energy_without_source(Motion(scene, slides))) < 1e-14
-    faster = dataclasses.replace(
-        slides, channels={**slides.channels, "x_dot": 1.1 * slides.channels["x_dot"]}
-    )
+    faster = spoilt(slides, x_dot=lambda c: 1.1 * c)
     assert energy_without_source(Motion(scene, faster)) > 1e-5
-    drops = scene.replace(
-        block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0
-    )  # and turns about the load
+    # And turns about the load.
+    drops = scene.replace(block=LOADED.block, initial_height=2.0, initial_angular_velocity=1.0)
     flies = EventBasedModel(pivot="unilateral").simulate(drops)
     assert set(flies.channels["mode"]) == {"flight"}
     assert abs(energy_without_source(Motion(drops, flies))) < 1e-13

@@ -74,9 +74,9 @@ def test_guards_are_what_their_names_say(touch, pivot):
                 **({"slip": mode.slip * slip} if touch == "none" else {}),
             }
             assert guards["phi"](tau) == pytest.approx(phi, abs=1e-15)
-            for name in guards.keys() & forces.keys():
-                known = pytest.approx(forces[name], abs=1e-11 * size)
-                assert guards[name](0.0) == known, (name, mode)
+            now = {name: guards[name](0.0) for name in guards.keys() & forces.keys()}
+            known = {name: forces[name] for name in now}
+            assert now == pytest.approx(known, abs=1e-11 * size), mode
             for name in guards.keys() & places.keys():
                 known = pytest.approx(places[name], abs=1e-11 if name == "slip" else 1e-12)
                 assert guards[name](tau) == known, (name, mode)
@@ -210,10 +210,9 @@ def newton_euler(
     -1 on a right one, 0 on none; d is the sense of the pivot's slip.
     """
     (pivot, corner), inertia = arms, scene.block.gyration_squared
-    u = float(scene.excitation.acceleration(0.0))
     # Unknowns: ax, ay, spin, P, Q, N (the wall pushes to the right where it is the left one).
     rows = [
-        ([1, 0, 0, 0, -1, -wall], -u),
+        ([1, 0, 0, 0, -1, -wall], -float(scene.excitation.acceleration(0.0))),
         ([0, 1, 0, -1, 0, 0], -G),
         ([0, 0, inertia, -pivot[0], pivot[1], wall * corner[1]], 0.0),
         ([0, 1, pivot[0], 0, 0, 0], w * w * pivot[1]),

@@ -51,10 +51,9 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
         s1, s2 = (b.left.arm, b.right.arm) if S1 > 0 else (b.right.arm, b.left.arm)
         forms.add(form)
         if form == Landing.FLAT_END:
-            xdot1 = v1 - c * w1
-            assert w2 == 0.0
-            slides = max(0.0, abs(xdot1) - mu_k * p) if abs(xdot1) > mu_s * p else 0.0
-            assert abs(v2) == approx(slides, abs=1e-14)
+            speed = abs(v1 - c * w1)
+            slides = max(0.0, speed - mu_k * p) if speed > mu_s * p else 0.0
+            assert (w2, abs(v2)) == (0.0, approx(slides, abs=1e-14))
             assert p == approx(s1 * abs(w1), abs=1e-15)
             continue
         q = (v2 - c * w2) - (v1 - c * w1)
@@ -117,8 +116,9 @@ def test_each_branch_of_the_wall_cascade(parting, lopsided):
     seen: Counter[int] = Counter()
     for corner, e, w1, xdot1, mu, no_slip in random_strikes(4000, parting, lopsided):
         S, Sw, s, c, C, share, spin = corner
-        floor = setting_of(0.4, mu, no_slip=no_slip)
-        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(floor, corner, e, w1, xdot1)
+        branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
+            setting_of(0.4, mu, no_slip=no_slip), corner, e, w1, xdot1
+        )
         seen[branch] += 1
         assert n >= 0.0
         # (27): without an impulse of the wall, the pivot held: angular momentum about it stays what
@@ -257,8 +257,8 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
 
         def landing(e: float, cap: bool = False, phi=phi, v=v, alpha=alpha, mu=mu):
             """Velocities after it lands on its corner, and the largest relative gain of energy."""
-            setting = setting_of(alpha, mu, e, energy_cap=cap)
-            after, state, _ = impact_of(setting, phi, [Contact.FOOT], 0.0, v)
+            block = setting_of(alpha, mu, e, energy_cap=cap)
+            after, state, _ = impact_of(block, phi, [Contact.FOOT], 0.0, v)
             return after, float(state.largest_gain)
 
         row = rows_of(setting_of(alpha, mu, e), 1.0, phi)[Contact.FOOT]

@@ -8,6 +8,7 @@ import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from stepping import row_of
 
 from rockcheck.ebm.core import series
 from rockcheck.ebm.core.lanes import (
@@ -72,13 +73,6 @@ def test_compiled_lanes_are_the_plain_ones(name):
 
 
 coefficients = st.lists(st.floats(-4.0, 4.0), min_size=2, max_size=series.ORDER + 1)
-
-
-def row_of(terms: list[float]) -> np.ndarray:
-    """The terms, and behind them what must not be seen."""
-    row = np.full((1, series.WIDTH), np.nan)
-    row[0, : len(terms)] = terms
-    return row
 
 
 @settings(deadline=None, max_examples=300)

@@ -164,8 +164,8 @@ def test_nothing_rebounds_between_two_walls(gap, leans):
     """A block that leans on one wall as it strikes the other, and one that fills the room."""
     walls = tuple(Wall(side=side, gap=gap, restitution=0.9) for side in ("left", "right"))
     b = setting_of(0.4, walls=walls, unilateral=False)
-    flat = {"family": Family.TILT if leans else Family.FLAT, "sense": 1, "tip": leans}
-    state = run_at([0.0, math.cos(0.4), 0.1 * leans, -0.3, 0.1, 0.2], **flat).state
+    mode = {"family": Family.TILT if leans else Family.FLAT, "sense": 1, "tip": leans}
+    state = run_at([0.0, math.cos(0.4), 0.1 * leans, -0.3, 0.1, 0.2], **mode).state
     assert not strike._wall_impact(b, state, False, 1e-9)
     assert (state.rules[Rule.WEDGED], state.rules.sum()) == (1, 1)
     assert state.wall_impulse == 0.3
