@@ -54,7 +54,7 @@ def test_units_of_columns(tmp_path):
     history = read_measured(write(tmp_path / "a.csv", head, *[t] * 6), offset=0.25)
     assert history.model == "measured"
     assert history.channels == {
-        name: pytest.approx(values, rel=1e-7)
+        name: pytest.approx(values, rel=1e-7, abs=0.0)
         for name, values in {
             "t": 1e-3 * t + 0.25,
             "theta": np.deg2rad(t),
@@ -178,7 +178,7 @@ FALLS = replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, 
     [
         (
             lambda: Measured(files={}).simulate(load_scene("bookcase")),
-            "no measured history of scene 'book",
+            "no measured history of scene 'bookcase'",
         ),
         (lambda: time_shift(swing(), swing(scale=0.0)), "no rotation"),
         (lambda: mean_history([swing(), FALLS]), "1 of 2 tests overturn"),

@@ -180,13 +180,8 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
         (0.03, 0.02, (0.04, 0.0), 0.0447213595, numerical.INPUTS),
         (0.03, 0.02, (0.01, 0.04), 0.0458257569, numerical.DATA),
         (0.10, 0.03, (0.04, 0.0), 0.05, "not explained: model form or set-up, at least 0.05 alpha"),
-        (
-            0.10,
-            0.04,
-            (),
-            0.04,
-            "not explained: model form or set-up, at least 0.06 alpha",
-        ),  # nothing is known
+        # Nothing is known of inputs and tests.
+        (0.10, 0.04, (), 0.04, "not explained: model form or set-up, at least 0.06 alpha"),
         (0.10, None, (0.04, 0.0), None, numerical.NOT_CONVERGED),
         (None, 0.02, (0.04, 0.0), 0.0447213595, numerical.NOT_CONVERGED),
         (0.02, 0.02, (0.0, 0.0), 0.02, numerical.NUMERICAL),  # at the limit it is within it
