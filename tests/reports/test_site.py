@@ -229,11 +229,9 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path, finis
     drawn = (tmp_path / PAGES / "figures" / "free.svg").read_bytes()
     finished.model_copy(update={"printed": ("beside a wall",)}).save(tmp_path)
     write_site(tmp_path, afresh=False)
-    left = {path.name for path in (tmp_path / PAGES / "figures").iterdir()}
-    assert {name for name in left if name.startswith(("free", "beside"))} == {
-        *("free-small.svg", "beside-a-wall-small.svg"),
-        *(f"beside-a-wall.{kind}" for kind in ("svg", "png", "pdf")),
-    }
+    assert not list((tmp_path / PAGES / "figures").glob("free.*"))
+    assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
+    assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
     page = (tmp_path / PAGES / "free.html").read_text("utf-8")
     assert "rockcheck report DIR --scene free -o free.pdf" in page
     for name, ending, begins in (
