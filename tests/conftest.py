@@ -22,7 +22,9 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import not_installed
 
 # What tests of several folders share beside fixtures, and what is a program of its own, too.
-sys.path[:0] = [str(Path(__file__).parent / folder) for folder in ("ebm", "stress")]
+sys.path[:0] = [
+    str(Path(__file__).parent / folder) for folder in ("ebm", "stress", "../docs/site_tools")
+]
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page

@@ -37,8 +37,7 @@ def folder(in_an_empty_folder):
 
 
 def ran(out: str, offset: float, *words: str, code: int = 0) -> None:
-    text = SUITE.format(offset=offset)
-    Path("mine.toml").write_text(text, encoding="utf-8")
+    Path("mine.toml").write_text(SUITE.format(offset=offset), "utf-8")
     assert main(["validate", "mine.toml", *CODE, "--no-report", "--out", out, *words]) == code
 
 
@@ -62,29 +61,22 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     ran("b", 0.00102)
     changes = diff("a", "b", 0)
     assert {change["what"] for change in changes} == {"figure"}
-    moved = {
-        change["name"]: (change["before"], change["after"])
-        for change in changes
-        if change["model"] == "near"
-    }
-    before, after = moved["theta_peak against still"]
-    assert after / before == pytest.approx(1.02, rel=1e-6)
+    moved = {(change["model"], change["name"]): change for change in changes}
+    peak = moved["near", "theta_peak against still"]
+    assert peak["after"] / peak["before"] == pytest.approx(1.02, rel=1e-6)
 
 
 def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
     ran("b", 0.002, code=1)
-    changes = diff("a", "b", 1)
-    verdicts = [
-        (c["scene"], c["model"], c["name"], c["before"], c["after"])
-        for c in changes
+    assert [
+        (place, c["scene"], c["model"], c["name"], c["before"], c["after"])
+        for place, c in enumerate(diff("a", "b", 1))
         if c["what"] == "verdict"
+    ] == [
+        (0, "", "", "", "pass", "fail"),
+        (1, "short", "near", "", "pass", "fail"),
+        (2, "short", "near", "theta_peak against still", "pass", "fail"),
     ]
-    assert verdicts == [
-        ("", "", "", "pass", "fail"),
-        ("short", "near", "", "pass", "fail"),
-        ("short", "near", "theta_peak against still", "pass", "fail"),
-    ]
-    assert [change["what"] for change in changes[:3]] == ["verdict"] * 3
     out = typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "])[0]
     assert max(map(len, out.splitlines())) <= 80
     back = diff("b", "a", 1)[0]
@@ -98,16 +90,16 @@ def changed(**change: object) -> None:
 
 def test_a_cell_that_is_gone_is_a_change(diff):
     changed(cells=Run.load("a").cells[:1])
-    gone = [one for one in diff("a", "b", 1) if one["what"] == "cell"]
-    assert [(one["model"], one["before"], one["after"]) for one in gone] == [
-        ("near", "there", None)
-    ]
+    assert [
+        (one["model"], one["before"], one["after"])
+        for one in diff("a", "b", 1)
+        if one["what"] == "cell"
+    ] == [("near", "there", None)]
 
 
 def test_runs_of_two_suites_are_not_compared(refused):
     changed(suite="other")
-    line = "rockcheck: the runs are of two suites, mine and other"
-    assert refused("compare", "a", "b") == line
+    assert refused("compare", "a", "b") == "rockcheck: the runs are of two suites, mine and other"
     assert "no finished run here" in refused("compare", "a", "none")
 
 
@@ -145,20 +137,22 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
         subprocess.run(["git", *words], check=True)
     ran("a", 0.001, "--history", "runs.jsonl")
     ran("a", 0.00105, "--history", "runs.jsonl")
-    words = "validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"
-    typed(*words, holds=["3 runs, 0 figures moved since "])
+    typed(
+        *("validate", "mine.toml", *CODE, "--out", "a", "--history", "runs.jsonl"),
+        holds=["3 runs, 0 figures moved since "],
+    )
     head = subprocess.run(
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
     ).stdout.strip()
     moments = read_history(Path("runs.jsonl"))
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
-    values = [one.figures[name] for one in moments]
-    assert values[1] / values[0] == pytest.approx(1.05, rel=1e-6)
-    assert values[2] == values[1]
-    page = Path("a/trend/index.html").read_text(encoding="utf-8")
+    first, second, third = (one.figures[name] for one in moments)
+    assert second / first == pytest.approx(1.05, rel=1e-6)
+    assert third == second
+    page = Path("a/trend/index.html").read_text("utf-8")
     assert [part for part in ("mine over 3 runs", name, head) if part not in page] == []
-    assert 'href="trend/index.html"' in Path("a/index.html").read_text(encoding="utf-8")
+    assert 'href="trend/index.html"' in Path("a/index.html").read_text("utf-8")
     os.truncate("runs.jsonl", Path("runs.jsonl").stat().st_size - 1)  # as some editors do
     ran("a", 0.001, "--history", "runs.jsonl")
     assert len(read_history(Path("runs.jsonl"))) == 4
@@ -170,23 +164,23 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     ["{", "[]", '{"suite": 3}', '{"created": "x", "suite": "mine", "verdict": "pass", "more": 1}'],
 )
 def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
-    Path("runs.jsonl").write_text(f"\n{line}\n", encoding="utf-8")
+    Path("runs.jsonl").write_text(f"\n{line}\n", "utf-8")
     ran("a", 0.001, "--history", "runs.jsonl", code=2)
     assert capsys.readouterr().err.startswith(
         "rockcheck: runs.jsonl, line 2: not a run of a history"
     )
-    assert Path("runs.jsonl").read_text(encoding="utf-8") == f"\n{line}\n"
+    assert Path("runs.jsonl").read_text("utf-8") == f"\n{line}\n"
 
 
 def test_without_a_report_the_pages_of_the_run_before_are_gone():
     """They would show other numbers than run.json. Files of the user's stay."""
     assert main(["report", "a"]) == 0
-    Path("a/pages/mine.html").write_text("my own", encoding="utf-8")
+    Path("a/pages/mine.html").write_text("my own", "utf-8")
     assert Path("a/pages/short.html").is_file()
     ran("a", 0.0012)
     assert not Path("a/index.html").exists()
     left = {path.name for path in Path("a/pages").rglob("*.*") if path.parent.name != "assets"}
     assert left == {"mine.html"}
-    Path("a/index.html").write_text("my own", encoding="utf-8")
+    Path("a/index.html").write_text("my own", "utf-8")
     ran("a", 0.001)
     assert Path("a/index.html").is_file()

@@ -29,6 +29,11 @@ FILES = {
     "unit.toml": SCENE + '[excitation]\nkind = "record"\nfile = "short.AT2"\nunit = "kg"\n',
     "wrong.toml": 'reference = "ebm"\nscenes = ["scene.toml"]\n[models.ebm]\n'
     '[[records]]\nfiles = ["one.AT2"]\nscenes = ["seen"]\n',
+    **{
+        f"pga-{n}.toml": SCENE + f'[excitation]\nkind = "record"\nfile = "one.AT2"\npga = {pga}\n'
+        for n, pga in enumerate(("0.5\nscale = 2.0", "-1.0", "1e9", '"0.5 g"'))
+    },
+    "engine.toml": 'engine = "mine"\ncolour = "red"\n',
     "run.json": '{"format": 99}',
     "short.AT2": AT2.format(3),
     "one.AT2": AT2.format(2),
@@ -124,13 +129,72 @@ FILES = {
         (["new", "scene.toml"], "scene.toml: is there already"),
         (["new", "mine.txt"], "mine.txt"),
         (["new", "no/such/mine.toml"], "no/such"),
+        *((["simulate", f"pga-{n}.toml"], "excitation.pga") for n in range(4)),
+        *(
+            ([*command.split(), "--scheduler", address], f"rockcheck: --scheduler: {address!r}")
+            for command, address in (
+                ("validate smoke", "local:0"),
+                ("assess fig5a", "local:two"),
+                ("spectrum", "nonsense"),
+                ("conformance", ""),
+                ("stress", "local:0"),
+                ("accept smoke", "local:0"),
+            )
+        ),
+        *(
+            (
+                ["assess", "bookcase", *words, "--capacity", "0.5"],
+                "--capacity: needs records and --levels",
+            )
+            for words in (["one.AT2"], ["--levels", "1:2:3"], [])
+        ),
+        (["benchmark", "modles"], "did you mean 'models'"),
+        *(
+            (["spectrum", *words], said)
+            for words, said in (
+                (["fig5"], "fig5"),
+                (["--size", "0"], "--size: 0 is not allowed"),
+                (["--size", "31623"], "--size: 31623 is not allowed"),
+                (["--size", "nan"], "--size"),
+                (["--frequencies", "8", "0.5"], "--frequencies: 8 to 0.5 is not allowed"),
+                (["--amplitudes", "nan", "2"], "--amplitudes: nan to 2"),
+                (["--amplitudes", "0", "2"], "--amplitudes: 0 to 2"),
+                (["--amplitudes", "1", "inf"], "--amplitudes: 1 to inf"),
+                (["--model", "mujcoo"], "did you mean 'mujoco'"),
+                (["--model", "cm", "--set", "tolerance"], "--set"),
+                (["--set", "tolerance=0"], "ebm.tolerance"),
+                (["gone.toml"], "gone.toml: cannot be read"),
+                (["scene.toml"], "excitation.kind: 'rest' is not allowed"),
+                (["--agreement", "0"], "--agreement: 0 is not allowed"),
+                (["--agreement", "9", "--model", "cm"], "--agreement"),
+            )
+        ),
+        *(
+            (["conformance", *words.split()], said)
+            for words, said in (
+                ("--engine ebm", "--engine: 'ebm' is not allowed: give one of mujoco"),
+                ("--set time_step=0", "mujoco.time_step: 0 is not allowed"),
+                ("--set softness=2", "mujoco.softness"),
+                ("--set colour=red", "mujoco.colour"),
+                ("--histories nowhere", "engine.toml: cannot be read"),
+                ("--histories .", "engine.toml: colour"),
+                ("--tune 0.5 --set settings=best", "settings"),
+                ("--tune 0.5 --engine ebm", "--engine: 'ebm' is not allowed: give one of mujoco"),
+                ("--tune 2", "--tune: 2.0 is not allowed"),
+                ("--tune nan", "--tune: nan is not allowed"),
+                ("--tune 0.5 --set time_step=0", "--set time_step: 0 is not allowed"),
+                ("--tune 0.5 --set friction=3", "--set friction: 3 is not allowed"),
+                ("--tune 0.5 --set friction=red", "--set friction: red is not allowed"),
+                ("--tune 0.5 --set step=1", "'step'"),
+            )
+        ),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(words, said, refused, monkeypatch):
     """Before anything is played or written."""
     monkeypatch.setattr(history, "find_spec", lambda name: None)  # as without pyarrow
     for name, text in FILES.items():
-        Path(name).write_text(text, encoding="utf-8")
+        Path(name).write_text(text, "utf-8")
     assert said in refused(*words)
     left = {path.name: path.read_text("utf-8") for path in Path().rglob("*") if path.is_file()}
     assert {name: left.get(name) for name in left.keys() - {"faulty.py"}} == FILES
@@ -167,7 +231,7 @@ OWN = ["mine.toml", *STILL[1:], "--jobs", "1"]
 def test_a_run_without_a_verdict_overwrites_none_with_one(refused):
     Path("mine.toml").write_text(SUITE)
     Path("scene.toml").write_text(SCENE)
-    alone = ["validate", "scene.toml", "--models", STILL[0], *STILL[1:], "--jobs", "1", "-q"]
+    alone = ["validate", "scene.toml", "--models", *STILL, "--jobs", "1", "-q"]
     # The second over what nobody judged; then the suite, without a tolerance.
     assert [main(words) for words in (alone, alone, ["validate", *OWN, "-q"])] == [0, 0, 1]
     before = {path: path.read_bytes() for path in Path("rockcheck-report").glob("*.*")}

@@ -50,7 +50,7 @@ def test_a_fault_that_cannot_be_written_down_is_told(tmp_path, monkeypatch, type
 
 def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
     said = typed("--help")[0]
-    page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text("utf-8")
     for code, meaning in EXIT_CODES.items():
         assert re.search(rf"^ +{code} +{re.escape(meaning)}$", said, re.MULTILINE), code
         assert f"\n| {code} | " in page, code
@@ -84,9 +84,8 @@ def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monk
 @pytest.mark.parametrize("reader", ["head -1", "true"])
 def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, reader):
     """`rockcheck scenes | head -1` ends with 0, and in silence."""
-    script = f"{' '.join(ROCKCHECK)} {words} | {reader}; echo ${{PIPESTATUS[0]}}"
     done = subprocess.run(
-        ["bash", "-c", script],
+        ["bash", "-c", f"{' '.join(ROCKCHECK)} {words} | {reader}; echo ${{PIPESTATUS[0]}}"],
         capture_output=True,
         text=True,
         cwd=tmp_path,
@@ -100,9 +99,13 @@ def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, read
 
 @pytest.mark.needs("box2d")
 def test_no_binding_tells_what_it_still_holds_at_the_end(tmp_path):
-    words = ["simulate", "fig5a", "--model", "box2d", "--quiet"]
     done = subprocess.run(
-        [*ROCKCHECK, *words], capture_output=True, text=True, cwd=tmp_path, timeout=120, check=False
+        [*ROCKCHECK, "simulate", "fig5a", "--model", "box2d", "--quiet"],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=120,
+        check=False,
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
@@ -111,23 +114,14 @@ def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypat
     run = Run(suite="s", created="", reference="ebm", scenes={}, models=("ebm",), cells=())
     monkeypatch.setattr(report, "SILENT", 0.0)
     monkeypatch.setattr(report, "PATIENCE", 0.1)
-    with (
-        FileLock(tmp_path / ".lock"),
-        pytest.raises(
-            report.InputError, match=r"waited 0\.1 s for another run, which holds .*lock"
-        ),
+    for lock, holder in (
+        (FileLock(tmp_path / ".lock"), r"another run, which holds .*\.lock"),
+        (report._turn(tmp_path), f"process {os.getpid()} on .*"),
     ):
-        report.keep(run, tmp_path)
-    assert re.fullmatch(
-        r"rockcheck: waiting up to 0\.1 s for another run, which holds .*\.lock\n",
-        capsys.readouterr().err,
-    )
-    with (
-        report._turn(tmp_path),
-        pytest.raises(report.InputError, match=rf"waited 0\.1 s for process {os.getpid()} on "),
-    ):
-        report.keep(run, tmp_path)
-    capsys.readouterr()
+        with lock, pytest.raises(report.InputError, match=rf"waited 0\.1 s for {holder}"):
+            report.keep(run, tmp_path)
+        said = rf"rockcheck: waiting up to 0\.1 s for {holder}\n"
+        assert re.fullmatch(said, capsys.readouterr().err)
     report.keep(run, tmp_path)
     assert capsys.readouterr().err == ""
     assert not (tmp_path / ".lock.holder").exists()

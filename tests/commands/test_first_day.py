@@ -48,12 +48,12 @@ CODE = [
 
 
 def suite(other: str = "faulty:Still", lines: str = "") -> str:
-    Path("mine.toml").write_text(SUITE.format(other=other) + lines, encoding="utf-8")
+    Path("mine.toml").write_text(SUITE.format(other=other) + lines, "utf-8")
     return "mine.toml"
 
 
 def simulated(typed, model: str, output: str, *words: str, **said: tuple[str, ...]) -> str:
-    Path("rack.toml").write_text(SCENE, encoding="utf-8")
+    Path("rack.toml").write_text(SCENE, "utf-8")
     own = "--model", f"faulty:{model}", *CODE, "-o", output
     return typed("simulate", "rack.toml", *own, *words, **said)[0]
 
@@ -126,9 +126,8 @@ def test_simulate_draws(typed):
     drawn = "-o", "a.png", "-o", "a.pdf"
     simulated(typed, "Falls", "a.csv", *drawn, holds=("figure: a.png", "figure: a.pdf"))
     assert History.load("a.csv").outcome == "overturned left"
-    for name, start in (("a.png", b"\x89PNG"), ("a.pdf", b"%PDF")):
-        assert Path(name).read_bytes().startswith(start)
-        assert Path(name).stat().st_size > 5000
+    for name, start in (("a.png", rb"\x89PNG"), ("a.pdf", b"%PDF")):
+        assert re.match(start + b"(?s:.{5000})", Path(name).read_bytes())
 
 
 def test_a_figure_alone_writes_no_history(typed):
@@ -181,8 +180,8 @@ excitation = { kind = "ricker", amplitude = 9.0, period = 0.5 }
 def test_a_no_that_is_accepted_may_be_either(typed):
     Path("mine.toml").write_text(FALLS)
     typed("accept", "mine.toml", "--jobs", "1")
-    line = "outcome_agrees = {expected = 0.0, limit = 1.0, drift = 0.0,"
-    assert line in Path("mine.tolerances.toml").read_text()
+    text = Path("mine.tolerances.toml").read_text()
+    assert "outcome_agrees = {expected = 0.0, limit = 1.0, drift = 0.0," in text
     validate = "validate", "mine.toml", "--jobs", "1", "--no-report"
     typed(*validate, holds=["verdict: pass"], lacks=["%"])
     Path("mine.toml").write_text(re.sub("walls = .*", "", FALLS))
@@ -193,24 +192,24 @@ def test_a_no_that_is_accepted_may_be_either(typed):
 def test_a_model_of_ones_own_that_returns_no_history_is_told_so(typed):
     said = ("faulty:Nothing returned NoneType",)
     simulated(typed, "Nothing", "a.csv", code=3, holds=said)
-    words = (suite("faulty:Nothing"), *CODE, "--no-report", "--jobs", "1")
-    typed("validate", *words, code=3, holds=said)
+    validate = "validate", suite("faulty:Nothing"), *CODE, "--no-report", "--jobs", "1"
+    typed(*validate, code=3, holds=said)
 
 
 def test_accept_writes_nothing_that_validate_refuses(typed):
-    t = np.linspace(0.5, 2.0, 151)
-    rows = "\n".join(f"{x:.3f},0.0" for x in t)
-    Path("table.csv").write_text(f"t,theta\n{rows}\n", encoding="utf-8")
+    rows = "\n".join(f"{t:.3f},0.0" for t in np.linspace(0.5, 2.0, 151))
+    Path("table.csv").write_text(f"t,theta\n{rows}\n", "utf-8")
     text = SUITE.format(other="measured").replace(
         "[require]", 'files = { short = "table.csv" }\n[require]'
     )
-    Path("mine.toml").write_text(text, encoding="utf-8")
+    Path("mine.toml").write_text(text, "utf-8")
     words = ("mine.toml", *CODE, "--jobs", "1")
     said = "theta_rms: other starts only at 0.5 s; `offset` of the measured model"
     typed("accept", *words, code=1, holds=[f"not accepted: [short.other.still] {said}"])
     assert not Path("mine.tolerances.toml").exists()
-    aligned = text.replace("[require]", "offset = -0.5\n[require]")
-    aligned = aligned.replace('"theta_rms", "outcome_agrees"', '"theta_rms@1s"')
-    Path("mine.toml").write_text(aligned, encoding="utf-8")
+    aligned = text.replace("[require]", "offset = -0.5\n[require]").replace(
+        '"theta_rms", "outcome_agrees"', '"theta_rms@1s"'
+    )
+    Path("mine.toml").write_text(aligned, "utf-8")
     typed("accept", *words)
     typed("validate", *words, "--no-report", "--strict")

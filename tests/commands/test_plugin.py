@@ -42,9 +42,8 @@ def test_unknown(rockcheck_check):
 
 @pytest.fixture
 def pytester(pytester):
-    """A project with a suite in its root."""
-    faulty = Path(__file__).parents[1] / "validation" / "models" / "faulty.py"
-    pytester.makepyfile(faulty=faulty.read_text("utf-8"))
+    models = Path(__file__).parents[1] / "validation" / "models"
+    pytester.makepyfile(faulty=(models / "faulty.py").read_text("utf-8"))
     pytester.makefile(".toml", rockcheck=SUITE)
     return pytester
 
@@ -71,14 +70,6 @@ def test_check_holds_a_cell_against_its_suite(pytester):
     )
 
 
-PLUGIN = """
-import pytest
-@pytest.fixture
-def check():
-    return "of another plugin"
-"""
-
-
 def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
     """`check` was its name; pytest-check has a fixture of that name, which is the one to have where
     it is installed."""
@@ -89,7 +80,9 @@ def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatc
     result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
     result.assert_outcomes(passed=1, warnings=1)
     result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])
-    (pytester.mkdir("elsewhere") / "pytest_check.py").write_text(PLUGIN, encoding="utf-8")
+    (pytester.mkdir("elsewhere") / "pytest_check.py").write_text(
+        'import pytest\n@pytest.fixture\ndef check():\n    return "of another plugin"\n', "utf-8"
+    )
     monkeypatch.setenv("PYTHONPATH", str(pytester.path / "elsewhere"))
     pytester.makepyfile('def test_theirs(check):\n    assert check == "of another plugin"\n')
     pytester.runpytest_subprocess("-p", "pytest_check").assert_outcomes(passed=1)

@@ -34,21 +34,19 @@ def motion(gain: float) -> np.ndarray:
 
 def at2(name: str, gain: float, component: str) -> None:
     values = " ".join(f"{a:.8e}" for a in motion(gain))
-    head = (
+    Path(name).write_text(
         f"PEER NGA\nSomewhere, 1/1/2000, Station, {component}\n"
-        "ACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n"
+        f"ACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n{values}\n"
     )
-    Path(name).write_text(head + values + "\n", encoding="utf-8")
 
 
 @pytest.fixture(autouse=True)
 def files(in_an_empty_folder):
-    Path("rack.toml").write_text(SCENE, encoding="utf-8")
+    Path("rack.toml").write_text(SCENE, "utf-8")
     Path("records").mkdir()
-    at2("records/RSN1_H1.AT2", 0.1, "180")
-    at2("records/RSN1_H2.AT2", 0.2, "270")
-    at2("records/RSN1_V.AT2", 0.3, "UP")
-    Path("records/README.txt").write_text("where they are from\n", encoding="utf-8")
+    for name, gain, component in (("H1", 0.1, "180"), ("H2", 0.2, "270"), ("V", 0.3, "UP")):
+        at2(f"records/RSN1_{name}.AT2", gain, component)
+    Path("records/README.txt").write_text("where they are from\n", "utf-8")
 
 
 HORIZONTAL = ["RSN1_H1", "RSN1_H2"]
@@ -93,42 +91,37 @@ def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
     """It is read as the others are."""
     at2("records/RSN2_H1.AT2", 0.15, "180")
     at2("records/RSN2_V.AT2", 0.05, "UP")
-    both = ("--read", "vertical=true", "--read", "scale=2")
-    words = ("validate", "rack.toml", "--records", "records", *both, *STILL)
+    words = (
+        *("validate", "rack.toml", "--records", "records"),
+        *("--read", "vertical=true", "--read", "scale=2", *STILL),
+    )
     assert names(told(*words)["left_out"]) == [ODD]
     run = Run.load("rockcheck-report")
-    peaks = {name: run.load_scene(name).vertical.peak for name in run.scenes}
-    assert peaks == pytest.approx(
+    assert {name: run.load_scene(name).vertical.peak for name in run.scenes} == pytest.approx(
         {"rack, RSN1_H1": 0.6, "rack, RSN1_H2": 0.6, "rack, RSN2_H1": 0.1}, rel=1e-2
     )
     Path("records/RSN2_H1.AT2").unlink()
-    said = "RSN2_V.AT2: a vertical component, and no horizontal one is named alike"
-    assert said in refused(*words)
+    said = refused(*words)
+    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in said
 
 
 def test_all_models_are_those_that_are_installed(told):
     """They play where none is named, too."""
     found = told("validate", "rack.toml", "--set", "mujoco.time_step=1e-3", "--no-report")
-    models = [cell["model"] for cell in found["cells"]]
-    assert models == [name for name in FAMILIES if name != "measured" and not not_installed(name)]
+    models = [name for name in FAMILIES if name != "measured" and not not_installed(name)]
     assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)
+    assert [(cell["scene"], cell["model"], cell["status"]) for cell in found["cells"]] == [
+        ("rack", model, "done") for model in models
+    ]
     assert found["reference"] == "ebm-unilateral"
-    for cell in found["cells"]:
-        assert (cell["status"], cell["scene"]) == ("done", "rack")
-        assert cell["model"] == "ebm-unilateral" or cell["apart_alpha"] < 0.01
+    others = (cell for cell in found["cells"] if cell["model"] != "ebm-unilateral")
+    assert max(cell["apart_alpha"] for cell in others) < 0.01
 
 
 def test_what_falls_is_told_with_its_time_and_without_a_peak(typed):
     out = typed(
-        "validate",
-        "rack.toml",
-        "--records",
-        "records/RSN1_H1.AT2",
-        "--models",
-        "faulty:Falls,faulty:Still",
-        *CODE,
-        "--jobs",
-        "1",
+        *("validate", "rack.toml", "--records", "records/RSN1_H1.AT2"),
+        *("--models", "faulty:Falls,faulty:Still", *CODE, "--jobs", "1"),
     )[0]
     (line,) = (line for line in out.splitlines() if "Falls" in line)
     assert re.fullmatch("faulty:Falls +overturned left at 1.57 s +ref. +0.0 s *", line)
@@ -136,7 +129,7 @@ def test_what_falls_is_told_with_its_time_and_without_a_peak(typed):
     folder, option = Path("rockcheck-report"), '<option value="pass">within tolerance</option>'
     (scene,) = (folder / "pages").glob("*.html")
     for path in (folder / "index.html", scene, folder / "summary.md"):
-        text = path.read_text(encoding="utf-8").replace(option, "")
+        text = path.read_text("utf-8").replace(option, "")
         assert "overturned left at 1.57 s" in text
         assert "ithin tolerance" not in text or path.suffix == ".md"
         assert "Nothing is judged." in text or path.stem != "index"
@@ -157,8 +150,8 @@ scenes = ["rack"]
 
 
 def test_a_suite_has_tables_of_records(typed):
-    Path("other.toml").write_text(SCENE, encoding="utf-8")
-    Path("mine.toml").write_text(SUITE, encoding="utf-8")
+    Path("other.toml").write_text(SCENE, "utf-8")
+    Path("mine.toml").write_text(SUITE, "utf-8")
     suite = load_suite("mine.toml", allow_code=("faulty:Still",))
     assert list(suite.scenes) == ["other", "rack, RSN1_H1", "rack, RSN1_H2"]
     assert suite.left_out == ("RSN1_V.AT2",)

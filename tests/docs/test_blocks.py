@@ -17,8 +17,8 @@ import shlex
 import subprocess
 import sys
 import tomllib
+from collections import namedtuple
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -34,19 +34,13 @@ LATE = ("ci", "conformance", "running")
 LONG = {"benchmark": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
 
 
-@dataclass(frozen=True)
-class Block:
-    """A code block: its language, the file that it shows, its text, and the line of its page."""
-
-    language: str
-    file: str
-    text: str
-    line: int
+#: A code block: its language, the file that it shows, its text, and the line of its page.
+Block = namedtuple("Block", ("language", "file", "text", "line"))
 
 
 def blocks_of(page: Path) -> Iterator[Block]:
     """The fenced and indented blocks of a page; an indented one is a shell's."""
-    for token in MarkdownIt().parse(page.read_text(encoding="utf-8")):
+    for token in MarkdownIt().parse(page.read_text("utf-8")):
         line = token.map[0] + 2 if token.map else 0
         if token.type == "fence":
             language, _, rest = token.info.strip().partition(" ")
@@ -78,11 +72,13 @@ def is_long(command: str) -> bool:
 
 
 def shell(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
-        env={**os.environ, "PATH": path},
+        env={
+            **os.environ,
+            "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        },
         capture_output=True,
         text=True,
         check=False,
@@ -108,7 +104,7 @@ def run_session(text: str, folder: Path) -> None:
 def show_file(block: Block, folder: Path) -> None:
     path = folder / block.file
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(block.text, encoding="utf-8")
+    path.write_text(block.text, "utf-8")
     if block.language == "toml":
         tomllib.loads(block.text)
     elif block.language == "bash":

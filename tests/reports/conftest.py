@@ -2,9 +2,6 @@
 cell, hostile names."""
 
 import math
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -18,11 +15,8 @@ from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samp
 from rockcheck.validation.execute.store import HISTORIES
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
-
 NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
-MODELS: Mapping[str, dict[str, Any]] = {
+MODELS = {
     "ebm-unilateral": {"pivot": "unilateral", "tolerance": 1e-10},
     "ebm": {"pivot": "bilateral", "tolerance": 1e-10},
     "cm": {"stiffness": 9e6},
@@ -44,7 +38,7 @@ def scene(name: str, wall: bool, duration: float = 12.0) -> Scene:
     )
 
 
-def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> Any:
+def motion(scene, model, delay, *, falls=False):
     """A decaying rocking motion about pivots that stand still, `delay` s late; hops a little beside
     a wall."""
     block, late = scene.block, np.maximum(scene.output_times - delay, 0.0)
@@ -95,22 +89,21 @@ def motion(scene: Scene, model: str, delay: float, *, falls: bool = False) -> An
         ]
     if falls:
         events.append(Event(t=float(late[-1]), kind="overturned left"))
-    cost = Cost(wall_seconds=0.01 * (1 + 10 * delay), set_up=0.1, steps=1000, evaluations=4000)
     return observe(
         scene,
         model,
         state,
         events=sorted(events, key=lambda e: e.t),
-        cost=cost,
+        cost=Cost(wall_seconds=0.01 * (1 + 10 * delay), set_up=0.1, steps=1000, evaluations=4000),
         settings=MODELS[model],
     )
 
 
-def figure(measure: str, value: float | None, unit: str = "alpha", **more: Any) -> Figure:
+def figure(measure, value, unit="alpha", **more):
     return Figure(measure=measure, label=measure.replace("_", " "), unit=unit, value=value, **more)
 
 
-def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = False) -> Cell:
+def cell_of(folder, scene, model, delay, falls=False):
     """Play, save and judge a cell: the limits are such that late models fail or change."""
     history = motion(scene, model, delay, falls=falls)
     path = f"{HISTORIES}/{scene.name.replace(' ', '_')}--{model.replace(':', '_')}--0.csv"
@@ -128,16 +121,13 @@ def cell_of(folder: Path, scene: Scene, model: str, delay: float, falls: bool = 
         )
     ]
     figures = [figure("highest_hop", 0.004, "m")]
-    for against in ("ebm-unilateral", "ebm"):
-        if model == against:
-            continue
-        form = against == "ebm" and bool(scene.walls)
-        value = 0.3 * delay
-        verdict: Any = "pass" if value < 0.8e-3 else "changed" if value < 2e-3 else "fail"
+    value = 0.3 * delay
+    for against in (one for one in ("ebm-unilateral", "ebm") if one != model):
+        verdict = "pass" if value < 0.8e-3 else "changed" if value < 2e-3 else "fail"
         checks.append(
             Check(
                 figure=figure("theta_rms", value, against=against, window="8s", until=8.0),
-                kind="model form" if form else "numerical",
+                kind="model form" if against == "ebm" and scene.walls else "numerical",
                 verdict=verdict,
                 reason={"pass": "", "changed": "0.0015 was 0.0001"}.get(
                     verdict, f"{value:.3g} is more than 0.002 {NASTY}"
@@ -220,19 +210,7 @@ def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
         evaluate(measure, pair, "alpha", against="ebm-unilateral")
         for measure in STATISTICS.values()
     )
-    checks = (
-        Check(
-            figure=figures[0],
-            kind="numerical",
-            verdict="pass",
-            ideal=0.0,
-            expected=0.0,
-            limit=0.5,
-            drift=0.5,
-            why="made up",
-        ),
-    )
-    cells = [
+    return record, [
         Cell(scene="crowd", model="ebm-unilateral", status="done", outcome="6 of 40 overturned"),
         Cell(
             scene="crowd",
@@ -240,16 +218,26 @@ def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
             status="done",
             outcome="6 of 40 overturned",
             figures=figures,
-            checks=checks,
+            checks=(
+                Check(
+                    figure=figures[0],
+                    kind="numerical",
+                    verdict="pass",
+                    ideal=0.0,
+                    expected=0.0,
+                    limit=0.5,
+                    drift=0.5,
+                    why="made up",
+                ),
+            ),
         ),
         Cell(
             scene="crowd", model="mujoco", status="failed", reason=f"40 of 40 scenes failed {NASTY}"
         ),
     ]
-    return record, cells
 
 
-def make_run(folder: Path, duration: float = 12.0) -> Run:
+def make_run(folder, duration=12.0):
     """Write a finished run of three scenes into `folder`: one passes, one fails, one has failed
     cells and a falling block."""
     scenes = [
@@ -257,19 +245,18 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
         scene("beside a wall", True, duration),
         scene("Free", False, duration),
     ]
-    cells = [
-        cell_of(folder, scenes[0], model, 0.5 * DELAYS[model] if model in ("cm", "mujoco") else 0.0)
-        for model in list(MODELS)[:5]
-    ]
-    cells += [cell_of(folder, scenes[1], model, delay) for model, delay in DELAYS.items()]
-    cells += [
-        cell_of(folder, scenes[2], model, DELAYS[model], falls=True)
-        for model in ("ebm-unilateral", "ebm")
-    ]
-    cells.append(
-        Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}")
-    )
+    late = {"cm": 0.5 * DELAYS["cm"], "mujoco": 0.5 * DELAYS["mujoco"]}
     ensemble, of_ensemble = crowd(0.2)
+    cells = (
+        *(cell_of(folder, scenes[0], model, late.get(model, 0.0)) for model in list(MODELS)[:5]),
+        *(cell_of(folder, scenes[1], model, delay) for model, delay in DELAYS.items()),
+        *(
+            cell_of(folder, scenes[2], model, DELAYS[model], falls=True)
+            for model in ("ebm-unilateral", "ebm")
+        ),
+        Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"),
+        *of_ensemble,
+    )
     run = Run(
         suite="made-up",
         description=f"for the tests {NASTY}",
@@ -279,7 +266,7 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
         scenes={s.name: s.model_dump(mode="json") for s in scenes},
         models=tuple(MODELS),
         printed=("free", "beside a wall"),  # "Free" is a page without figures for print
-        cells=(*cells, *of_ensemble),
+        cells=cells,
         ensembles=(ensemble,),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
         measures=(
@@ -299,14 +286,14 @@ def make_run(folder: Path, duration: float = 12.0) -> Run:
 
 
 @pytest.fixture
-def finished(tmp_path: Path, request: pytest.FixtureRequest) -> Run:
+def finished(tmp_path, request):
     """A finished run in `tmp_path`, for tests that change it; a parameter is how long its scenes
     are (s)."""
     return make_run(tmp_path, getattr(request, "param", 12.0))
 
 
 @pytest.fixture(scope="session")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def site(tmp_path_factory):
     from rockcheck.reports.site import write_site
 
     folder = tmp_path_factory.mktemp("site")
@@ -318,21 +305,21 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def run(site: Path) -> Run:
+def run(site):
     return Run.load(site)
 
 
 @pytest.fixture(scope="session")
-def index(site: Path) -> str:
-    return (site / "index.html").read_text(encoding="utf-8")
+def index(site):
+    return (site / "index.html").read_text("utf-8")
 
 
 @pytest.fixture
-def opened(visitor: Callable[..., "Page"]) -> Callable[..., "Page"]:
+def opened(visitor):
     """`opened(path, home, **settings)` is a page of the folder `home` in the browser, its data
     unpacked; in the end it must have complained of nothing and asked for nothing elsewhere."""
 
-    def page_at(path: Path, home: Path | None = None, **settings: Any) -> "Page":
+    def page_at(path, home=None, **settings):
         desk = {"viewport": {"width": 1280, "height": 900}}
         page = visitor(home or path.parent, **desk | settings)
         page.goto(path.as_uri())
@@ -342,7 +329,7 @@ def opened(visitor: Callable[..., "Page"]) -> Callable[..., "Page"]:
     return page_at
 
 
-def until(page: "Page", expression: str, seconds: float = 10.0) -> None:
+def until(page, expression, seconds=10.0):
     """Wait for an expression to hold; the pages' policy forbids what playwright's own waiting
     does."""
     for _ in range(int(seconds / 0.05)):
@@ -353,22 +340,21 @@ def until(page: "Page", expression: str, seconds: float = 10.0) -> None:
 
 
 @pytest.fixture
-def eventually() -> Callable[..., None]:
+def eventually():
     return until
 
 
 @pytest.fixture
-def barriers() -> Callable[["Page"], list[str]]:
+def barriers():
     """`barriers(page)`: what keeps people from reading a page, all its details open."""
     from axe_playwright_python.sync_playwright import Axe
 
-    def found(page: "Page") -> list[str]:
+    def found(page):
         page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
         # By default it would ask for style sheets, which a file may not.
-        violations = Axe().run(page, options={"preload": False}).response["violations"]
         return [
             f"{v['id']}: {n['html'][:120]}"
-            for v in violations
+            for v in Axe().run(page, options={"preload": False}).response["violations"]
             if v["impact"] in ("serious", "critical")
             for n in v["nodes"][:3]
         ]

@@ -10,12 +10,11 @@ import pytest
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
+from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.commands.cli import main
-from rockcheck.ebm import Spectrum
 from rockcheck.reports.document import FIGURES, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
-from rockcheck.scenes import Sine, load_scene
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
 from rockcheck.validation.paper import KEPT, Panel as Case, kept_spectra, paper_panels
@@ -30,12 +29,11 @@ from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
-REQUEST = Request(SIZE)
 
 
-def plot_of(*panels, letter="R", request=REQUEST):
+def plot_of(*panels, letter="R", ranges=()):
     """The plot of spectra whose nodes were all played to one outcome."""
-    study = Spectra(panels, request)
+    study = Spectra(panels, Request(SIZE, *ranges))
     done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
     return next(study.gather(done).plots())
 
@@ -47,9 +45,8 @@ def labels(figure):
 
 @pytest.mark.parametrize(("panel", "overturned"), [(0, "clockwise"), (1, "overturned")])
 def test_the_papers_colours(panel, overturned):
-    outcomes = np.repeat([0, 1, -1], [6, 3, 3]).astype(np.int8)[:, None] * np.ones(SIZE, np.int8)
     spectrum = Spectrum(
-        outcomes=outcomes,
+        outcomes=np.repeat([0, 1, -1], [6, 3, 3]).astype(np.int8)[:, None] * np.ones(SIZE, np.int8),
         frequency_ratios=np.linspace(0.5, 8.0, SIZE),
         amplitude_ratios=np.linspace(1.0, 12.0, SIZE),
         evaluations=SIZE * SIZE,
@@ -96,8 +93,8 @@ def test_the_pulse_of_ones_own_scene_is_marked():
         2.0 * math.pi / 0.8 / scene.frequency_parameter,
         6.0 / (scene.gravity * scene.block.slope),
     ]
-    request = Request(SIZE, (1.0, 8.0), (1.0, 4.0))
-    figure = figure_of(plot_of(Case("rack", "Rack", scene), request=request))
+    plot = plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0)))
+    figure = figure_of(plot)
     (star,) = figure.axes[0].lines
     np.testing.assert_allclose(star.get_xydata(), [own])
     assert OWN_MARK["label"] in labels(figure)
@@ -116,17 +113,17 @@ def test_the_documentation_shows_the_kept_study():
         share["nodes"] == 100 for share in found["shares"] if share["model"] not in PLAYED_SHARE
     )
     assert {share["model"] for share in found["shares"]} == set(CANDIDATES)
-    figure = figure_of(plot)
-    assert len(figure.axes) == len(panels) * len(found["maps"])
+    assert len(figure_of(plot).axes) == len(panels) * len(found["maps"])
 
 
 def test_a_map_of_each_finding():
     paper = Paper(kept_spectra())
     found = findings_of(paper)
     _, plot, rows = beyond(paper, found)
-    for panel, one in zip(plot.data["panels"], found, strict=True):
-        assert panel["outcomes"].count("G") == one.gained.sum()
-        assert panel["outcomes"].count("X") == one.lost.sum()
+    letters = [panel["outcomes"] for panel in plot.data["panels"]]
+    assert [(one.count("G"), one.count("X")) for one in letters] == [
+        (one.gained.sum(), one.lost.sum()) for one in found
+    ]
     assert len(figure_of(plot).axes) == 3
     assert len(rows.rows) == sum(len(one.rows) for one in found)
 
@@ -161,27 +158,33 @@ def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, name):
     shown = (study / FIGURES / f"{name}.svg").read_bytes()
     unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)
     assert (tmp_path / "one.svg").read_bytes() == unstamped != shown
-    page = (study / "index.html").read_text(encoding="utf-8")
+    page = (study / "index.html").read_text("utf-8")
     assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in page
 
 
 @pytest.mark.parametrize(
-    ("data", "said"),
+    ("data", "words", "said"),
     [
-        ([], "curves.json: no data of a figure: ValidationError"),
-        ({"name": "a", "panels": "b"}, "curves.json: no data of a figure: ValidationError"),
-        ({"name": "a", "kind": "spectra"}, "curves.json: no data of a figure: TypeError"),
+        *(
+            ({"curves": data}, "--scene curves", f"curves.json: no data of a figure: {error}")
+            for data, error in (
+                ([], "ValidationError"),
+                ({"name": "a", "panels": "b"}, "ValidationError"),
+                ({"name": "a", "kind": "spectra"}, "TypeError"),
+            )
+        ),
+        (
+            {},
+            "--scene curve",
+            "unknown figure 'curve'; did you mean 'curves'? allowed: curves, strips",
+        ),
+        ({}, "", "--output: needs one --scene NAME"),
     ],
 )
-def test_data_that_is_no_figure_is_refused_in_one_line(study, refused, data, said):
-    (study / FIGURES / "curves.json").write_text(json.dumps(data), encoding="utf-8")
-    assert said in refused("report", str(study), "--scene", "curves", "-o", "a.svg")
-
-
-def test_an_unknown_figure_is_named(study, refused):
-    said = refused("report", str(study), "--scene", "curve", "-o", "a.svg")
-    assert "unknown figure 'curve'; did you mean 'curves'? allowed: curves, strips" in said
-    assert "--output: needs one --scene NAME" in refused("report", str(study), "-o", "a.svg")
+def test_what_is_no_figure_is_refused_in_one_line(study, refused, data, words, said):
+    for name, content in data.items():
+        (study / FIGURES / f"{name}.json").write_text(json.dumps(content), "utf-8")
+    assert said in refused("report", str(study), *words.split(), "-o", "a.svg")
 
 
 def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
@@ -192,7 +195,7 @@ def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
 
 def test_the_folder_holds_one_run(tmp_path):
     """Tables and figures of the run before are gone; files of the user's stay."""
-    (tmp_path / "mine.csv").write_text("a\n", encoding="utf-8")
+    (tmp_path / "mine.csv").write_text("a\n", "utf-8")
     first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
     publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)
     publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
@@ -206,11 +209,14 @@ def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
     (folder / FIGURES).mkdir(parents=True)
     rows = [{"a": 1.0}]
     said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
-    (folder / "run.json").write_text(json.dumps(said), encoding="utf-8")
-    mine = [tmp_path / "mine.csv", *(folder / f"{name}.csv" for name in ("empty", "odd"))]
-    mine += [folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")]
+    (folder / "run.json").write_text(json.dumps(said), "utf-8")
+    mine = [
+        tmp_path / "mine.csv",
+        *(folder / f"{name}.csv" for name in ("empty", "odd")),
+        *(folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")),
+    ]
     for path in mine:
-        path.write_text("a\n", encoding="utf-8")
-    (folder / "own.csv").write_text("b,a\n", encoding="utf-8")
+        path.write_text("a\n", "utf-8")
+    (folder / "own.csv").write_text("b,a\n", "utf-8")
     publish(Finding("made", "Made up", ""), folder)
     assert all(path.exists() for path in (*mine, folder / "own.csv"))

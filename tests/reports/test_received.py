@@ -5,8 +5,6 @@ import json
 import os
 import re
 import shutil
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -18,8 +16,7 @@ from rockcheck.validation.suite.results import RUN_FILE, Run
 
 
 @pytest.fixture
-def received(tmp_path: Path, site: Path) -> Path:
-    """The run as it was sent: run.json and the histories."""
+def received(tmp_path, site):
     folder = tmp_path / "received"
     folder.mkdir()
     shutil.copy(site / RUN_FILE, folder)
@@ -27,20 +24,20 @@ def received(tmp_path: Path, site: Path) -> Path:
     return folder
 
 
-def published(folder: Path) -> None:
+def published(folder):
     keep(Run.load(folder), folder)
     write_site(folder)
 
 
 @pytest.mark.needs("POSIX")
 @pytest.mark.long
-def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> None:
+def test_no_file_of_a_run_is_written_through(tmp_path, received):
     """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
     pipe."""
     whole = tmp_path / "whole"
     shutil.copytree(received, whole)
     published(whole)
-    names = [path.relative_to(whole) for path in whole.rglob("*") if path.is_file()]
+    names = (path.relative_to(whole) for path in whole.rglob("*") if path.is_file())
     written = [name for name in names if name.parts[0] not in (HISTORIES, RUN_FILE, LOCK)]
     assert len(written) > 40
     suffixes = {".csv", ".xml", ".md", ".html", ".js", ".svg", ".css", ".toml", ".json"}
@@ -59,16 +56,17 @@ def test_no_file_of_a_run_is_written_through(tmp_path: Path, received: Path) -> 
     ]
 
 
-PARTS = ("pages", "pages/assets", "pages/figures", "pages/data", "pages/scene-files", LOCK)
-
-
 @pytest.mark.parametrize(
     ("part", "write"),
-    [*((part, published) for part in PARTS), ("histories", Store), ("comparisons", Store)],
+    [
+        *((f"pages{part}", published) for part in ("", "/assets", "/figures", "/data")),
+        ("pages/scene-files", published),
+        (LOCK, published),
+        ("histories", Store),
+        ("comparisons", Store),
+    ],
 )
-def test_no_folder_of_a_run_is_written_through(
-    tmp_path: Path, received: Path, part: str, write: Callable[[Path], object]
-) -> None:
+def test_no_folder_of_a_run_is_written_through(tmp_path, received, part, write):
     (tmp_path / "elsewhere").mkdir()
     shutil.rmtree(received / part, ignore_errors=True)
     (received / part).parent.mkdir(exist_ok=True)
@@ -88,9 +86,7 @@ TRAPS = {
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("trap", TRAPS)
 @pytest.mark.parametrize("suffix", [".json", ".csv.gz", ".events.csv.gz"])
-def test_a_kept_result_that_is_no_file_of_the_folder_is_none(
-    tmp_path: Path, trap: str, suffix: str
-) -> None:
+def test_a_kept_result_that_is_no_file_of_the_folder_is_none(tmp_path, trap, suffix):
     """It is neither read nor waited for; what takes its place is written beside, not through it."""
     store, kept = Store(tmp_path / "run"), tmp_path / "kept"
     files = {".csv.gz": b"1", ".events.csv.gz": b"2"}
@@ -107,10 +103,9 @@ def test_a_kept_result_that_is_no_file_of_the_folder_is_none(
     assert (kept.read_bytes(), kept.stat().st_mtime_ns) == before
 
 
-def changed(folder: Path, **change: object) -> None:
+def changed(folder, **change):
     path = folder / RUN_FILE
-    data = json.loads(path.read_text(encoding="utf-8"))
-    path.write_text(json.dumps(data | change), encoding="utf-8")
+    path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | change), "utf-8")
 
 
 @pytest.mark.parametrize(
@@ -122,36 +117,32 @@ def changed(folder: Path, **change: object) -> None:
         ({"scenes": {}}, "cells.scene"),
     ],
 )
-def test_a_run_that_names_what_it_has_not_is_bad_input(
-    received: Path, change: dict[str, object], said: str, refused
-) -> None:
+def test_a_run_that_names_what_it_has_not_is_bad_input(received, change, said, refused):
     changed(received, **change)
     assert re.search(f"{RUN_FILE}.*{said}", refused("report", str(received)))
 
 
 @pytest.mark.parametrize("signs", ["\u202e\u2067\x9b", "\ud800"])
-def test_text_that_turns_around_reaches_no_page(received: Path, signs: str) -> None:
+def test_text_that_turns_around_reaches_no_page(received, signs):
     """Also as JavaScript and JSON escape it; half of a pair of UTF-16 is no text at all."""
     evil = f"gnp{signs}.exe"
     run = Run.load(received)
-    scenes = {name: {**scene, "description": evil} for name, scene in run.scenes.items()}
-    cells = [
-        {
-            **cell.model_dump(mode="json"),
-            "reason": evil,
-            "notes": [evil],
-            "settings": {evil: evil},
-            "outcome": evil,
-        }
-        for cell in run.cells
-    ]
     changed(
         received,
         suite=evil,
         description=evil,
         created=evil,
-        scenes=scenes,
-        cells=cells,
+        scenes={name: {**scene, "description": evil} for name, scene in run.scenes.items()},
+        cells=[
+            {
+                **cell.model_dump(mode="json"),
+                "reason": evil,
+                "notes": [evil],
+                "settings": {evil: evil},
+                "outcome": evil,
+            }
+            for cell in run.cells
+        ],
         faults=[evil],
         versions={evil: evil},
     )
@@ -162,6 +153,6 @@ def test_text_that_turns_around_reaches_no_page(received: Path, signs: str) -> N
             path.suffix in (".html", ".js", ".csv", ".md", ".xml", ".svg", ".toml", ".json")
             and path.parent.name != "assets"
         ):
-            text = path.read_text(encoding="utf-8").lower()
+            text = path.read_text("utf-8").lower()
             assert [form for form in forms if form in text] == [], path
-    assert f"gnp{'?' * len(signs)}.exe" in (received / "index.html").read_text(encoding="utf-8")
+    assert f"gnp{'?' * len(signs)}.exe" in (received / "index.html").read_text("utf-8")

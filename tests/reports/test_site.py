@@ -4,7 +4,6 @@ are reproducible."""
 import html
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,6 @@ from rockcheck.reports.site import PAGES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, use, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, InputError
-from rockcheck.validation.suite.results import Run
 
 
 def addresses(text: str) -> list[str]:
@@ -30,30 +28,33 @@ def text_of(page: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", page)).split())
 
 
-def pages_of(site: Path) -> list[Path]:
+def pages_of(site):
     return [site / "index.html", *sorted((site / PAGES).glob("*.html"))]
 
 
-def test_every_scene_has_a_page_and_every_address_is_a_file_of_the_folder(site: Path) -> None:
+def test_every_scene_has_a_page_and_every_address_is_a_file_of_the_folder(site):
     pages = pages_of(site)
     assert [page.stem for page in pages] == ["index", "Free-2", "beside-a-wall", "crowd", "free"]
-    for page in pages:
-        for address in addresses(page.read_text(encoding="utf-8")):
-            target = (page.parent / address.partition("#")[0]).resolve()
-            assert target.is_relative_to(site.resolve()), f"{page.name} asks for {address}"
-            assert target.is_file(), f"{page.name} asks for {address}"
+    targets = {
+        (page.name, address): (page.parent / address.partition("#")[0]).resolve()
+        for page in pages
+        for address in addresses(page.read_text("utf-8"))
+    }
+    assert [place for place, target in targets.items() if not target.is_file()] == []
+    home = site.resolve()
+    assert [place for place, to in targets.items() if not to.is_relative_to(home)] == []
 
 
-def test_hostile_text_stays_text(site: Path) -> None:
-    for page in pages_of(site):
-        text = page.read_text(encoding="utf-8")
-        assert "<img src=x" not in text
-        assert "<img src=x onerror=alert(1)>&\"'</script>" in text_of(text), page.name
-    for script in (site / PAGES / "data").glob("*.js"):
-        assert "<" not in script.read_text(encoding="utf-8")
+def test_hostile_text_stays_text(site):
+    texts = {page.name: page.read_text("utf-8") for page in pages_of(site)}
+    assert [name for name, text in texts.items() if "<img src=x" in text] == []
+    said = "<img src=x onerror=alert(1)>&\"'</script>"
+    assert [name for name, text in texts.items() if said not in text_of(text)] == []
+    scripts = (site / PAGES / "data").glob("*.js")
+    assert [one.name for one in scripts if "<" in one.read_text("utf-8")] == []
 
 
-def test_index_lists_what_is_wrong_worst_first(run: Run, index: str) -> None:
+def test_index_lists_what_is_wrong_worst_first(run, index):
     first, second, *rest = worst_first(run)
     assert [(cell.model, check) for cell, check in (first, second)] == [("mujoco", None)] * 2
     order = [(check.verdict != "fail", -use(check)) for _, check in rest]
@@ -65,12 +66,15 @@ def test_index_lists_what_is_wrong_worst_first(run: Run, index: str) -> None:
     assert "tolerance [old.cm.ebm: theta_rms] has no cell in the suite" in index
 
 
-def test_index_says_how_far_each_model_is(run: Run, index: str) -> None:
+def test_index_says_how_far_each_model_is(run, index):
     rows = {scene: dict(zip(run.models, row, strict=True)) for scene, row in matrix(run).items()}
     assert set(rows) == set(run.scenes)
     late, falling = rows["beside a wall"]["mine:Model"], rows["Free"]["ebm"]
-    assert (late["rms"].window, late["rms"].value) == ("8s", pytest.approx(0.006))
-    assert late["used"] == pytest.approx(3.0)
+    assert (late["rms"].window, late["rms"].value, late["used"]) == (
+        "8s",
+        pytest.approx(0.006),
+        pytest.approx(3.0),
+    )
     assert rows["free"]["mine:Model"] is None
     outcomes = {run.cell("Free", model).outcome for model in ("ebm", "ebm-unilateral")}
     assert (falling["why_apart"], falling["apart"]) == ("", len(outcomes) > 1)
@@ -78,7 +82,7 @@ def test_index_says_how_far_each_model_is(run: Run, index: str) -> None:
     assert '<tr data-scene="Free" data-worst="1e+09">' in index, "a model has no history of it"
 
 
-def test_index_answers_three_questions_first(run: Run, index: str) -> None:
+def test_index_answers_three_questions_first(run, index):
     found = glance(run, matrix(run))
     farthest = found["farthest"]["cell"]
     assert (farthest.scene, farthest.model) == ("beside a wall", "mine:Model")
@@ -96,7 +100,7 @@ def test_index_answers_three_questions_first(run: Run, index: str) -> None:
     assert after.index("Not within") < after.index('id="matrix"')
 
 
-def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished: Run) -> None:
+def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
     missing = {
         "limit": None,
         "expected": None,
@@ -117,47 +121,39 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path: Path, finished:
         "faults": (),
     }
     finished.model_copy(update=alone).save(tmp_path)
-    index = write_site(tmp_path).read_text(encoding="utf-8")
-    for said in (
+    index = write_site(tmp_path).read_text("utf-8")
+    said = (
         "No tolerance yet",
         f"{sum(len(cell.checks) for cell in cells)} figures have no tolerance yet",
         "rockcheck accept",
         'data-verdict="no-tolerance"',
         'class="banner changed"',  # it has a state of its own, and is not red
-    ):
-        assert said in index
+    )
+    assert [words for words in said if words not in index] == []
     assert index.count("no tolerance yet</span>") >= len(cells) - 1
     assert "out of tolerance</span>" not in index, "what waits for a tolerance has not failed"
     assert "Not within tolerance" not in index, "what waits is counted, not listed"
 
 
-def test_the_command_of_the_page_runs_as_it_stands(
-    site: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    text = (site / PAGES / "beside-a-wall.html").read_text(encoding="utf-8")
+def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path):
+    text = (site / PAGES / "beside-a-wall.html").read_text("utf-8")
     found = re.search(r"<code>rockcheck (simulate [^<]+)</code>", text)
     monkeypatch.chdir(site)
     assert main([*found[1].split(), "-o", str(tmp_path / "again.csv")]) == 0
     assert History.load(tmp_path / "again.csv").model == "ebm-unilateral"
 
 
-def files_of(site: Path) -> dict[str, tuple[int, bytes]]:
+def files_of(site):
     """By name: time of writing and content of all that belongs to the scenes' pages, not to the
     index."""
-    found = (
-        path
-        for path in (site / PAGES).rglob("*")
-        if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS
-    )
     return {
         path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes())
-        for path in found
+        for path in (site / PAGES).rglob("*")
+        if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS
     }
 
 
-def test_only_what_would_show_something_else_is_written_again(
-    tmp_path: Path, site: Path, finished: Run
-) -> None:
+def test_only_what_would_show_something_else_is_written_again(tmp_path, site, finished):
     """And the pages of scenes that are gone go."""
 
     def again(**change: object) -> dict[str, tuple[int, bytes]]:
@@ -173,12 +169,11 @@ def test_only_what_would_show_something_else_is_written_again(
 
     cells = tuple(cell.model_copy(update={"read_back": True}) for cell in finished.cells)
     assert again(created="2026-01-02T00:00:00+00:00", wall_seconds=1.0, cells=cells) == first
-    assert "2026-01-02" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "2026-01-02" in (tmp_path / "index.html").read_text("utf-8")
 
-    slower = finished.cells[0].model_copy(
-        update={"cost": replace(finished.cells[0].cost, wall_seconds=9.0)}
-    )
-    second = again(cells=(slower, *finished.cells[1:]))
+    one, *others = finished.cells
+    slower = one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)})
+    second = again(cells=(slower, *others))
     assert second.keys() == first.keys()
     assert {name for name in first if second[name][1] != first[name][1]} == {"free.html"}
     assert all(second[name] == first[name] for name in first if "beside-a-wall" in name)
@@ -200,17 +195,16 @@ def test_only_what_would_show_something_else_is_written_again(
 
 @pytest.mark.long
 def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_are_wanted(
-    tmp_path: Path, finished: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, finished, monkeypatch
+):
     """The index names the others where it has to, without a link, and says how to get their
     pages."""
     monkeypatch.setattr("rockcheck.reports.site.shown", lambda run: ("free",))
-    index = write_site(tmp_path).read_text(encoding="utf-8")
+    index = write_site(tmp_path).read_text("utf-8")
     assert "1 of 3 scenes have a page" in index
     assert "rockcheck report DIR --scene NAME" in index
     scenes = {f"pages/{slug}.html": name for name, slug in slugs_of(finished.scenes).items()}
-    linked = set(addresses(index)) & scenes.keys()
-    assert {scenes[one] for one in linked} == {"free"}
+    assert {scenes[one] for one in scenes.keys() & addresses(index)} == {"free"}
     assert re.findall('data-scene="(.*?)"', index) == ["free"]
 
     write_site(tmp_path, wanted=("beside a wall",), afresh=False)
@@ -219,18 +213,16 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
         write_site(tmp_path, wanted=("fre",))
 
 
-def test_a_scene_that_no_model_plays_has_no_page(tmp_path: Path, finished: Run) -> None:
+def test_a_scene_that_no_model_plays_has_no_page(tmp_path, finished):
     """No suite makes such a run, but a file may say so."""
     nobodys = {"nobody's": {**finished.scenes["free"], "name": "nobody's"}}
     finished.model_copy(update={"scenes": finished.scenes | nobodys}).save(tmp_path)
-    assert "3 of 4 scenes have a page" in write_site(tmp_path).read_text(encoding="utf-8")
+    assert "3 of 4 scenes have a page" in write_site(tmp_path).read_text("utf-8")
     assert not (tmp_path / PAGES / "nobody-s.html").exists()
 
 
 @pytest.mark.long
-def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
-    tmp_path: Path, finished: Run, refused
-) -> None:
+def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path, finished, refused):
     """The page of a scene without them says how to get one, and the command draws it: the same
     figure."""
     write_site(tmp_path)
@@ -240,7 +232,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     assert not list((tmp_path / PAGES / "figures").glob("free.*"))
     assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
     assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
-    page = (tmp_path / PAGES / "free.html").read_text(encoding="utf-8")
+    page = (tmp_path / PAGES / "free.html").read_text("utf-8")
     assert "rockcheck report DIR --scene free -o free.pdf" in page
     for name, ending, begins in (
         ("free", ".svg", b"<?xml"),
@@ -266,7 +258,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
         assert said in refused("report", str(tmp_path), *asked)
 
 
-def test_an_ensemble_is_shown_by_its_distributions(site: Path, run: Run) -> None:
+def test_an_ensemble_is_shown_by_its_distributions(site, run):
     (record,) = run.ensembles
     view = EnsembleView(run, "crowd", "crowd", record)
     (row,) = view.page().table("data/crowd-against-ebm-unilateral").records()
@@ -280,7 +272,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site: Path, run: Run) -> None
     assert {name: row[name] for name in counts} == {k: np.sum(v) for k, v in counts.items()}
     figures = {f.measure: f.value for f in run.cell("crowd", "cm").figures}
     assert row["peak_bias"] == figures["peak_bias"]
-    page = text_of((site / PAGES / "crowd.html").read_text(encoding="utf-8"))
+    page = text_of((site / PAGES / "crowd.html").read_text("utf-8"))
     drawn = ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "p = ")
     assert [said for said in (*drawn, number(row["peak_scatter"])) if said not in page] == []
     rows = pd.read_csv(site / PAGES / "data" / "crowd.csv")

@@ -2,9 +2,7 @@
 accessibility, a phone."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,7 +39,6 @@ SIZE = 20
 MADE = Made(created="2031-01-02T00:00:00+00:00", jobs=1, wall_seconds=1.0, versions={}, hardware={})
 FREQUENCIES, AMPLITUDES = np.linspace(0.5, 8.0, SIZE), np.linspace(1.0, 12.0, SIZE)
 PHONE = {"viewport": {"width": 390, "height": 800}}
-Opened = Callable[..., playwright.Page]
 
 
 def benchmark() -> Finding:
@@ -101,8 +98,9 @@ def marked() -> Finding:
         Table("rows", columns, rows, "Rows", "A note.", folded=True),
         Plot("curve", "Curves", panels=[curve], x=Axis("t, s"), y=Axis("x, m"), live=True),
     ]
-    lost = {"a": "it blew up"}
-    return Finding("made", "Made up", "It fails.", blocks, verdict="fail", failures=lost)
+    return Finding(
+        "made", "Made up", "It fails.", blocks, verdict="fail", failures={"a": "it blew up"}
+    )
 
 
 def found(blocks: list[Block]) -> Finding:
@@ -138,23 +136,22 @@ def spectra(letters: str, *panels: Panel) -> Finding:
     return replace(study.gather(done), made=MADE)
 
 
-def figure_8() -> Finding:
-    """Safe up to the sixth amplitude, overturned right from there on; one node is undecided."""
-    return spectra("U" + "S" * (6 * SIZE - 1) + "R" * (SIZE - 6) * SIZE, *paper_panels(8))
-
-
 #: What makes a study's finding, and words of its page.
 STUDIES = {
     "benchmark": (benchmark, "What does not converge"),
     "marked": (marked, "no mode is consistent"),
-    "spectra": (figure_8, "no wall: overturned clockwise"),
+    # Safe up to the sixth amplitude, overturned right from there on; one node is undecided.
+    "spectra": (
+        lambda: spectra("U" + "S" * (6 * SIZE - 1) + "R" * (SIZE - 6) * SIZE, *paper_panels(8)),
+        "no wall: overturned clockwise",
+    ),
     "fragility": (fragility, "with the wall"),
     "ida": (ida, "PGA"),
 }
 
 
 @pytest.fixture(scope="module")
-def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def studies(tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies")
     for name, (make, _) in STUDIES.items():
         (folder / name).mkdir()
@@ -163,24 +160,24 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def visit(opened: Opened, studies: Path) -> Opened:
+def visit(opened, studies):
     return lambda name, **settings: opened(studies / name / "index.html", studies, **settings)
 
 
 @pytest.mark.parametrize("name", STUDIES)
-def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visit: Opened, name: str) -> None:
-    for settings in ({}, PHONE, PHONE | {"color_scheme": "dark"}):
-        page = visit(name, **settings)
-        assert page.locator("h1").count() == 1
-        assert STUDIES[name][1] in page.locator("main").inner_text()
-        page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
-        assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
+@pytest.mark.parametrize("settings", [{}, PHONE, PHONE | {"color_scheme": "dark"}])
+def test_opens_on_a_desk_and_on_a_phone_and_asks_for_nothing(visit, name, settings):
+    page = visit(name, **settings)
+    assert page.locator("h1").count() == 1
+    assert STUDIES[name][1] in page.locator("main").inner_text()
+    page.eval_on_selector_all("details", "all => all.forEach(one => { one.open = true; })")
+    assert page.evaluate("document.documentElement.scrollWidth") == page.viewport_size["width"]
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", STUDIES)
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_accessible(visit: Opened, barriers, name: str, scheme: str) -> None:
+def test_accessible(visit, barriers, name, scheme):
     page = visit(name, color_scheme=scheme, bypass_csp=True)
     if name == "spectra":
         page.evaluate("(f => f.choose(f.panels[2], [8, 8]))(rockcheckFigures['figure-8'])")
@@ -197,16 +194,15 @@ def place_of_node(page: playwright.Page, panel: int, row: int, column: int) -> t
     return box["x"] + 42.0 + across, box["y"] + 4.0 + down
 
 
-def test_the_panels_stand_as_in_the_paper_and_are_painted(visit: Opened) -> None:
+def test_the_panels_stand_as_in_the_paper_and_are_painted(visit):
     page = visit("spectra")
     assert page.locator(".panel h3").all_inner_texts() == [panel.title for panel in paper_panels(8)]
-    outcomes = [
+    assert page.locator(".key.outcomes span").all_inner_texts() == [
         "safe",
         "no wall: overturned clockwise",
         "overturned; no wall: counterclockwise",
         "undecided",
     ]
-    assert page.locator(".key.outcomes span").all_inner_texts() == outcomes
     colours = """([panel, nodes]) => {
         const c = document.querySelectorAll('.panel canvas')[panel], r = devicePixelRatio;
         const w = c.clientWidth - 48, h = c.clientHeight - 30;
@@ -223,7 +219,7 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(visit: Opened) -> None
     assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [COLOURS["safe"], COLOURS["overturned"]]
 
 
-def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit: Opened) -> None:
+def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit):
     page = visit("spectra")
     page.mouse.move(*place_of_node(page, 3, 10, 7))
     said = page.locator("output.node").inner_text()
@@ -241,7 +237,7 @@ def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit: O
     playwright.expect(page.locator(".played")).to_be_visible()
 
 
-def test_ones_own_block_is_told_in_hertz_and_g(opened: Opened, tmp_path: Path) -> None:
+def test_ones_own_block_is_told_in_hertz_and_g(opened, tmp_path):
     panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
     page = opened(publish(spectra("S" * SIZE**2, panel), tmp_path))
     assert page.locator(".key.outcomes span").all_inner_texts() == [
@@ -258,7 +254,7 @@ def test_ones_own_block_is_told_in_hertz_and_g(opened: Opened, tmp_path: Path) -
     assert list(shown) == pytest.approx([g, hertz], rel=0.01)
 
 
-def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit: Opened, eventually) -> None:
+def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit, eventually):
     page = visit("spectra")
     page.mouse.click(*place_of_node(page, 0, 7, 7))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
@@ -274,14 +270,13 @@ def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit: Opened, ev
     assert page.locator(".played svg .solid").count() >= 2  # the floor and the wall
 
 
-def test_fragility_is_read_under_the_pointer(visit: Opened) -> None:
+def test_fragility_is_read_under_the_pointer(visit):
     page = visit("fragility")
     assert page.locator(".key span").all_inner_texts() == ["with the wall", "without a wall"]
     page.locator("[data-curves] .u-over").hover()
-    said = page.locator("[data-curves] output").inner_text()
     across, in_g = re.fullmatch(
         r"peak acceleration / \(g tan α\) ([\d.]+) \(([\d.]+) g\): with the wall 0\..*",
-        said,
+        page.locator("[data-curves] output").inner_text(),
         re.DOTALL,
     ).groups()
     cells = page.locator("table tbody tr").first.locator("td")
@@ -291,7 +286,7 @@ def test_fragility_is_read_under_the_pointer(visit: Opened) -> None:
     assert axes[2] == ["x", "peak acceleration, g"]
 
 
-def test_the_lines_of_an_ida_are_named_under_the_pointer(visit: Opened) -> None:
+def test_the_lines_of_an_ida_are_named_under_the_pointer(visit):
     page = visit("ida")
     page.locator('[data-curves="lines"] .u-over').hover(position={"x": 500, "y": 200})
     said = page.locator('[data-curves="lines"] output').inner_text()

@@ -6,10 +6,10 @@ import math
 import re
 import zlib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
 from rockcheck.reports.figures import histories_figure
@@ -25,7 +25,7 @@ from rockcheck.reports.tables import (
     use,
     why_apart,
 )
-from rockcheck.reports.view import FALL, SceneView, scene_views, slugs_of
+from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.scenes import Block, Event, Floor, Record, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure, Pair
@@ -33,25 +33,22 @@ from rockcheck.validation.discrepancy.measures import DIFFERENCES
 from rockcheck.validation.suite.results import Check, Run
 
 
-def payload_of(site: Path, slug: str) -> tuple[dict, np.ndarray]:
-    text = (site / PAGES / "data" / f"{slug}.js").read_text(encoding="utf-8")
+def payload_of(site, slug):
+    """A scene's data and their lines, unpacked as a page does."""
+    text = (site / PAGES / "data" / f"{slug}.js").read_text("utf-8")
     data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
-    return data, lines_of(data["lines"], data["rows"])
+    places = np.frombuffer(zlib.decompress(base64.b64decode(data["lines"])), np.uint8)
+    lines = np.ascontiguousarray(places.reshape(4, -1).T).view("<f4")
+    return data, lines.reshape(-1, data["rows"])
 
 
-def view_of(folder: Path, name: str) -> SceneView:
+def view_of(folder, name):
     return next(view for view in scene_views(Run.load(folder), folder) if view.name == name)
 
 
-def lines_of(text: str, rows: int) -> np.ndarray:
-    """Unpacks as a page does."""
-    places = np.frombuffer(zlib.decompress(base64.b64decode(text)), np.uint8).reshape(4, -1)
-    return np.ascontiguousarray(places.T).view("<f4").reshape(-1, rows)
-
-
 def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(
-    finished: Run,
-) -> None:
+    run,
+):
     tighter = {"limit": 1e-12, "drift": 1e-6, "verdict": "fail"}
     cells = [
         cell.model_copy(
@@ -62,45 +59,39 @@ def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is
                 )
             }
         )
-        for cell in finished.cells
+        for cell in run.cells
     ]
-    run = finished.model_copy(update={"cells": tuple(cells)})
-    found = glance(run, matrix(run))
+    tightened = run.model_copy(update={"cells": tuple(cells)})
+    found = glance(tightened, matrix(tightened))
     assert found["judged"] > 0
     assert found["changed"] == []
 
 
-def test_a_run_that_ends_during_a_fall_says_so(finished: Run) -> None:
+@pytest.mark.parametrize(
+    ("last", "outcome", "apart"),
+    [(5.8, "falling left", False), (-5.8, "falling right", True), (0.4, "moving", True)],
+)
+def test_a_run_that_ends_during_a_fall_says_so(run, last, outcome, apart):
     """Two models fall to one side, one of them after the scene's end: the outcome does not depend
     on the model."""
-
-    own = finished.cell("Free", "ebm")
-    for last, outcome, apart in (
-        (5.8, "falling left", False),
-        (-5.8, "falling right", True),
-        (0.4, "moving", True),
-    ):
-        figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
-        change = {"outcome": "moving", "overturned_at": None, "figures": (*own.figures, figure)}
-        cells = [own.model_copy(update=change) if one is own else one for one in finished.cells]
-        run = finished.model_copy(update={"cells": tuple(cells)})
-        found = entry(run, run.by_scene()["Free"], "ebm")
-        assert (found["outcome"], found["apart"]) == (outcome, apart)
+    own = run.cell("Free", "ebm")
+    figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
+    change = {"outcome": "moving", "overturned_at": None, "figures": (*own.figures, figure)}
+    cells = [own.model_copy(update=change) if one is own else one for one in run.cells]
+    changed = run.model_copy(update={"cells": tuple(cells)})
+    found = entry(changed, changed.by_scene()["Free"], "ebm")
+    assert (found["outcome"], found["apart"]) == (outcome, apart)
 
 
-def test_an_outcome_unlike_the_references_within_tolerance_is_explained(finished: Run) -> None:
-    own = next(c for c in finished.cells if c.checks and c.verdict == "pass")
+def test_an_outcome_unlike_the_references_within_tolerance_is_explained(run):
+    own = next(c for c in run.cells if c.checks and c.verdict == "pass")
     agrees = Figure(measure="outcome_agrees", label="outcome agrees", unit="1", value=0.0)
     judged = own.checks[0].model_copy(update={"figure": agrees})
-    for cell, said in (
-        (own, "not judged"),
-        (own.model_copy(update={"checks": (judged,)}), "accepted"),
-        (own.model_copy(update={"checks": ()}), ""),
-    ):
-        assert why_apart(cell).rpartition("; ")[2] == said
+    cells = (own, *(own.model_copy(update={"checks": checks}) for checks in ((judged,), ())))
+    assert [why_apart(cell).rpartition("; ")[2] for cell in cells] == ["not judged", "accepted", ""]
 
 
-def test_data_are_the_histories(site: Path) -> None:
+def test_data_are_the_histories(site):
     view = view_of(site, "beside a wall")
     data, lines = payload_of(site, view.slug)
     assert (view.hop["height"], view.hop["model"]) == (0.004, "ebm-unilateral")  # the trusted one
@@ -121,21 +112,21 @@ def test_data_are_the_histories(site: Path) -> None:
     } == {(model, 2e-3, 8.0) for model in view.run.models if model != "ebm"}
 
 
-def test_a_history_that_ends_early_is_padded(site: Path) -> None:
+def test_a_history_that_ends_early_is_padded(site):
     data, lines = payload_of(site, "Free-2")
     theta = lines[data["models"][0]["values"]["theta"]]
     assert len(theta) == data["rows"]
     assert np.isnan(theta[[0, -1]]).tolist() == [False, True]
 
 
-def test_a_large_run_shows_every_nth_row(site: Path, run: Run) -> None:
+def test_a_large_run_shows_every_nth_row(site, run):
     [coarse, *_] = scene_views(run, site, most_values=60_000)
     [fine, *_] = scene_views(run, site)
     assert (fine.stride, coarse.stride) == (1, 5)
     assert coarse.values["cm"]["theta"] == pytest.approx(fine.values["cm"]["theta"][::5], abs=0.0)
 
 
-def test_the_running_rms_of_candidate_minus_reference_ends_at_the_measure(site: Path) -> None:
+def test_the_running_rms_of_candidate_minus_reference_ends_at_the_measure(site):
     view = view_of(site, "beside a wall")
     assert view.figure_references == ("ebm-unilateral", "ebm")
     reference, candidate = (view.histories[name] for name in ("ebm-unilateral", "mujoco"))
@@ -152,7 +143,7 @@ def test_the_running_rms_of_candidate_minus_reference_ends_at_the_measure(site: 
     )
 
 
-def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(site: Path) -> None:
+def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(site):
     view = view_of(site, "Free")
     whole, drawn = view.values["ebm"]["theta"], view.drawn["ebm"]["theta"]
     row = int(np.flatnonzero(np.abs(whole) > FALL)[0])
@@ -171,15 +162,13 @@ def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(site: Path) -> None:
     [(12.0, 12.0, 12.0), (60.0, 25.0, 35.0)],
     indirect=["finished"],
 )
-def test_plots_open_where_something_happens(
-    tmp_path: Path, finished: Run, least: float, most: float
-) -> None:
+def test_plots_open_where_something_happens(tmp_path, finished, least, most):
     start, end = view_of(tmp_path, "free").active
     assert start == 0.0
     assert least <= end <= most
 
 
-def test_missing_and_foreign_histories_are_told(site: Path, run: Run) -> None:
+def test_missing_and_foreign_histories_are_told(site, run):
     [one, two, *rest] = run.cells
     cells = (
         one.model_copy(update={"history": "histories/gone.csv"}),
@@ -216,9 +205,8 @@ def test_missing_and_foreign_histories_are_told(site: Path, run: Run) -> None:
         ),
     ],
 )
-def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
-    files = write_scene_file(scene, tmp_path, "again")
-    again = load_scene(tmp_path / next(iter(files)))
+def test_scene_file_plays_the_same_scene(tmp_path, scene):
+    again = load_scene(tmp_path / next(iter(write_scene_file(scene, tmp_path, "again"))))
     for which in ("excitation", "vertical"):
         one, other = (
             getattr(s, which).acceleration(np.linspace(0.0, 3.0, 1000)) for s in (scene, again)
@@ -228,7 +216,7 @@ def test_scene_file_plays_the_same_scene(tmp_path: Path, scene: Scene) -> None:
     assert again.model_dump(exclude=hidden) == scene.model_dump(exclude=hidden)
 
 
-def test_slugs_differ_whatever_the_file_system() -> None:
+def test_slugs_differ_whatever_the_file_system():
     slugs = slugs_of(["a b", "a,b", "A b", "a-b-2", "..", "x/../y"])
     assert len({slug.lower() for slug in slugs.values()}) == 6
     assert all(
@@ -237,7 +225,7 @@ def test_slugs_differ_whatever_the_file_system() -> None:
     )
 
 
-def test_figures_are_reproducible_and_undated(tmp_path: Path, site: Path) -> None:
+def test_figures_are_reproducible_and_undated(tmp_path, site):
     view = view_of(site, "free")
     written = [save(histories_figure(view), tmp_path / name / "figure") for name in ("one", "two")]
     for first, second in zip(*written, strict=True):
@@ -246,47 +234,38 @@ def test_figures_are_reproducible_and_undated(tmp_path: Path, site: Path) -> Non
     assert b"<dc:date>" not in written[0][0].read_bytes()
 
 
-def test_run_times_are_ratios_to_the_reference(run: Run) -> None:
+def test_run_times_are_ratios_to_the_reference(run):
     times = {row[0]: row[1] for row in times_table(run).rows}
     assert times["ebm-unilateral"] == pytest.approx(1.0)
     # 0.01 s (1 + 10 delay): 1.005 and 1.01 of the reference in the two scenes that the model played
     assert times["cm"] == pytest.approx((1.005 * 1.01) ** 0.5)
 
 
-def test_how_much_of_its_limit_a_check_uses() -> None:
-    def check(value: float | None, **more: object) -> Check:
-        figure = Figure(measure="m", label="m", unit="1", value=value)
-        return Check(
-            figure=figure,
-            kind="numerical",
-            **{"verdict": "fail", "ideal": 0.0, "limit": 2.0, **more},
-        )
-
-    for value, more, used in (
+@pytest.mark.parametrize(
+    ("value", "more", "used"),
+    [
         (5.0, {}, 2.5),
         (5.0, {"ideal": 4.0}, 0.5),
         (8.0, {"ideal": None, "limit": 12.0}, 1.5),
         (None, {}, math.inf),
         (1.0, {"limit": None}, math.inf),
-    ):
-        assert use(check(value, **more)) == used
+    ],
+)
+def test_how_much_of_its_limit_a_check_uses(value, more, used):
+    figure = Figure(measure="m", label="m", unit="1", value=value)
+    about = {"kind": "numerical", "verdict": "fail", "ideal": 0.0, "limit": 2.0}
+    assert use(Check(figure=figure, **about | more)) == used
 
 
-def contrast(first: str, second: str) -> float:
+def contrast(first, second):
     """Contrast ratio of two colours (WCAG 2.2, relative luminance)."""
-
-    def luminance(colour: str) -> float:
-        channels = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-        red, green, blue = (
-            c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels
-        )
-        return 0.2126 * red + 0.7152 * green + 0.0722 * blue
-
-    dark, bright = sorted((luminance(first), luminance(second)))
+    shares = np.array([to_rgb(first), to_rgb(second)])
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    dark, bright = sorted(linear @ (0.2126, 0.7152, 0.0722))
     return (bright + 0.05) / (dark + 0.05)
 
 
-def test_models_can_be_seen_and_told_apart() -> None:
+def test_models_can_be_seen_and_told_apart():
     shown = [*LOOKS.values(), *SPARE]
     assert min(contrast(look.light, "#ffffff") for look in shown) >= 3.0
     assert min(contrast(look.dark, "#14171b") for look in shown) >= 3.0
@@ -300,7 +279,7 @@ def test_models_can_be_seen_and_told_apart() -> None:
     ]
 
 
-def test_numbers_for_people_do_not_break_in_sentences() -> None:
+def test_numbers_for_people_do_not_break_in_sentences():
     assert [number(v) for v in (None, 0.0, -0.5, 1.23456e-7, 5300.0)] == [
         "–",
         "0",
@@ -313,7 +292,7 @@ def test_numbers_for_people_do_not_break_in_sentences() -> None:
     assert said == "−1.2·10⁻³ is more than 1·10⁵; x-2 of run-7 on 2026-01-02 (−0.5)"
 
 
-def test_index_shows_peaks_against_the_reference_s(site: Path, run: Run, index: str) -> None:
+def test_index_shows_peaks_against_the_reference_s(site, run, index):
     (table,) = (block for block in accuracy(run) if block.block == "table")
     (crowd,) = (row for row in table.records() if row["model"] == "cm")
     assert crowd["scenes_here"] > 30
@@ -322,7 +301,7 @@ def test_index_shows_peaks_against_the_reference_s(site: Path, run: Run, index: 
     assert (site / PAGES / "figures" / "overview-peaks.svg").stat().st_size > 1000
 
 
-def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(site: Path) -> None:
+def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(site):
     view = view_of(site, "free")
     landing = Event(t=0.5, kind="landing", impulse=1.0)
     view.histories["ebm"] = replace(view.histories["ebm"], event_list=(landing,))

@@ -3,11 +3,9 @@ the shape."""
 
 import json
 import os
-from collections.abc import Callable
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,17 +27,17 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.work_precision.study import WorkPrecision
-from rockcheck.validation.study import FAULTS, Study, run
+from rockcheck.validation.study import FAULTS, run
 
 
 @pytest.fixture
-def squares(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Study]:
+def squares(monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parent / "models")
     return import_module("squares").Squares  # type: ignore[no-any-return]
 
 
 @pytest.fixture
-def log(tmp_path: Path) -> Path:
+def log(tmp_path):
     path = tmp_path / "log"
     path.touch()
     return path
@@ -50,12 +48,10 @@ def played(log: Path) -> list[float]:
 
 
 @pytest.mark.parametrize("jobs", [0, 1, 2])
-def test_what_was_played_is_read_back_whatever_plays_it(
-    squares: Callable[..., Study], tmp_path: Path, log: Path, jobs: int
-) -> None:
-    heard: list[tuple[float, float]] = []
+def test_what_was_played_is_read_back_whatever_plays_it(squares, tmp_path, log, jobs):
+    heard = []
     study = squares([2.0, 3.0, 3.0, 11.0], log)  # whose square is a task of a second wave
-    how: dict[str, Any] = {"folder": tmp_path / "out", "jobs": jobs}
+    how = {"folder": tmp_path / "out", "jobs": jobs}
     found = run(study, **how, on_progress=lambda done, of, what="": heard.append((done, of)))
     values = [2.0, 3.0, 11.0, 121.0, 14641.0]
     rows = [[value, value**2] for value in values]
@@ -68,9 +64,7 @@ def test_what_was_played_is_read_back_whatever_plays_it(
     assert played(log) == sorted(2 * values)
 
 
-def test_a_fault_of_one_task_takes_no_other_down(
-    squares: Callable[..., Study], tmp_path: Path, log: Path
-) -> None:
+def test_a_fault_of_one_task_takes_no_other_down(squares, tmp_path, log):
     found = run(squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
     assert found.data == {"count": 1}
     assert {
@@ -87,9 +81,7 @@ def test_a_fault_of_one_task_takes_no_other_down(
     assert played(log).count(2.0) == 1
 
 
-def test_an_interrupted_run_gathers_what_there_is_and_goes_on(
-    squares: Callable[..., Study], tmp_path: Path, log: Path
-) -> None:
+def test_an_interrupted_run_gathers_what_there_is_and_goes_on(squares, tmp_path, log):
     late = run(squares([2.0], log), tmp_path, jobs=0, minutes=1e-9)
     assert (late.complete, late.exit_code, played(log)) == (False, 0, []), "there was no time"
     found = run(squares([2.0, 16.0, 3.0], log), tmp_path, jobs=0)
@@ -98,9 +90,7 @@ def test_an_interrupted_run_gathers_what_there_is_and_goes_on(
     assert played(log) == [2.0, 3.0, 16.0]
 
 
-def test_timed_tasks_are_played_here_and_a_damaged_record_again(
-    squares: Callable[..., Study], tmp_path: Path, log: Path
-) -> None:
+def test_timed_tasks_are_played_here_and_a_damaged_record_again(squares, tmp_path, log):
     study = squares([2.0], log, where="timed")
     run(study, tmp_path, jobs=2)
     (record,) = (tmp_path / "records").glob("*.json")
@@ -112,40 +102,14 @@ def test_timed_tasks_are_played_here_and_a_damaged_record_again(
 @pytest.mark.parametrize(
     ("values", "expected", "said"), [([2.0, 3.0], 90.0, ["3 min"]), ([4.0], 1.0, [])]
 )
-def test_a_long_run_says_how_long(
-    squares: Callable[..., Study], tmp_path: Path, log: Path, values, expected, said
-) -> None:
-    heard: list[str] = []
+def test_a_long_run_says_how_long(squares, tmp_path, log, values, expected, said):
+    heard = []
     with announcing(heard.append):
         run(squares(values, log, expected=expected), tmp_path, jobs=0)
     assert [part in words for part, words in zip(said, heard, strict=True)] == [True] * len(said)
 
 
-@pytest.mark.parametrize(
-    ("words", "address"),
-    [
-        ("validate smoke", "local:0"),
-        ("assess fig5a", "local:two"),
-        ("spectrum", "nonsense"),
-        ("conformance", ""),
-        ("stress", "local:0"),
-        ("accept smoke", "local:0"),
-    ],
-)
-def test_a_wrong_scheduler_is_bad_input_before_anything_is_planned(
-    words: str, address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    said = refused(*words.split(), "--scheduler", address, "--quiet")
-    assert said.startswith(f"rockcheck: --scheduler: {address!r}")
-    assert not any(path.is_file() for path in tmp_path.rglob("*"))
-    with pytest.raises(InputError, match="--scheduler"):
-        run(None, tmp_path, scheduler=address)  # type: ignore[arg-type]  # no study is looked at
-
-
-def test_a_folder_that_cannot_be_used_is_bad_input(
-    squares: Callable[..., Study], log: Path
-) -> None:
+def test_a_folder_that_cannot_be_used_is_bad_input(squares, log):
     with pytest.raises(InputError, match="output folder"):
         run(squares([2.0], log), log)
 
@@ -187,7 +151,7 @@ FOUND = Finding(
 )
 
 
-def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:
+def test_one_table_is_csv_markdown_and_page(tmp_path):
     table = FOUND.table("numbers")
     head, first, second = csv(table).splitlines()
     assert (head, second) == ("name,bias,model,share,x", "b,,mine,,2.0")
@@ -196,7 +160,7 @@ def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:
     assert [part for part in ("length, m", "25.0 %", "✕ 2") if part not in shown] == []
     assert "bias" not in shown
     assert "bias" in block_markdown(replace(table, rows=[["a", 0.0, "mine", 0.5, 1.0]]))
-    page = publish(FOUND, tmp_path).read_text(encoding="utf-8")
+    page = publish(FOUND, tmp_path).read_text("utf-8")
     assert "Made up &lt;b&gt;" in page
     assert 'class="n fail" title="too long"' in page
     assert (tmp_path / "figures" / "curve.svg").stat().st_size > 1000
@@ -204,7 +168,7 @@ def test_one_table_is_csv_markdown_and_page(tmp_path: Path) -> None:
     assert "rockcheckCurves" in (tmp_path / "curves.js").read_text()
 
 
-def test_a_record_of_a_real_study_is_read_back_as_it_was(tmp_path: Path) -> None:
+def test_a_record_of_a_real_study_is_read_back_as_it_was(tmp_path):
     study = WorkPrecision("ebm", quick=True)
     task = next(task for task in study.tasks({}) if getattr(task, "size", 0) == 1)
     record, store = study.play(task), Store(tmp_path, study.kinds)

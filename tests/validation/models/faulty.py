@@ -25,8 +25,6 @@ class Still(Frozen):
 
 
 class NotFinite(Frozen):
-    """NaN in the last row."""
-
     def simulate(self, scene: Scene) -> History:
         history = Still().simulate(scene)
         history.channels["theta"][-1] = np.nan
@@ -65,8 +63,6 @@ class Hog(Frozen):
 
 
 class Nothing(Frozen):
-    """Forgets to return its history."""
-
     def simulate(self, scene: Scene) -> History:
         return None  # type: ignore[return-value]
 

@@ -30,8 +30,6 @@ class Square(Task):
 
 @dataclass(frozen=True)
 class Squared:
-    """The record."""
-
     value: float
     process: int
 

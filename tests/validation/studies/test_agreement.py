@@ -113,8 +113,7 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):
         for panel in paper_panels()
         if panel.name in (flat, bouncing)
     }
-    models = ("ebm-unilateral", "cm", "dart", "drake")
-    found, played = agree(lambda *_: "S", models, spectra, 3)
+    found, played = agree(lambda *_: "S", ("ebm-unilateral", "cm", "dart", "drake"), spectra, 3)
     counted = {(s["spectrum"], s["model"], s["near"]): s["nodes"] for s in found["shares"]}
     slow = itertools.product(((flat, "dart"), (flat, "drake"), (bouncing, "dart")), (True, False))
     assert {counted[*name, near] for name, near in slow} == {4}
@@ -122,7 +121,7 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):
     assert set(played[flat, "dart"]) == set(played[flat, "drake"]) < set(played[flat, "cm"])
     assert (bouncing, "drake") not in played
     assert {one["model"] for one in found["maps"]} == {"ebm", "ebm-unilateral", "cm"}
-    table = list(agreement.blocks(found, list(spectra), came=False))[1]
+    _, table, *_ = agreement.blocks(found, list(spectra), came=False)
     assert [row["nodes"] for row in table.records()] == [80, 80, 16, 8]
 
 
@@ -137,8 +136,7 @@ def test_an_engine_without_restitution_does_not_play_a_floor_that_bounces(restit
 def test_the_command_compares_models(tmp_path, monkeypatch, told):
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral",))
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)
-    words = ("spectrum", "fig8", "--size", "12", "--agreement", "6", "--out", str(tmp_path))
-    said = told(*words)
+    said = told("spectrum", "fig8", "--size", "12", "--agreement", "6", "--out", str(tmp_path))
     (row,) = said["tables"]["agreement"]
     assert (row["model"], row["nodes"]) == ("ebm-unilateral", 7 * 6)
     assert [one["model"] for one in said["agreement"]["maps"]] == ["ebm", "ebm-unilateral"]

@@ -50,14 +50,7 @@ def noise(seed: int) -> Record:
 
 def write_record(path, samples):
     rows = [f"{0.02 * k!r},{a!r}" for k, a in enumerate(samples)]
-    path.write_text("\n".join(["time_s,acceleration_m_s2", *rows, ""]), encoding="utf-8")
-
-
-UNCERTAIN = CABINET.replace("friction = 0.4", "friction = { value = 0.4, sd = 0.04 }")
-OF_A_RECORD = (
-    CABINET.partition("[excitation]")[0]
-    + '[excitation]\nkind = "record"\nfile = "records/R01.csv"\npga = 0.5\n'
-)
+    path.write_text("\n".join(["time_s,acceleration_m_s2", *rows, ""]), "utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -68,13 +61,14 @@ def folder(tmp_path_factory):
         write_record(path / "records" / f"R{seed:02d}.csv", noise(seed).unscaled)
     for name, text in {
         "cabinet": CABINET,
-        "uncertain": UNCERTAIN,
+        "uncertain": CABINET.replace("friction = 0.4", "friction = { value = 0.4, sd = 0.04 }"),
         "uncertain-pulse": CABINET.replace("= 5.0", "= { value = 5.0, sd = 0.1 }"),
         "bouncy": CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 0.5"),
         "falls": CABINET.replace("amplitude = 5.0", "amplitude = 15.0"),
-        "pga": OF_A_RECORD,
+        "pga": CABINET.partition("kind")[0]
+        + 'kind = "record"\nfile = "records/R01.csv"\npga = 0.5\n',
     }.items():
-        (path / f"{name}.toml").write_text(text, encoding="utf-8")
+        (path / f"{name}.toml").write_text(text, "utf-8")
     return path
 
 
@@ -112,26 +106,38 @@ def test_counts_motions_and_gaps_are_those_of_a_loop_of_ones_own(assess, loop):
     stand = {k: h.frame for k, h in at[0.05].items() if not h.outcome.startswith("overturned")}
     fallen = COUNT - len(stand)
     assert 0 < fallen < COUNT, "the records tell falling from standing"
-    assert (said["runs"], said["overturning"]["count"]) == (COUNT, fallen)
-    assert said["overturning"]["probability"] == pytest.approx(fallen / COUNT)
-    for name, value_of in {
-        "peak_rotation": lambda f: np.max(np.abs(f.theta)) / math.atan(0.3),
-        "slip": lambda f: np.max(np.abs(f.slip)),
-        "top_displacement": lambda f: max(
-            np.max(np.abs(f.x + d * (np.cos(f.theta) - 1.0) - np.sin(f.theta))) for d in (-0.3, 0.3)
-        ),
-    }.items():
-        one, values = said["quantities"][name], {k: value_of(f) for k, f in stand.items()}
-        assert (one["of"], one["record"]) == (len(stand), max(values, key=values.get))
-        assert one["median"] == pytest.approx(np.median(list(values.values())), rel=1e-9)
-        assert one["largest"] == pytest.approx(max(values.values()), rel=1e-9)
-    fallen_at = []
-    for gap, row in zip(GAPS, said["gaps"], strict=True):
-        runs = at[gap].values()
-        fallen_at.append(sum(history.outcome.startswith("overturned") for history in runs))
-        struck = sum("wall impact" in set(history.events.kind) for history in runs)
-        told = [row[name] for name in ("gap", "runs", "overturned", "struck")]
-        assert told == [gap, COUNT, fallen_at[-1], struck]
+    assert (said["runs"], said["overturning"]["count"], said["overturning"]["probability"]) == (
+        COUNT,
+        fallen,
+        pytest.approx(fallen / COUNT),
+    )
+    values = {
+        "peak_rotation": {k: np.max(np.abs(f.theta)) / math.atan(0.3) for k, f in stand.items()},
+        "slip": {k: np.max(np.abs(f.slip)) for k, f in stand.items()},
+        "top_displacement": {
+            k: max(
+                np.max(np.abs(f.x + d * (np.cos(f.theta) - 1.0) - np.sin(f.theta)))
+                for d in (-0.3, 0.3)
+            )
+            for k, f in stand.items()
+        },
+    }
+    told = ("of", "record", "median", "largest")
+    assert {name: [said["quantities"][name][one] for one in told] for name in values} == {
+        name: [
+            len(stand),
+            max(of, key=of.get),
+            pytest.approx(np.median(list(of.values())), rel=1e-9),
+            pytest.approx(max(of.values()), rel=1e-9),
+        ]
+        for name, of in values.items()
+    }
+    runs = [at[gap].values() for gap in GAPS]
+    fallen_at = [sum(one.outcome.startswith("overturned") for one in played) for played in runs]
+    struck = [sum("wall impact" in set(one.events.kind) for one in played) for played in runs]
+    assert [
+        (row["gap"], row["runs"], row["overturned"], row["struck"]) for row in said["gaps"]
+    ] == list(zip(GAPS, [COUNT] * len(GAPS), fallen_at, struck, strict=True))
     reach = [
         np.max(np.hypot(0.3, 1.0) * np.sin(math.atan(0.3) + np.abs(f.theta)) - 0.3 + f.x)
         for f in (history.frame for history in at[math.inf].values())
@@ -147,8 +153,8 @@ def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loo
     """Against the same motion with a hundred times as many rows."""
     scene, history = loop[0.05, name]
     fine = EventBasedModel(pivot="unilateral").simulate(scene.replace(output_step=5e-5))
-    speeds = [motion_of(one, scene).wall_speed for one in (history, fine)]
-    assert speeds[0] == pytest.approx(speeds[1], rel=5e-3)
+    expected = pytest.approx(motion_of(fine, scene).wall_speed, rel=5e-3)
+    assert motion_of(history, scene).wall_speed == expected
 
 
 @pytest.mark.parametrize(("before", "speed"), [(None, 0.4), (0.15, 0.3)])
@@ -165,12 +171,12 @@ def test_hand_methods_stand_beside_the_simulation(assess, loop):
     said = assess("cabinet.toml records")["criteria"]
     runs = [loop[0.05, f"R{k:02d}"] for k in range(COUNT)]
     falls = [history.outcome.startswith("overturned") for _, history in runs]
-    for criterion, row in zip(CRITERIA, said, strict=True):
-        says = [criterion.says(scene, base_of(scene))[0] for scene, _ in runs]
-        assert (row["of"], row["predicts"]) == (COUNT, sum(says))
-        if criterion.event == "overturns":
-            agrees = sum(a == b for a, b in zip(says, falls, strict=True))
-            assert (row["simulated"], row["agrees"]) == (sum(falls), agrees)
+    says = [[one.says(scene, base_of(scene))[0] for scene, _ in runs] for one in CRITERIA]
+    assert [(row["of"], row["predicts"]) for row in said] == [(COUNT, sum(one)) for one in says]
+    of_falls = [k for k, criterion in enumerate(CRITERIA) if criterion.event == "overturns"]
+    assert [(said[k]["simulated"], said[k]["agrees"]) for k in of_falls] == [
+        (sum(falls), sum(a == b for a, b in zip(says[k], falls, strict=True))) for k in of_falls
+    ]
 
 
 def test_contributions_are_shares_and_the_largest_comes_first(assess):
@@ -186,9 +192,8 @@ def test_contributions_are_shares_and_the_largest_comes_first(assess):
 def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(assess):
     words = "uncertain.toml records --samples 4 --gaps 0.05,0.2"
     first, again = (assess(f"{words}{more}") for more in ("", " --jobs 1"))
-    first.pop("made")
-    assert again.pop("made")["jobs"] == 1
-    assert again == first
+    assert again["made"]["jobs"] == 1
+    assert again == first | {"made": again["made"]}
     where = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
     with LocalCluster(**where) as cluster:
         there = assess(f"{words} --scheduler {cluster.scheduler_address}", out="there")
@@ -221,16 +226,22 @@ def test_a_gap_that_was_not_played_is_not_called_safe(folder):
 def test_the_history_of_each_run_and_its_tables_are_written(assess, tmp_path, loop):
     assess("cabinet.toml records/R0*.csv --gaps 0.05")
     out = tmp_path / "out"
-    page = (out / "index.html").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text("utf-8")
     assert "as CSV, in at most 2000 rows" in page
     for name in ("R00", "R09"):
         assert f'href="histories/{name}.csv"' in page
         theta = loop[0.05, name][1].channels["theta"]
         kept = pd.read_csv(out / "histories" / f"{name}.csv").theta
         assert kept.tolist() == pytest.approx(theta[:: -(-len(theta) // 2000)].tolist(), abs=1e-15)
-    tables = {"outcomes", "quantities", "gaps", "contributions", "criteria", "runs"}
-    assert {path.stem for path in out.glob("*.csv")} >= tables
-    assert (out / "summary.md").read_text(encoding="utf-8").startswith("# Assessment: cabinet")
+    assert {path.stem for path in out.glob("*.csv")} >= {
+        "outcomes",
+        "quantities",
+        "gaps",
+        "contributions",
+        "criteria",
+        "runs",
+    }
+    assert (out / "summary.md").read_text("utf-8").startswith("# Assessment: cabinet")
 
 
 def test_a_block_that_falls_has_no_numerical_error_and_the_page_says_whose_figures_are_meant(
@@ -239,9 +250,8 @@ def test_a_block_that_falls_has_no_numerical_error_and_the_page_says_whose_figur
     """It falls with a finer tolerance, too, and counts as 1 alpha."""
     said = assess("falls.toml")
     assert said["tables"]["outcomes"][0]["outcome"].startswith("overturned")
-    sources = {row["source"]: row["sd"] for row in said["contributions"]}
-    assert sources["numerical error"] == 0.0
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert {row["source"]: row["sd"] for row in said["contributions"]}["numerical error"] == 0.0
+    page = (tmp_path / "out" / "index.html").read_text("utf-8")
     assert "of runs that stand" not in page  # none does, and the table would be empty
     assert "Of a block that falls only the speed at the wall is given." in page
 
@@ -264,9 +274,9 @@ def test_an_engine_may_play_and_is_compared(assess):
 def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(assess, tmp_path):
     assert main(["new", "new.toml", "--quiet"]) == 0
     said = assess("new.toml --models mujoco,ebm-unilateral --set time_step=1e-3", code=1)
-    answers = {row["question"]: row["answer"] for row in said["tables"]["answers"]}
-    assert "Not converged: no figure of it is sure." in answers.values()
-    page = (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
+    answers = [row["answer"] for row in said["tables"]["answers"]]
+    assert "Not converged: no figure of it is sure." in answers
+    page = (tmp_path / "out" / "summary.md").read_text("utf-8")
     assert "numerical error (no run is converged)" in page
 
 
@@ -312,12 +322,6 @@ def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
     assert scaled.unscaled == noise(1).unscaled
 
 
-@pytest.mark.parametrize("pga", ["0.5\nscale = 2.0", "-1.0", "1e9", '"0.5 g"'])
-def test_a_peak_acceleration_that_cannot_be_is_named(folder, pga, refused):
-    (folder / "wrong.toml").write_text(OF_A_RECORD.replace("0.5\n", f"{pga}\n"), encoding="utf-8")
-    assert "excitation.pga" in refused("assess", str(folder / "wrong.toml"))
-
-
 def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
     """A record at 1.3 times its intensity does what the record and its vertical one times 1.3 do,
     but for the rows that the peak is read from."""
@@ -337,12 +341,6 @@ def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
 def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(assess, tmp_path, refused):
     words = "uncertain-pulse.toml records/R00.csv"
     assess(words)
-    assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text(encoding="utf-8")
+    assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text("utf-8")
     said = refused("assess", *words.split(), "--samples", "8")
     assert "besides the excitation that the records replace" in said
-
-
-@pytest.mark.parametrize("words", ["records/R00.csv", "--levels 1:2:3", ""])
-def test_a_capacity_of_which_no_curve_is_asked_for_is_refused(assess, refused, words):
-    said = refused("assess", "cabinet.toml", *words.split(), "--capacity", "0.5")
-    assert said == "rockcheck: --capacity: needs records and --levels"

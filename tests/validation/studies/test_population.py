@@ -75,13 +75,13 @@ def lines():
 @pytest.fixture
 def records(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "rack.toml").write_text(TOML, encoding="utf-8")
+    (tmp_path / "rack.toml").write_text(TOML, "utf-8")
     (tmp_path / "empty").mkdir()
     (tmp_path / "records").mkdir()
     for name, one in MOTIONS:
-        rows = [f"{0.02 * k:.2f},{a!r}" for k, a in enumerate(one.samples.tolist())]
-        text = "\n".join(["time_s,acceleration_m_s2", *rows, ""])
-        (tmp_path / "records" / f"{name}.csv").write_text(text, encoding="utf-8")
+        rows = "".join(f"{0.02 * k:.2f},{a!r}\n" for k, a in enumerate(one.samples.tolist()))
+        path = tmp_path / "records" / f"{name}.csv"
+        path.write_text(f"time_s,acceleration_m_s2\n{rows}", "utf-8")
 
 
 # Lines
@@ -115,13 +115,16 @@ def test_a_share_of_the_motions_stays_below_its_quantile(lines):
 def test_a_capacity_is_exceeded_not_met(lines):
     """Of a limit that is a motion's own peak, that motion stays within it."""
     peaks, found = lines
-    cases = [one["case"] for one in found.table("fits").records()]
-    assert cases == ["peak above 0.1 α", "peak above 0.5 α", "peak above α, or overturned"]
+    assert [one["case"] for one in found.table("fits").records()] == [
+        "peak above 0.1 α",
+        "peak above 0.5 α",
+        "peak above α, or overturned",
+    ]
     limit = float(np.max(peaks[np.isfinite(peaks)]))
-    study = ida(SCENE, MOTIONS, LEVELS, capacities=[limit])
-    for most, one in ((1.0, found), (limit, played(study)[1])):
-        shares = [row[2] for row in one.table("fragility").rows]
-        assert shares[-6:] == np.mean(peaks > most, axis=(0, 1)).tolist()
+    _, at_limit = played(ida(SCENE, MOTIONS, LEVELS, capacities=[limit]))
+    assert [[row[2] for row in one.table("fragility").rows[-6:]] for one in (found, at_limit)] == [
+        np.mean(peaks > most, axis=(0, 1)).tolist() for most in (1.0, limit)
+    ]
 
 
 @pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
@@ -155,8 +158,8 @@ def test_what_failed_says_nothing_and_ends_the_command_so():
     own = UncertainScene(SCENE, {}, np.eye(0))
     part = Assessment(own=own, cases={"rack": own}, levels=study).gather(done)
     assert part.exit_code == 3
-    for found, names in ((whole, {"H1", "H2", "H3"}), (part, {"H1", "H2"})):
-        assert {row[0] for row in found.table("ida").rows} == names
+    names = [{row[0] for row in found.table("ida").rows} for found in (whole, part)]
+    assert names == [{"H1", "H2", "H3"}, {"H1", "H2"}]
     assert Finding("", "", *study.gather({})).table("motions").rows
 
 
@@ -202,8 +205,7 @@ def test_a_task_depends_on_all_that_its_runs_do():
 def test_both_cases_and_directions_are_played():
     """Reversed, a symmetric block without a wall does the mirror image."""
     scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
-    study = fragility(scene, np.linspace(1.0, 6.0, 4), (1.0, 3.0))
-    done, found = played(study)
+    done, found = played(fragility(scene, np.linspace(1.0, 6.0, 4), (1.0, 3.0)))
     cases = ["with the wall"] * PULSES + ["without a wall"] * PULSES
     assert [batch.of[0] for batch in done] == cases
     free = [runs.side for batch, runs in done.items() if not batch.scene.walls]
@@ -318,12 +320,10 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
         curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
         for failed in (np.zeros_like(hit), some, all_at_2, np.ones_like(hit))
     )
-    for one, shares in (
-        (plain, [0.0, 0.5, 1.0]),
-        (curve, [0.0, 1.0, 1.0]),
-        (nowhere, [0.0, math.nan, 1.0]),
-    ):
-        assert [point[1] for point in one.points] == pytest.approx(shares, nan_ok=True)
+    assert [[point[1] for point in one.points] for one in (plain, curve, nowhere)] == [
+        pytest.approx(shares, nan_ok=True)
+        for shares in ([0.0, 0.5, 1.0], [0.0, 1.0, 1.0], [0.0, math.nan, 1.0])
+    ]
     # Wilson's band of both motions
     assert curve.points[1][2:4] == pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4)
     assert curve.undecided == 5
@@ -370,10 +370,14 @@ def test_the_command_writes_curves_tables_and_page(records, tmp_path, told):
     )
     assert (answer["unit"], answer["capacities"], answer["left_out"]) == ("g", [0.5], [])
     folder = tmp_path / "rockcheck-report" / "assess"
-    assert len((folder / "ida.csv").read_text(encoding="utf-8").splitlines()) == 1 + 3 * 2 * 6
-    assert "peak above 0.5 α" in (folder / "index.html").read_text(encoding="utf-8")
-    figures = {path.stem for path in (folder / "figures").glob("*.svg")}
-    assert figures == {"lines", "fragility", "motion", "histories"}
+    assert len((folder / "ida.csv").read_text("utf-8").splitlines()) == 1 + 3 * 2 * 6
+    assert "peak above 0.5 α" in (folder / "index.html").read_text("utf-8")
+    assert {path.stem for path in (folder / "figures").glob("*.svg")} == {
+        "lines",
+        "fragility",
+        "motion",
+        "histories",
+    }
 
 
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, told):

@@ -19,24 +19,12 @@ from rockcheck.validation.studies.spectrum.study import KEPT_AN_AXIS, Spectra
 from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing, nodes_of
 from rockcheck.validation.study import run
 
-PULSE = 'excitation = { kind = "ricker", amplitude = 1.0, period = 0.5 }\n'
-SCENE = f"""duration = 1.0
-block = {{ half_width = 0.2, half_height = 1.0 }}
-floor = {{ friction = 0.5 }}
-walls = [{{ side = "left", gap = 0.02 }}]
-{PULSE}"""
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_scenes(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    texts = {
-        "bookcase": SCENE,
-        "still": SCENE.replace(PULSE, ""),
-        "free": SCENE.replace("walls", "#"),
-    }
-    for name, text in texts.items():
-        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+SCENE = """duration = 1.0
+block = { half_width = 0.2, half_height = 1.0 }
+floor = { friction = 0.5 }
+walls = [{ side = "left", gap = 0.02 }]
+excitation = { kind = "ricker", amplitude = 1.0, period = 0.5 }
+"""
 
 
 PANELS = {panel.name: panel for panel in paper_panels()}
@@ -189,8 +177,7 @@ def test_nodes_that_depend_on_the_law_of_impacts_are_known(tmp_path, refine):
     ("name", "model"), [("gap-3-e-1", "ebm"), ("unobstructed", "ebm-unilateral")]
 )
 def test_without_a_wall_or_a_hop_no_second_law_is_played(name, model):
-    panel = PANELS[f"figure-6-{name}"]
-    asked = Spectra((panel,), on_grid(*OF_THE_LAW, model=model)).tasks({})
+    asked = Spectra((PANELS[f"figure-6-{name}"],), on_grid(*OF_THE_LAW, model=model)).tasks({})
     assert [task.what for task in asked] == ["outcomes", "motions"]
 
 
@@ -217,14 +204,13 @@ def test_nodes_whose_block_lands_flat_depend_on_the_law(tmp_path, restitutions, 
 
 
 def test_an_undecided_node_does_not_depend_on_the_law():
-    about = dict.fromkeys(("evaluations", "scene", "model"))
-    axes = {"frequency_ratios": np.ones(1), "amplitude_ratios": np.ones(2)}
     one, other = (
         Spectrum(
             outcomes=np.array(sides, dtype=np.int8).reshape(-1, 1),
             undecided=np.array(undecided, dtype=np.int64).reshape(-1, 2),
-            **axes,
-            **about,
+            frequency_ratios=np.ones(1),
+            amplitude_ratios=np.ones(2),
+            **dict.fromkeys(("evaluations", "scene", "model")),
         )
         for sides, undecided in (([0, 1], [0, 0]), ([1, 0], []))
     )
@@ -235,58 +221,34 @@ def test_an_undecided_node_does_not_depend_on_the_law():
 # The command
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["fig5"], "fig5"),
-        (["--size", "0"], "--size: 0 is not allowed"),
-        (["--size", "31623"], "--size: 31623 is not allowed"),
-        (["--size", "nan"], "--size"),
-        (["--frequencies", "8", "0.5"], "--frequencies: 8 to 0.5 is not allowed"),
-        (["--amplitudes", "nan", "2"], "--amplitudes: nan to 2"),
-        (["--amplitudes", "0", "2"], "--amplitudes: 0 to 2"),
-        (["--amplitudes", "1", "inf"], "--amplitudes: 1 to inf"),
-        (["--model", "mujcoo"], "did you mean 'mujoco'"),
-        (["--model", "cm", "--set", "tolerance"], "--set"),
-        (["--set", "tolerance=0"], "ebm.tolerance"),
-        (["gone.toml"], "gone.toml: cannot be read"),
-        (["still.toml"], "excitation.kind: 'rest' is not allowed"),
-        (["--agreement", "0"], "--agreement: 0 is not allowed"),
-        (["--agreement", "9", "--model", "cm"], "--agreement"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_2(words, said, refused):
-    assert said in refused("spectrum", *words)
-
-
 def test_the_command_writes_figures_data_and_page(tmp_path, told):
-    said = told("spectrum", "fig8", "--size", "9", "--out", "out")
-    folder = tmp_path / "out"
+    said = told("spectrum", "fig8", "--size", "9", "--out", str(tmp_path))
     assert {f"figure-8.{kind}" for kind in ("svg", "json", "nodes.js", "histories.js")} == {
-        path.name for path in (folder / "figures").iterdir()
+        path.name for path in (tmp_path / "figures").iterdir()
     }
-    data = dict(np.load(folder / "figure-8-gap-3-e-0.npz"))
+    data = dict(np.load(tmp_path / "figure-8-gap-3-e-0.npz"))
     settings = json.loads(str(data["settings"]))
     assert settings["scene"]["walls"] == [{"side": "right", "gap": 0.003, "restitution": 0.0}]
     assert settings["settings"] == {"tolerance": 4e-8} == said["settings"]
-    table = np.loadtxt(folder / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
-    amplitudes = np.linspace(1.0, 12.0, 9)
-    np.testing.assert_allclose(table, np.column_stack([amplitudes, data["outcomes"]]))
+    table = np.loadtxt(tmp_path / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
+    expected = np.column_stack([np.linspace(1.0, 12.0, 9), data["outcomes"]])
+    np.testing.assert_allclose(table, expected)
     rows = said["tables"]["spectra"]
     assert [row["runs"] for row in rows] == 7 * [81]
     assert rows[1]["safe"] == np.mean(data["outcomes"] == 0)
 
 
 @pytest.mark.parametrize(
-    ("name", "words", "model", "stem"),
+    ("text", "words", "model", "stem"),
     [
-        ("bookcase", [], "ebm-unilateral", "bookcase--ebm-unilateral"),
-        ("free", [], "ebm", "free"),
-        ("bookcase", ["--model", "ebm"], "ebm", "bookcase"),
+        (SCENE, [], "ebm-unilateral", "shelf--ebm-unilateral"),
+        (SCENE.replace("walls", "#"), [], "ebm", "shelf"),
+        (SCENE, ["--model", "ebm"], "ebm", "shelf"),
     ],
 )
-def test_beside_a_wall_of_ones_own_the_block_may_hop(tmp_path, told, name, words, model, stem):
-    asked = ("spectrum", f"{name}.toml", "--size", "3", "--refine", "--out", "out")
+def test_beside_a_wall_of_ones_own_the_block_may_hop(tmp_path, told, text, words, model, stem):
+    path = tmp_path / "shelf.toml"
+    path.write_text(text, "utf-8")
+    asked = ("spectrum", str(path), "--size", "3", "--refine", "--out", str(tmp_path))
     assert told(*asked, *words)["model"] == model
-    assert (tmp_path / "out" / f"{stem}.npz").exists()
-    assert (tmp_path / "out" / "figures" / f"{stem}.svg").exists()
+    assert {path.name for path in tmp_path.rglob("*.*")} >= {f"{stem}.npz", f"{stem}.svg"}

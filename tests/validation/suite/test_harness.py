@@ -15,48 +15,44 @@ import pytest
 ROOT = Path(__file__).parents[3]
 
 
-class Copy:
-    """A copy of the project in which files can be changed and put back,
-    compiled code and times kept."""
+def start(folder: Path, *words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "rockcheck", "validate", "smoke", *words, "--no-report"],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"},
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        ignore = shutil.ignore_patterns("__pycache__")
-        shutil.copytree(ROOT / "rockcheck", folder / "rockcheck", ignore=ignore)
 
-    def start(self, *words: str) -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [sys.executable, "-m", "rockcheck", "validate", "smoke", *words, "--no-report"],
-            cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": str(self.folder), "PYTHONDONTWRITEBYTECODE": "1"},
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
+def run(folder: Path, *words: str) -> tuple[int, str]:
+    process = start(folder, *words)
+    out, _ = process.communicate(timeout=900)
+    return process.returncode, out
 
-    def run(self, *words: str) -> tuple[int, str]:
-        process = self.start(*words)
-        out, _ = process.communicate(timeout=900)
-        return process.returncode, out
 
-    def run_changed(self, file: str, old: str, new: str, *words: str) -> tuple[int, str]:
-        """A run with a regular expression replaced in one file."""
-        path = self.folder / "rockcheck" / file
-        text = path.read_text(encoding="utf-8")
-        path.write_text(re.sub(old, new, text, count=1), encoding="utf-8")
-        try:
-            return self.run(*words)
-        finally:
-            path.write_text(text, encoding="utf-8")
+def run_changed(folder: Path, file: str, old: str, new: str, *words: str) -> tuple[int, str]:
+    path = folder / "rockcheck" / file
+    text = path.read_text("utf-8")
+    path.write_text(re.sub(old, new, text, count=1), "utf-8")
+    try:
+        return run(folder, *words)
+    finally:
+        path.write_text(text, "utf-8")
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
-    copy = Copy(tmp_path_factory.mktemp("project"))
-    code, out = copy.run("--strict")
+    """The folder of a copy in which files can be changed and put back, compiled code and times
+    kept."""
+    folder = tmp_path_factory.mktemp("project")
+    ignore = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "rockcheck", folder / "rockcheck", ignore=ignore)
+    code, out = run(folder, "--strict")
     assert code == 0, out
-    return copy
+    return folder
 
 
 #: What is done wrong, in which file, by replacing what (a regular expression) with what, and how
@@ -136,7 +132,7 @@ FAULTS = [
     ("fault", "file", "old", "new", "untouched"), FAULTS, ids=[fault[0] for fault in FAULTS]
 )
 def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new, untouched):
-    code, out = project.run_changed(file, old, new, "--strict")
+    code, out = run_changed(project, file, old, new, "--strict")
     assert code in (1, 3), f"{fault}: {out}"
     assert f"{untouched} of 25 simulations were up to date" in out
     assert "Traceback" not in out
@@ -161,7 +157,7 @@ CHANGES = [
 @pytest.mark.parametrize(("file", "old"), [(fault[1], fault[2]) for fault in FAULTS + CHANGES])
 def test_what_is_to_be_changed_is_there(file: str, old: str) -> None:
     """Each day, not each night only: else a fault that cannot be planted any more is not missed."""
-    assert re.search(old, (ROOT / file).read_text(encoding="utf-8")), "mend this test"
+    assert re.search(old, (ROOT / file).read_text("utf-8")), "mend this test"
 
 
 @pytest.mark.slow
@@ -171,9 +167,9 @@ def test_what_is_to_be_changed_is_there(file: str, old: str) -> None:
     ids=[change[0] for change in CHANGES],
 )
 def test_exactly_what_depends_on_a_change_runs_again(project, file, old, new, untouched):
-    project.run()
-    assert "25 of 25 simulations were up to date" in project.run()[1]
-    _, out = project.run_changed(file, old, new)
+    run(project)
+    assert "25 of 25 simulations were up to date" in run(project)[1]
+    _, out = run_changed(project, file, old, new)
     assert f"{untouched} of 25 simulations were up to date" in out
 
 
@@ -183,19 +179,19 @@ def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
         return [(folder / name).read_bytes() for name in ("checks.csv", "figures.csv")]
 
     began = time.perf_counter()
-    project.run("validate", "smoke", "--out", str(tmp_path / "undisturbed"))
+    run(project, "--out", str(tmp_path / "undisturbed"))
     length = time.perf_counter() - began
     expected = tables(tmp_path / "undisturbed")
     chance = random.Random(20)
     killed = 0
     for attempt in range(20):
         out = tmp_path / f"killed-{attempt}"
-        process = project.start("validate", "smoke", "--out", str(out))
+        process = start(project, "--out", str(out))
         time.sleep(chance.uniform(0.0, 1.1) * length)
         killed += process.poll() is None
         process.kill()
         process.communicate()
-        code, text = project.run("validate", "smoke", "--out", str(out))
+        code, text = run(project, "--out", str(out))
         assert code == 0, text
         assert tables(out) == expected
         assert not _alive(process.pid), "its workers outlive a killed run"
@@ -205,21 +201,16 @@ def test_a_killed_run_goes_on_and_ends_the_same(project, tmp_path):
 
 @pytest.mark.slow
 def test_two_runs_on_one_folder(project, tmp_path):
-    both = [project.start("--out", str(tmp_path / "shared")) for _ in range(2)]
+    both = [start(project, "--out", str(tmp_path / "shared")) for _ in range(2)]
     texts = [process.communicate(timeout=900)[0] for process in both]
     assert [process.returncode for process in both] == [0, 0], texts
 
 
 def _alive(group: int) -> list[str]:
     """Processes of a process group, after half a minute's grace."""
-    listed: list[str] = []
+    listing = ["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)]
     for _ in range(60):
-        done = subprocess.run(
-            ["ps", "-o", "pid=,args=", "--sort=pid", "-g", str(group)],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        done = subprocess.run(listing, capture_output=True, text=True, check=False)
         listed = [line for line in done.stdout.splitlines() if "<defunct>" not in line]
         if not listed:
             break

@@ -38,112 +38,125 @@ def check(
 
 
 def run_of(*checks: Check, **more: object) -> Run:
-    cell = Cell(scene="s", model="m", status="done", checks=checks)
     return Run(
         suite="mine",
         created="",
         reference="r",
         scenes={"s": {}},
         models=("r", "m"),
-        cells=(cell,),
+        cells=(Cell(scene="s", model="m", status="done", checks=checks),),
         **more,
     )
 
 
 @pytest.mark.parametrize(
-    ("measure", "line", "values"),
+    ("measure", "line", "more", "values"),
     [
-        # A quantity counts by what it has beyond its floor, on either side of zero; far from zero
-        # the floor says nothing.
-        (
-            "last_rotation",
-            (2.8e-6, 1e-5, 1e-6),
-            {2.2e-5: "pass", -2.2e-5: "pass", 2.5e-5: "changed", 3.5e-5: "fail", -3.5e-5: "fail"},
+        *(
+            (measure, line, {}, values)
+            for measure, line, values in (
+                # A quantity counts by what it has beyond its floor, on either side of zero; far
+                # from zero the floor says nothing.
+                (
+                    "last_rotation",
+                    (2.8e-6, 1e-5, 1e-6),
+                    {
+                        2.2e-5: "pass",
+                        -2.2e-5: "pass",
+                        2.5e-5: "changed",
+                        3.5e-5: "fail",
+                        -3.5e-5: "fail",
+                    },
+                ),
+                (
+                    "last_rotation",
+                    (0.2, 1e-5, 1e-6),
+                    {0.2: "pass", 0.200005: "changed", 0.20002: "fail"},
+                ),
+                # The drift band is as wide as it says, whatever the size of what was expected.
+                ("end_time", (6.0, 1.0, 0.25), {6.25: "pass", 6.5: "changed", 7.5: "fail"}),
+                (
+                    "floor_impacts",
+                    (50.0, 5.0, 1.0),
+                    {51.0: "pass", 52.0: "changed", 48.0: "changed", 56.0: "fail"},
+                ),
+                (
+                    "peak_rotation",
+                    (0.33, 0.01, 0.001),
+                    {0.33: "pass", 0.335: "changed", 0.345: "fail"},
+                ),
+                # A figure just at its drift passes, one just at its limit does not fail: numbers
+                # that a computer holds exactly.
+                (
+                    "theta_rms",
+                    (0.25, 0.5, 0.125),
+                    {0.375: "pass", 0.125: "pass", 0.3750001: "changed", 0.1249999: "better"}
+                    | {
+                        0.5: "changed",
+                        0.5000001: "fail",
+                        -0.5: "changed",
+                        0.0: "better",
+                        -0.75: "fail",
+                    },
+                ),
+                # An error is better where it falls. Its limit holds as it is written.
+                (
+                    "theta_rms",
+                    (2.3e-2, 4.6e-2, 1e-3),
+                    {1.4e-7: "better", 2.25e-2: "pass", 2.5e-2: "changed", 5e-2: "fail"},
+                ),
+                ("theta_rms", (0.1, 0.05, 1e-3), {0.06: "fail"}),
+                ("theta_rms", (0.0, 1e-9, 0.0), {1e-10: "pass", 2e-9: "fail"}),
+                (
+                    "peak_ratio",
+                    (1.125, 0.25, 0.01),
+                    {1.0: "better", 1.0625: "better", 0.875: "changed", 0.5: "fail"},
+                ),
+                (
+                    "peak_ratio",
+                    (1.0, 0.1, 0.05),
+                    {1.0: "pass", 0.94: "changed", 0.89: "fail", 1.11: "fail"},
+                ),
+                ("outcome_agrees", (0.0, 1.0, 0.0), {0.0: "pass", 1.0: "better"}),
+                ("outcome_agrees", (1.0, 0.0, 0.0), {1.0: "pass", 0.0: "fail"}),
+                ("events_agree_until", (None, 8.0, None), {8.0: "pass", 12.0: "pass", 7.9: "fail"}),
+                (
+                    "events_agree_until",
+                    (9.0, 8.0, 0.1),
+                    {12.0: "better", 9.05: "pass", 8.5: "changed", 7.0: "fail"},
+                ),
+            )
         ),
-        ("last_rotation", (0.2, 1e-5, 1e-6), {0.2: "pass", 0.200005: "changed", 0.20002: "fail"}),
-        # The drift band is as wide as it says, whatever the size of what was expected.
-        ("end_time", (6.0, 1.0, 0.25), {6.25: "pass", 6.5: "changed", 7.5: "fail"}),
+        # A quantity is better where it comes nearer to that of the reference.
         (
-            "floor_impacts",
-            (50.0, 5.0, 1.0),
-            {51.0: "pass", 52.0: "changed", 48.0: "changed", 56.0: "fail"},
-        ),
-        ("peak_rotation", (0.33, 0.01, 0.001), {0.33: "pass", 0.335: "changed", 0.345: "fail"}),
-        # A figure just at its drift passes, one just at its limit does not fail: numbers that a
-        # computer holds exactly.
-        (
-            "theta_rms",
-            (0.25, 0.5, 0.125),
-            {0.375: "pass", 0.125: "pass", 0.3750001: "changed", 0.1249999: "better"}
-            | {0.5: "changed", 0.5000001: "fail", -0.5: "changed", 0.0: "better", -0.75: "fail"},
-        ),
-        # An error is better where it falls. Its limit holds as it is written.
-        (
-            "theta_rms",
-            (2.3e-2, 4.6e-2, 1e-3),
-            {1.4e-7: "better", 2.25e-2: "pass", 2.5e-2: "changed", 5e-2: "fail"},
-        ),
-        ("theta_rms", (0.1, 0.05, 1e-3), {0.06: "fail"}),
-        ("theta_rms", (0.0, 1e-9, 0.0), {1e-10: "pass", 2e-9: "fail"}),
-        (
-            "peak_ratio",
-            (1.125, 0.25, 0.01),
-            {1.0: "better", 1.0625: "better", 0.875: "changed", 0.5: "fail"},
+            *("peak_rotation", (3.06e-4, 1e-5, 1e-6)),
+            {"kind": "absolute", "beside": 0.0},
+            {7.7e-5: "better", 4e-4: "fail"},
         ),
         (
-            "peak_ratio",
-            (1.0, 0.1, 0.05),
-            {1.0: "pass", 0.94: "changed", 0.89: "fail", 1.11: "fail"},
+            *("peak_rotation", (3.06e-4, 1e-5, 1e-6)),
+            {"kind": "absolute"},
+            {7.7e-5: "fail", 4e-4: "fail"},
         ),
-        ("outcome_agrees", (0.0, 1.0, 0.0), {0.0: "pass", 1.0: "better"}),
-        ("outcome_agrees", (1.0, 0.0, 0.0), {1.0: "pass", 0.0: "fail"}),
-        ("events_agree_until", (None, 8.0, None), {8.0: "pass", 12.0: "pass", 7.9: "fail"}),
         (
-            "events_agree_until",
-            (9.0, 8.0, 0.1),
-            {12.0: "better", 9.05: "pass", 8.5: "changed", 7.0: "fail"},
-        ),
-    ],
-)
-def test_the_rule(measure, line, values):
-    tolerance = Tolerance(**dict(zip(("expected", "limit", "drift"), line, strict=True)))
-    floor = 2.3e-5 if MEASURES[measure].role == "quantity" else None
-    assert {
-        value: check(measure, value, tolerance, floor=floor).verdict for value in values
-    } == values
-
-
-@pytest.mark.parametrize(
-    ("kind", "measure", "line", "beside", "values"),
-    [
-        ("absolute", "peak_rotation", (3.06e-4, 1e-5, 1e-6), 0.0, {7.7e-5: "better", 4e-4: "fail"}),
-        ("absolute", "peak_rotation", (3.06e-4, 1e-5, 1e-6), None, {7.7e-5: "fail", 4e-4: "fail"}),
-        (
-            "absolute",
-            "floor_impacts",
-            (5.0, 0.1, 0.01),
-            41.0,
+            *("floor_impacts", (5.0, 0.1, 0.01)),
+            {"kind": "absolute", "beside": 41.0},
             {53.0: "better", 41.0: "better", 4.0: "fail", 78.0: "fail"},
         ),
-        # What comes nearer to another model form is not better.
-        ("model form", "theta_rms", (0.3, 0.5, 0.01), None, {0.1: "changed"}),
         (
-            "absolute",
-            "highest_hop",
-            (1.2e-3, 2e-3, 2e-6),
-            1.3e-3,
+            *("highest_hop", (1.2e-3, 2e-3, 2e-6)),
+            {"kind": "absolute", "beside": 1.3e-3},
             {1.3e-3: "better", 1e-3: "changed"},
         ),
+        # What comes nearer to another model form is not better.
+        ("theta_rms", (0.3, 0.5, 0.01), {"kind": "model form"}, {0.1: "changed"}),
     ],
 )
-def test_a_quantity_is_better_where_it_comes_nearer_to_the_reference(
-    kind, measure, line, beside, values
-):
+def test_the_rule(measure, line, more, values):
     tolerance = Tolerance(**dict(zip(("expected", "limit", "drift"), line, strict=True)))
-    assert {
-        value: check(measure, value, tolerance, kind=kind, beside=beside).verdict
-        for value in values
-    } == values
+    if MEASURES[measure].role == "quantity" and not more:
+        more = {"floor": 2.3e-5}
+    assert {value: check(measure, value, tolerance, **more).verdict for value in values} == values
 
 
 def test_floors_come_from_the_rows_and_from_u_num():
@@ -159,22 +172,24 @@ def test_floors_come_from_the_rows_and_from_u_num():
             ),
         ],
     )
-    for name, floor, floor_of_known in (
-        ("last_rotation", p2 * 0.005**2 / 8, 3e-4),
-        ("peak_rotation", p2 * 0.005**2 / 8, 3e-4),
-        ("last_x", 9.81 * 0.005**2 / 8, 9.81 * 0.005**2 / 8),
-        ("end_time", 0.005, 0.005),
-        ("theta_rms", 1e-6, 3e-4),
-        ("theta_peak", 1e-6, 3e-4),
-        ("floor_impacts", 0.0, 0.0),
-    ):
-        assert floor_of(MEASURES[name], SCENE, None) == pytest.approx(floor), name
-        assert floor_of(MEASURES[name], SCENE, known) == pytest.approx(floor_of_known), name
+    floors = {
+        "last_rotation": (p2 * 0.005**2 / 8, 3e-4),
+        "peak_rotation": (p2 * 0.005**2 / 8, 3e-4),
+        "last_x": (9.81 * 0.005**2 / 8, 9.81 * 0.005**2 / 8),
+        "end_time": (0.005, 0.005),
+        "theta_rms": (1e-6, 3e-4),
+        "theta_peak": (1e-6, 3e-4),
+        "floor_impacts": (0.0, 0.0),
+    }
+    assert {
+        name: tuple(floor_of(MEASURES[name], SCENE, of) for of in (None, known)) for name in floors
+    } == {name: pytest.approx(values) for name, values in floors.items()}
 
 
-BETTER = check("theta_rms", 1e-3, Tolerance(expected=0.1, limit=0.2, drift=0.01))
-PASSES = check("theta_rms", 0.1, Tolerance(expected=0.1, limit=0.2, drift=0.01))
-CHANGED = check("theta_rms", 0.15, Tolerance(expected=0.1, limit=0.2, drift=0.01))
+BETTER, PASSES, CHANGED = (
+    check("theta_rms", value, Tolerance(expected=0.1, limit=0.2, drift=0.01))
+    for value in (1e-3, 0.1, 0.15)
+)
 NOTHING = check("peak_ratio", None, None, note="not defined here: the reference does not rotate")
 
 
@@ -267,7 +282,7 @@ def test_a_better_step_passes_and_is_accepted_without_a_reason(typed):
         ("8e-5", "validate mine.toml", 1, []),
         ("8e-5", "accept mine.toml", 1, ["--reason"]),
     ):
-        Path("mine.toml").write_text(SUITE.replace("OFFSET", offset), encoding="utf-8")
+        Path("mine.toml").write_text(SUITE.replace("OFFSET", offset), "utf-8")
         options = ["--no-report"] * command.startswith("validate")
         words = [*command.split(), "--allow-code", "faulty:Still", "--jobs", "1", *options]
         typed(*words, code=code, holds=holds)

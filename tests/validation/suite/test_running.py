@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from collections import deque
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -47,14 +46,10 @@ FINE = (
 )
 
 
-def write_suite(
-    folder: Path, models: dict[str, str], tolerances: str = "", seconds: float = 60.0
-) -> Path:
+def write_suite(folder, models, tolerances="", seconds=60.0):
     tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
-    path.write_text(
-        SUITE.format(models=tables, tolerances=tolerances, seconds=seconds), encoding="utf-8"
-    )
+    path.write_text(SUITE.format(models=tables, tolerances=tolerances, seconds=seconds))
     return path
 
 
@@ -62,7 +57,7 @@ def write_suite(
 def run(tmp_path, faulty):
     """Runs a suite as a new process would, which has not read the code before."""
 
-    def run(path: Path, jobs: int = 0, **options: object) -> Run:
+    def run(path, jobs=0, **options):
         sys.modules.pop("faulty", None)
         provenance.code_digest.cache_clear()
         provenance._source_of.cache_clear()
@@ -85,13 +80,8 @@ def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("where", [{"jobs": 2}, {"scheduler": "local:2"}], ids=["here", "cluster"])
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run, where):
-    path = write_suite(
-        tmp_path,
-        {name: f'model = "faulty:{name}"' for name in OWN_NAMES},
-        FINE.format(model="Still"),
-        seconds=15.0,
-    )
-    done = run(path, **where)
+    models = {name: f'model = "faulty:{name}"' for name in OWN_NAMES}
+    done = run(write_suite(tmp_path, models, FINE.format(model="Still"), seconds=15.0), **where)
     reasons = {cell.model: cell.reason for cell in done.cells}
     assert "memory" in reasons.pop("Hog").lower()
     assert reasons == {
@@ -123,9 +113,9 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
         "a": ("done", "pass", ""),
         "pybullet": (status, "incomplete", "not installed: so"),
     }
-    missed = status == "absent"
-    failed = strict and missed
-    assert (done.verdict, done.exit_code) == ("incomplete" if missed else "pass", int(failed))
+    failed = strict and status == "absent"
+    verdict = "incomplete" if status == "absent" else "pass"
+    assert (done.verdict, done.exit_code) == (verdict, int(failed))
     assert list(verdict_lines(done)) == ["pybullet: not installed: so"]
     (suite,) = ElementTree.fromstring(junit(done))
     assert (suite.get("skipped"), suite.get("failures")) == (("0", "1") if failed else ("1", "0"))
@@ -209,7 +199,7 @@ def test_models_of_different_form_may_fall_apart_where_that_is_accepted(
     tmp_path, run, text, outcomes, kind, verdict
 ):
     path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, "utf-8")
     done = run(path)
     assert [cell.outcome for cell in done.cells] == outcomes
     assert [(check.kind, check.verdict) for _, check in done.checks()] == [(kind, verdict)] * 2
@@ -235,8 +225,8 @@ def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(
 ):
     done = run(write_suite(tmp_path, models, tolerances))
     assert [check.reason for _, check in done.checks()] == reasons
-    assert (done.faults, done.without_tolerance) == (faults, missing)
-    assert (done.words, done.exit_code) == (words, 1)
+    found = (done.faults, done.without_tolerance, done.words, done.exit_code)
+    assert found == (faults, missing, words, 1)
 
 
 def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
@@ -282,8 +272,7 @@ def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     longer."""
     study = SuiteStudy(load_suite("paper"), tmp_path)
     begun = [(cell.variant.label, cell.place) for cell in in_order(study.items)]
-    first = ("mujoco", "ebm-unilateral", "cm")
-    assert begun[:3] == [(model, "fig4a") for model in first]
+    assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
     engines = begun[3:10]
     assert {model for model, _ in engines} == {"mujoco", "pybullet"}
     assert [scene[:4] for _, scene in engines] == 4 * ["fig5"] + 3 * ["fig4"]

@@ -14,7 +14,7 @@ SHELF = (
 
 def suite(tmp_path, text):
     path = tmp_path / "mine.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, "utf-8")
     return load_suite(path)
 
 
@@ -33,7 +33,8 @@ def test_scenes_by_name_by_table_and_by_file_and_models_by_labels_of_their_own(t
 
 
 def test_a_grid_is_every_combination(tmp_path):
-    text = (
+    found = suite(
+        tmp_path,
         MODELS
         + """
 [[grid]]
@@ -52,9 +53,8 @@ duration = 1.0
 block = { half_width = 0.1, half_height = 0.4 }
 floor = { friction = 0.5 }
 walls = [{ restitution = 0.5 }]
-"""
+""",
     )
-    found = suite(tmp_path, text)
     assert list(found.scenes) == [
         f"w-{side}-{rest}" for side in ("left", "right") for rest in ("3mm", "53mm", "mu09")
     ]

@@ -5,9 +5,6 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 
 import pytest
@@ -45,7 +42,7 @@ ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
 
 
 @pytest.fixture
-def run(tmp_path, faulty) -> Callable[[], Run]:
+def run(tmp_path, faulty):
     (tmp_path / "mine.toml").write_text(SUITE)
 
     def run() -> Run:
@@ -55,7 +52,7 @@ def run(tmp_path, faulty) -> Callable[[], Run]:
     return run
 
 
-def stored(folder: Path, kind: str = "json") -> list[Path]:
+def stored(folder, kind="json"):
     """The files of that kind, by what follows the first point of their names."""
     files = (
         path for name in (HISTORIES, COMPARISONS) for path in (folder / "out" / name).iterdir()
@@ -63,7 +60,7 @@ def stored(folder: Path, kind: str = "json") -> list[Path]:
     return sorted(path for path in files if path.name.partition(".")[2] == kind)
 
 
-def plain(run: Run) -> list[Any]:
+def plain(run):
     return [(cell.figures, cell.verdict, cell.outcome, cell.reason) for cell in run.cells]
 
 
@@ -72,7 +69,7 @@ def sealed(path, content):
     Store(path.parent.parent).put_record(path.parent.name, path.stem, content)
 
 
-DAMAGE: dict[str, Callable[[Path], Any]] = {
+DAMAGE = {
     "figures edited": lambda path: path.write_text(
         json.dumps(json.loads(path.read_text(), parse_float=lambda value: 0.5 * float(value) + 7.0))
     ),
@@ -154,9 +151,15 @@ EVIL = (
 def test_names_in_the_summary_and_in_junit_are_text():
     """A model, scene, suite or reason may be called anything: no tag, link, picture, line or
     control character comes of it."""
-    cell = Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL)
-    about = {"suite": EVIL, "created": "2026", "reference": "x", "scenes": {}, "faults": (EVIL,)}
-    made = Run(**about, models=(EVIL,), cells=(cell,))
+    made = Run(
+        suite=EVIL,
+        created="2026",
+        reference="x",
+        scenes={},
+        faults=(EVIL,),
+        models=(EVIL,),
+        cells=(Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL),),
+    )
     text = markdown(made)
     assert text.replace("\n", "").isprintable()
     assert len([line for line in text.splitlines() if line.startswith("#")]) == 1
