@@ -14,17 +14,16 @@ from rockcheck.commands import (
     OutOption,
     Played,
     answer,
+    completing,
     console,
     model_names,
-    one_of,
-    scene_names,
     setting_of,
     studied,
     tell_missing,
     usable_folder,
 )
-from rockcheck.scenes.errors import InputError, NotInstalled, printable, unknown_name
-from rockcheck.scenes.files import load_scene
+from rockcheck.scenes.errors import InputError, NotInstalled, one_of, printable, unknown_name
+from rockcheck.scenes.files import load_scene, named_scenes
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import name_of
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
@@ -32,11 +31,6 @@ from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, 
 #: Nothing begins later than this; what was left out begins with the next run.
 MINUTES = 25.0
 PAPER = {"paper": tuple(FIGURES), **{f"fig{number}": (number,) for number in FIGURES}}
-
-
-def _panel_names(incomplete: str) -> list[str]:
-    """For the shell's completion: the paper's figures, and scenes."""
-    return [*(name for name in PAPER if name.startswith(incomplete)), *scene_names(incomplete)]
 
 
 @dataclass(frozen=True)
@@ -69,7 +63,7 @@ def spectrum(
             metavar="[WHAT]",
             help="paper (all 28 spectra), fig6, fig7, fig8 or fig9; or your own block, walls,"
             " friction and pulse or record: a scene's name or a .toml file.",
-            autocompletion=_panel_names,
+            autocompletion=completing(lambda: [*PAPER, *named_scenes()]),
         ),
     ] = "paper",
     grid: Grid = Grid(),

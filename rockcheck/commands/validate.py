@@ -16,11 +16,11 @@ from rockcheck.commands import (
     Played,
     answer,
     chosen_models,
+    completing,
     console,
     model_names,
     playing,
     progress,
-    suite_names,
     tell_left_out,
     tell_missing,
     told,
@@ -34,7 +34,13 @@ from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
+from rockcheck.validation.suite.suites import (
+    Suite,
+    is_scene,
+    load_suite,
+    named_suites,
+    scene_suite,
+)
 from rockcheck.validation.suite.tables import finding_of, summary
 
 #: The folder of the trend's page.
@@ -77,7 +83,7 @@ _named = partial(
     typer.Argument,
     help="Named, or a .toml file (default: suite paper).",
     show_default=False,
-    autocompletion=suite_names,
+    autocompletion=completing(named_suites),
 )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene
 from rockcheck.scenes.base import MOST
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import one_of, printable
 from rockcheck.validation.execute.pool import Failure, guarded
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
@@ -126,9 +126,7 @@ def family(name: str) -> Family:
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
-    if name not in FAMILIES:
-        raise unknown_name("model", name, FAMILIES)
-    return FAMILIES[name]
+    return FAMILIES[one_of("model", name, FAMILIES)]
 
 
 def engine_names() -> tuple[str, ...]:

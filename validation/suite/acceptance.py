@@ -72,7 +72,9 @@ def _accept(
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
         elif line != old:
-            table = _table(tables, (cell.scene, cell.model, against))
+            table = tables
+            for depth, name in enumerate((cell.scene, cell.model, against)):
+                table = table.setdefault(name, tomlkit.table(is_super_table=depth < 2))
             changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
             entry = tomlkit.inline_table()
             entry.update(line)
@@ -140,17 +142,9 @@ def _named(check: Check, line: Mapping[str, Any]) -> str:
     return "tightened" if check.weighs == "pass" else "moved"
 
 
-def _table(tables: Any, path: tuple[str, ...]) -> Any:
-    for depth, name in enumerate(path, 1):
-        tables = tables.setdefault(name, tomlkit.table(is_super_table=depth < len(path)))
-    return tables
-
-
 def _round(value: float, down: bool = False) -> float:
     """`value` with two digits, rounded up (or down)."""
-    if value == 0.0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    unit = 10.0 ** (math.floor(math.log10(abs(value) or 1.0)) - 1)
     steps = math.floor(value / unit) if down else math.ceil(value / unit * (1.0 - 1e-12))
     return float(f"{steps * unit:.2g}")
 

@@ -16,7 +16,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
-from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import (
     Played,
@@ -352,10 +352,6 @@ class SuiteStudy(Study):
     def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
         planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
         played = {label: self._together(batches) for label, batches in planned.items()}
-        samples = {
-            label: Sample(np.array(one.peaks, dtype=float), one.outcomes)
-            for label, one in played.items()
-        }
         whole = EnsembleRecord(
             name=name,
             description=ensemble.description,
@@ -364,7 +360,7 @@ class SuiteStudy(Study):
             outcomes={label: one.outcomes for label, one in played.items()},
         )
         return whole, [
-            self._ensemble_cell(batches, samples, played[label].cost)
+            self._ensemble_cell(batches, whole.samples, played[label].cost)
             for label, batches in planned.items()
         ]
 

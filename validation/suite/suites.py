@@ -63,7 +63,7 @@ from pydantic import Field
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import one_of, printable, unknown_name
 from rockcheck.scenes.files import (
     UncertainScene,
     load_uncertain_scene,
@@ -73,8 +73,7 @@ from rockcheck.scenes.files import (
     uncertain_scene,
     uncertain_scene_from,
 )
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.discrepancy.statistics import STATISTICS
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
 from rockcheck.validation.execute.models import Work, build, check_allowed, family, is_own
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
@@ -205,8 +204,7 @@ class Suite:
         """The suite with one cell, and the references that it is compared with."""
         own = self.owners.get(scene, self)
         for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
-            if name not in known:
-                raise unknown_name(f"{what} of the suite", name, known)
+            one_of(f"{what} of the suite", name, known)
         tolerances = {
             place: line
             for place, line in own.tolerances.items()
@@ -413,12 +411,11 @@ def _tolerances(
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
         for place in tolerances:
-            if place.against not in (OWN_FIGURES, *models):
-                raise unknown_name(
-                    f"reference of [{place.scene}.{place.model}]",
-                    place.against,
-                    [OWN_FIGURES, *models],
-                )
+            one_of(
+                f"reference of [{place.scene}.{place.model}]",
+                place.against,
+                [OWN_FIGURES, *models],
+            )
     except InputError as error:
         raise InputError(f"{printable(path)}: {error}") from None
     return tolerances
