@@ -376,12 +376,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
-    # the side to which each overturns
-    sides = {
-        said.split()[1] if said.startswith(("overturned ", "falling ")) else ""
-        for said in map(outcome_of, done)
-    }
-    differs = len(sides) > 1
+    differs = len({_side(outcome_of(one)) for one in done}) > 1
     nearest = max(cell.checks, key=use, default=None)
     used = use(nearest) if nearest else 0.0
     return {
@@ -412,6 +407,12 @@ def outcome_of(cell: Cell) -> str:
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:
         return f"falling {'left' if last > 0.0 else 'right'}"
     return cell.fate
+
+
+def _side(outcome: str) -> str:
+    """'left', 'right', or '' if the block does not overturn."""
+    words = outcome.split()
+    return words[1] if words and words[0] in ("overturned", "falling") else ""
 
 
 def accuracy(run: Run) -> list[Block]:

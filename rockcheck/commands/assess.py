@@ -157,17 +157,27 @@ def check_tried(
     scene = given.scene
     begins = (scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity)
     rests = scene.excitation.kind == scene.vertical.kind == "rest"
-    if rests and not (recorded or any(begins) or scene.initial_height):
-        raise InputError("are needed: the base of the scene is at rest", "records")
-    if tried.samples is not None and not drawn.spreads:
-        besides = " besides the excitation that the records replace" if given.spreads else ""
-        raise InputError(
+    besides = " besides the excitation that the records replace" if given.spreads else ""
+    for wrong, option, said in (
+        (
+            rests and not (recorded or any(begins) or scene.initial_height),
+            "records",
+            "are needed: the base of the scene is at rest",
+        ),
+        (
+            tried.samples is not None and not drawn.spreads,
+            "--samples",
             f"no number of the scene{besides} is uncertain: write one as"
             " { value = 0.3, sd = 0.03 }",
-            "--samples",
-        )
-    if tried.capacity and not (recorded and tried.levels):
-        raise InputError("needs records and --levels", "--capacity")
+        ),
+        (
+            tried.capacity and not (recorded and tried.levels),
+            "--capacity",
+            "needs records and --levels",
+        ),
+    ):
+        if wrong:
+            raise InputError(said, option)
 
 
 def population_of(tried: Tried, scene: Scene, cases: dict[str, UncertainScene]) -> Population:

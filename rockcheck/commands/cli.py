@@ -48,7 +48,7 @@ COMMANDS = {
         "rockcheck conformance --engine mujoco --set settings=default",
     ),
     "stress": ("studies.stress", "rockcheck stress --quick"),
-    "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
+    "report": ("validate.report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
     "warm": ("warm", "rockcheck warm"),
 }
 
@@ -134,7 +134,6 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
 
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
-    """The parameter, or the fields of its group as parameters."""
     if not is_dataclass(given.annotation):
         return [given.replace(kind=_NAMED)]
     hints, values = get_type_hints(given.annotation, include_extras=True), vars(given.default)
@@ -307,14 +306,13 @@ class _Pipe:
 @contextlib.contextmanager
 def _readers_may_go() -> Iterator[None]:
     """Within this block a closed stdout or stderr does not change the exit code."""
-    before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = cast(TextIO, _Pipe(sys.stdout)), cast(TextIO, _Pipe(sys.stderr))
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        sys.stdout, sys.stderr = before
+    out, err = (cast(TextIO, _Pipe(stream)) for stream in (sys.stdout, sys.stderr))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            yield
+        finally:
+            out.flush()
+            err.flush()
 
 
 def _told(message: str, code: int) -> int:

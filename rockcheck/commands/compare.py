@@ -98,7 +98,6 @@ def run(
 def _finding(
     found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
 ) -> Finding:
-    """The finding on a comparison; `shift` (s) is that of the candidate."""
     motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [

@@ -226,8 +226,7 @@ def mean_history(tests: Sequence[History]) -> History:
     }
     if "slip" in stacked:
         scatter["last_slip"] = float(np.std(stacked["slip"][:, -1], ddof=1))
-    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1))
-    factor = quantile / np.sqrt(len(tests))
+    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1) / np.sqrt(len(tests))
     return dataclasses.replace(
         first,
         channels=channels,

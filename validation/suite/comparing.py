@@ -236,7 +236,6 @@ def by_any(
 
 
 def _away(figure: Figure) -> float:
-    """Distance of a figure from its ideal; infinity where it has no value."""
     ideal = DIFFERENCES[figure.measure].ideal
     return float("inf") if figure.value is None or ideal is None else abs(figure.value - ideal)
 

@@ -198,7 +198,6 @@ class SuiteStudy(Study):
             self.store.put_record(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
-        """Compare and judge the cells of a scene, once all are there."""
         cells, found = self.planned[scene], dict[str, Cell]()
         if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
@@ -286,7 +285,6 @@ class SuiteStudy(Study):
         }
 
     def _cell(self, parts: Sequence[Planned], reference: Cell | None) -> Cell:
-        """The cell, compared and judged; `reference` is the reference's cell of that scene."""
         (planned,), record = parts, self.ended[parts[0]]
         if isinstance(record, Failure):
             return Cell(**self._about(parts, record.reason))

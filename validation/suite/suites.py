@@ -384,7 +384,6 @@ def is_scene(source: str) -> bool:
 def _check_names(
     given: SuiteFile, models: Collection[str], scenes: Collection[str], ensembles: Collection[str]
 ) -> None:
-    """Raise `InputError` where something is missing, named twice, or unknown."""
     known = ", ".join(models) or "none"
     count = Counter((*scenes, *(one.name for one in given.ensemble)))
     for wrong, key, said in (

@@ -115,17 +115,18 @@ def _verdict_row(cell: Cell) -> list[Any]:
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
     idle = cell.status == "done" and not cell.checks
     state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
-    share: Any = used(near) if near else ""
-    if near and near.figure.measure in YES_NO:
-        share = value_words(near.figure.value, yes_no=True)
-    elif near and near.words == "no tolerance yet":
-        share = "-"
     return [
         cell.model,
         judged if cell.status == "done" else cell.reason or "failed",
-        share,
+        _limit_used(near) if near else "",
         f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
     ]
+
+
+def _limit_used(check: Check) -> float | str:
+    if check.figure.measure in YES_NO:
+        return value_words(check.figure.value, yes_no=True)
+    return "-" if check.words == "no tolerance yet" else used(check)
 
 
 def outcome_tables(run: Run) -> Iterator[Table]:
