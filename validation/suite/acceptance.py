@@ -72,9 +72,7 @@ def _accept(
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
         elif line != old:
-            table = tables
-            for depth, name in enumerate((cell.scene, cell.model, against)):
-                table = table.setdefault(name, tomlkit.table(is_super_table=depth < 2))
+            table = _table(tables, (cell.scene, cell.model, against))
             changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
             entry = tomlkit.inline_table()
             entry.update(line)
@@ -140,6 +138,12 @@ def _named(check: Check, line: Mapping[str, Any]) -> str:
     if line["limit"] < check.limit if at_least else line["limit"] > check.limit:
         return "loosened"
     return "tightened" if check.weighs == "pass" else "moved"
+
+
+def _table(tables: Any, path: tuple[str, ...]) -> Any:
+    for depth, name in enumerate(path, 1):
+        tables = tables.setdefault(name, tomlkit.table(is_super_table=depth < len(path)))
+    return tables
 
 
 def _round(value: float, down: bool = False) -> float:
