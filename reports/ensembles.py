@@ -187,14 +187,13 @@ class EnsembleView(View):
             ]
 
         others = {m: share - shares[reference] for m, share in shares.items() if m != reference}
-        panels = [
-            Panel("share of scenes below the peak", steps(shares)),
-            Panel(f"difference from {known[reference].label}", [*steps(others), band]),
-        ]
         return Plot(
             self.slug,
             f"Peak rotation in {max(counts.values())} scenes",
-            panels=panels,
+            panels=[
+                Panel("share of scenes below the peak", steps(shares)),
+                Panel(f"difference from {known[reference].label}", [*steps(others), band]),
+            ],
             x=Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5))),
             note=CURVES,
             shared=False,

@@ -1,4 +1,4 @@
-"""The commands of `rockcheck`, a module each, and their common options and output.
+"""The commands of `rockcheck`, and their common options and output.
 
 Tables or JSON go to stdout, progress to stderr.
 """

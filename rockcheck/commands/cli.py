@@ -1,6 +1,6 @@
 """The command `rockcheck`: finds and runs the commands, and prints errors in one line.
 
-Each command is a module of rockcheck.commands.
+Each command is a function of a module of rockcheck.commands.
 """
 
 import contextlib
@@ -30,8 +30,8 @@ from rockcheck.validation.suite.results import FAULT
 #: The commands, in the order of the help: where each is below this package, a module with
 #: its function `run` or another function of one; and an example.
 COMMANDS = {
-    "scenes": ("scenes", "rockcheck scenes"),
-    "new": ("scenes.new", "rockcheck new bookcase.toml"),
+    "scenes": ("simulate.scenes", "rockcheck scenes"),
+    "new": ("simulate.new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
@@ -49,7 +49,7 @@ COMMANDS = {
     ),
     "stress": ("studies.stress", "rockcheck stress --quick"),
     "report": ("validate.report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
-    "warm": ("warm", "rockcheck warm"),
+    "warm": ("simulate.warm", "rockcheck warm"),
 }
 
 #: Replacements of removed commands and options.

@@ -124,22 +124,27 @@ def _finding(
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]
-    data = {
-        "reference": found.reference,
-        "candidate": found.candidate,
-        "start": found.start,
-        "end": found.end,
-        "shift": shift,
-        "gap": found.gap,
-        "headline": headline(found),
-        "motion": {role: motion.model_dump() for role, motion in motions.items()},
-        "notes": {role: history.notes for role, history in histories.items()},
-        "figures": [
-            {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
-            for f in found.figures
-        ],
-    }
-    return Finding("comparison", models, "", blocks, data)
+    return Finding(
+        "comparison",
+        models,
+        "",
+        blocks,
+        {
+            "reference": found.reference,
+            "candidate": found.candidate,
+            "start": found.start,
+            "end": found.end,
+            "shift": shift,
+            "gap": found.gap,
+            "headline": headline(found),
+            "motion": {role: motion.model_dump() for role, motion in motions.items()},
+            "notes": {role: history.notes for role, history in histories.items()},
+            "figures": [
+                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
+                for f in found.figures
+            ],
+        },
+    )
 
 
 def headline(found: Discrepancy) -> str:

@@ -64,7 +64,7 @@ def test_the_front_picture():
 
 
 def test_the_tutorials_bookcase(tmp_path):
-    from rockcheck.commands.scenes import new
+    from rockcheck.commands.simulate import new
 
     new(tmp_path / "bookcase.toml")
     scene = load_scene(tmp_path / "bookcase.toml")

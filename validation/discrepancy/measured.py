@@ -179,11 +179,12 @@ def time_shift(reference: History, candidate: History) -> float:
 
 def shifted(history: History, offset: float) -> History:
     """The same history `offset` s later."""
-    events = tuple(dataclasses.replace(event, t=event.t + offset) for event in history.event_list)
     return dataclasses.replace(
         history,
         channels={**history.channels, "t": history.channels["t"] + offset},
-        event_list=events,
+        event_list=tuple(
+            dataclasses.replace(event, t=event.t + offset) for event in history.event_list
+        ),
     )
 
 

@@ -174,8 +174,11 @@ def summary(run: Run) -> dict[str, Any]:
         "reasons": list(verdict_lines(run)),
     }
     if not run.judged:
-        cells = [outcome_row(cell, run.reference) for cell in run.cells]
-        return common | {"judged": False, "reference": run.reference, "cells": cells}
+        return common | {
+            "judged": False,
+            "reference": run.reference,
+            "cells": [outcome_row(cell, run.reference) for cell in run.cells],
+        }
     return common | {
         "verdict": run.verdict,
         "wall_seconds": run.wall_seconds,
