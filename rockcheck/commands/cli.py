@@ -40,7 +40,7 @@ COMMANDS = {
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("validate.accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
+    "assess": ("studies.assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("studies.spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("studies.benchmark", "rockcheck benchmark --quick"),
     "conformance": (
