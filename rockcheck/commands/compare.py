@@ -17,11 +17,10 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import History, InputError, Scene, load_scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.discrepancy.compare import Discrepancy, compare
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare, motion_of
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run

@@ -37,7 +37,7 @@ from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import announcing, listening, one_run
 from rockcheck.scenes.writing import write_new
-from rockcheck.validation.discrepancy.motion import motion_of
+from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.execute.models import FAMILIES, Work, build, check_allowed, is_own, play
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
