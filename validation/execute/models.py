@@ -22,7 +22,6 @@ class Model(Protocol):
 
     def simulate(self, scene: Scene) -> History:
         """The block's motion; raises `scenes.ModelFailure` where the model cannot finish."""
-        ...  # pragma: no cover
 
 
 @dataclass(frozen=True)
