@@ -295,11 +295,11 @@ def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:
     found = [guarded(_end_of, work, scene) for scene in scenes]
     costs = [one[2] for one in found if not isinstance(one, Failure)]
     ends = [(None, one.reason) if isinstance(one, Failure) else one[:2] for one in found]
-    cost = {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
     record = {
         "peaks": [peak for peak, _ in ends],
         "outcomes": [outcome for _, outcome in ends],
-        "cost": {**cost, "worker_seconds": time.perf_counter() - began},
+        "cost": {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
+        | {"worker_seconds": time.perf_counter() - began},
     }
     traces = (one.traceback for one in found if isinstance(one, Failure) and one.traceback)
     return Played(record, traceback=next(traces, ""))

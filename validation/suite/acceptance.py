@@ -101,9 +101,12 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
         "drift": drift,
         "why": why,
     }
-    measure = MEASURES[check.figure.measure]
     again = judge(
-        check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor
+        check.figure,
+        Tolerance(**line),
+        kind=check.kind,
+        measure=MEASURES[check.figure.measure],
+        floor=check.floor,
     )
     return line if again.verdict == "pass" else again.reason
 

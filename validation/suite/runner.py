@@ -86,8 +86,14 @@ def run_suite(
     A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where
     `folder` cannot be used, and, when interrupted, `KeyboardInterrupt` after all results are kept.
     """
-    study = SuiteStudy(suite, folder)
-    found = run(study, folder, jobs=jobs, force=force, scheduler=scheduler, on_progress=on_progress)
+    found = run(
+        SuiteStudy(suite, folder),
+        folder,
+        jobs=jobs,
+        force=force,
+        scheduler=scheduler,
+        on_progress=on_progress,
+    )
     if not found.complete:
         raise KeyboardInterrupt
     finished: Run = found.data["run"]
@@ -339,8 +345,9 @@ class SuiteStudy(Study):
         Only of those that finished, and whose numerical error is known.
         """
         own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
-        played = self.planned[scene]
-        scatters = {one.model: self.ended[played[one.model][0]].uncertainty for one in done}
+        scatters = {
+            one.model: self.ended[self.planned[scene][one.model][0]].uncertainty for one in done
+        }
         for cell in self.compared[scene]:
             against = {own.reference, own.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
