@@ -38,13 +38,18 @@ from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import announcing, listening, one_run
 from rockcheck.scenes.writing import write_new
 from rockcheck.validation.discrepancy.compare import motion_of
-from rockcheck.validation.execute.models import FAMILIES, Work, build, check_allowed, is_own, play
+from rockcheck.validation.execute.models import (
+    FAMILIES,
+    REFERENCE,
+    Work,
+    build,
+    check_allowed,
+    is_own,
+    play,
+)
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 from rockcheck.validation.finding import Column, Finding, Table, text
-
-#: The model that plays where none is named: the fair reference for engines.
-REFERENCE = "ebm-unilateral"
 
 
 def scenes() -> None:

@@ -55,7 +55,6 @@ MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
 PULSES = (0.5, 8.0)
 #: Draws of the numbers of a single run.
 SAMPLES = 1024
-REFERENCE = "ebm-unilateral"
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ def assess(
             help="The model that plays, and others to compare with it, with commas between.",
             autocompletion=model_names,
         ),
-    ] = REFERENCE,
+    ] = models.REFERENCE,
     settings: Annotated[
         list[str] | None,
         typer.Option(

@@ -42,6 +42,8 @@ class Family:
     compiled: str = ""
 
 
+#: The fair reference for engines, and the model that forbids flight.
+REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
 ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
 #: Further libraries of the engines that step adaptively.

@@ -153,7 +153,7 @@ def _of_scene(
 ) -> T:
     """A result of type `kind` on a scene, by the code of a module; kept in the store."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
-    key = provenance.cell_key(scene, "ebm-unilateral", depends)
+    key = provenance.cell_key(scene, models.REFERENCE, depends)
     return kept(store, name_of(scene.name, what, key), kind, compute)
 
 

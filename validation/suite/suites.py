@@ -74,7 +74,15 @@ from rockcheck.scenes.files import (
     uncertain_scene_from,
 )
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
-from rockcheck.validation.execute.models import Work, build, check_allowed, family, is_own
+from rockcheck.validation.execute.models import (
+    PAPER_MODEL,
+    REFERENCE,
+    Work,
+    build,
+    check_allowed,
+    family,
+    is_own,
+)
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
@@ -86,8 +94,6 @@ from rockcheck.validation.suite.tolerances import (
     parse_tolerances,
 )
 
-#: The fair reference for engines, and the model that forbids flight.
-REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
 #: Time limit (s) of a simulation without a suite.
 UNJUDGED_SECONDS = 900.0
 DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
@@ -129,7 +135,7 @@ class SuiteFile(Frozen):
 
     description: str = ""
     include: tuple[str, ...] = ()
-    reference: str = "ebm-unilateral"
+    reference: str = REFERENCE
     model_form: str = ""
     scenes: tuple[str, ...] = ()
     scene: tuple[dict[str, Any], ...] = ()
