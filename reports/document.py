@@ -41,7 +41,7 @@ from rockcheck.reports.style import (
     stamp_in,
     stamp_of,
 )
-from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
+from rockcheck.scenes.errors import InputError, inert, one_of, printable
 from rockcheck.scenes.reading import MOST_BYTES, head_of, read_json, within
 from rockcheck.scenes.writing import (
     finite,
@@ -203,12 +203,11 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     """
     kind_of(path)
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
-    if name not in known:
-        raise unknown_name("figure", name, known)
+    data = known[one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:
-        (ended,) = pool.run(deque([Call(_draw_again, (known[name], path), DRAWING)]))
+        (ended,) = pool.run(deque([Call(_draw_again, (data, path), DRAWING)]))
     if ended.error is not None:
-        raise InputError(f"{printable(known[name])}: no data of a figure: {ended.outcome.reason}")
+        raise InputError(f"{printable(data)}: no data of a figure: {ended.outcome.reason}")
     return path
 
 
@@ -311,11 +310,10 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     `name` and the `links` of its navigation: (title, address).
     """
     *parts, name = address.split("/")
-    page = TEMPLATES.get_template(template)
-    return write_whole(
-        made(folder, *parts) / name,
-        page.render(root="../" * len(parts), address=address, **context),
+    page = TEMPLATES.get_template(template).render(
+        root="../" * len(parts), address=address, **context
     )
+    return write_whole(made(folder, *parts) / name, page)
 
 
 def write_assets(folder: Path) -> None:

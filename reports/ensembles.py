@@ -11,7 +11,7 @@ from rockcheck.reports.show.words import number, scene_facts
 from rockcheck.reports.tables import checks_table, formula, runs_table, verdict_mark
 from rockcheck.reports.view import View, slugs_of
 from rockcheck.scenes import Scene
-from rockcheck.validation.discrepancy.statistics import CONFIDENCE, Sample, Samples
+from rockcheck.validation.discrepancy.measures import CONFIDENCE, Samples
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -71,17 +71,6 @@ class EnsembleView(View):
     printed: ClassVar[bool] = True
 
     @cached_property
-    def samples(self) -> dict[str, Sample]:
-        """By model: peaks (alpha, NaN where it failed) and outcomes of all scenes."""
-        return {
-            model: Sample(
-                np.array([math.nan if peak is None else peak for peak in peaks]),
-                self.record.outcomes[model],
-            )
-            for model, peaks in self.record.peaks.items()
-        }
-
-    @cached_property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here; the run's own reference first."""
         named = dict.fromkeys(
@@ -91,19 +80,19 @@ class EnsembleView(View):
                 *(figure.against for cell in self.cells for figure in cell.figures),
             ]
         )
-        return tuple(model for model in named if model in self.samples)
+        return tuple(model for model in named if model in self.record.samples)
 
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
         """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
         known = {
             model: np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
-            for model, sample in self.samples.items()
+            for model, sample in self.record.samples.items()
         }
         return {
             model: (
                 peaks.tolist(),
-                (np.arange(1, len(peaks) + 1) / len(self.samples[model].peaks)).tolist(),
+                (np.arange(1, len(peaks) + 1) / len(self.record.samples[model].peaks)).tolist(),
             )
             for model, peaks in known.items()
         }
@@ -123,7 +112,7 @@ class EnsembleView(View):
                 ],
             ),
             self.distributions(),
-            *([self.by_scene()] if len(self.samples) > 1 else []),
+            *([self.by_scene()] if len(self.record.samples) > 1 else []),
             *(table for against in self.references if (table := self.agreement(against)).rows),
             Text(INTERVALS),
             replace(checks_table(self.cells), title="Checks"),
@@ -161,8 +150,8 @@ class EnsembleView(View):
         if "excitation" in drawn.scene:
             return known
         instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
-        base = scene_facts(Scene(**{"name": self.name, **drawn.scene}))
-        return known + [fact for fact in base if not instead.get(fact[0])]
+        base = Scene(**{"name": self.name, **drawn.scene})
+        return known + [fact for fact in scene_facts(base) if not instead.get(fact[0])]
 
     def distributions(self) -> Plot:
         """Share of scenes with a peak below each value, by model; difference from the reference.
@@ -174,13 +163,13 @@ class EnsembleView(View):
         grid = np.unique(
             np.concatenate([[0.0, MOST * 1.05], *(x for x, _ in self.curves.values())])
         )
+        counts = {model: len(peaks) for model, peaks in self.record.peaks.items()}
         shares = {
-            model: np.searchsorted(peaks, grid, side="right") / len(self.samples[model].peaks)
+            model: np.searchsorted(peaks, grid, side="right") / counts[model]
             for model, (peaks, _) in self.curves.items()
         }
         known, reference = self.looks, self.references[0]
-        counts = [len(sample.peaks) for sample in self.samples.values()]
-        same = float(kstwobign.ppf(CONFIDENCE)) * math.sqrt(2.0 / min(counts))
+        same = float(kstwobign.ppf(CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
         ends = (0.0, float(grid[-1]))
         band = Series(
             f"no difference at the {CONFIDENCE:.0%} level",
@@ -198,14 +187,13 @@ class EnsembleView(View):
             ]
 
         others = {m: share - shares[reference] for m, share in shares.items() if m != reference}
-        panels = [
-            Panel("share of scenes below the peak", steps(shares)),
-            Panel(f"difference from {known[reference].label}", [*steps(others), band]),
-        ]
         return Plot(
             self.slug,
-            f"Peak rotation in {max(counts)} scenes",
-            panels=panels,
+            f"Peak rotation in {max(counts.values())} scenes",
+            panels=[
+                Panel("share of scenes below the peak", steps(shares)),
+                Panel(f"difference from {known[reference].label}", [*steps(others), band]),
+            ],
             x=Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5))),
             note=CURVES,
             shared=False,
@@ -214,8 +202,8 @@ class EnsembleView(View):
     def by_scene(self) -> Plot:
         """Peak rotation of each scene by each model against the reference's."""
         reference, known, panels = self.references[0], self.looks, []
-        for model in [one for one in self.samples if one != reference]:
-            pair = Samples(self.samples[reference], self.samples[model])
+        for model in [one for one in self.record.samples if one != reference]:
+            pair = Samples(self.record.samples[reference], self.record.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LEAST, MOST * 1.6))
                 for one in (pair.reference, pair.candidate)
@@ -243,7 +231,10 @@ class EnsembleView(View):
         for cell in self.cells:
             figures = {f.measure: f for f in cell.figures if f.against == against}
             if figures:
-                theirs, own = self.samples[against].fallen, self.samples[cell.model].fallen
+                theirs, own = (
+                    self.record.samples[against].fallen,
+                    self.record.samples[cell.model].fallen,
+                )
                 counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
                 shown = (
                     Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
@@ -265,7 +256,7 @@ class EnsembleView(View):
         """Peak rotation (alpha) and outcome of every scene by every model."""
         values = {
             f"{what} {model}": column
-            for model, sample in self.samples.items()
+            for model, sample in self.record.samples.items()
             for what, column in (
                 ("peak_rotation_alpha", sample.peaks.tolist()),
                 ("outcome", sample.outcomes),

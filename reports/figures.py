@@ -357,7 +357,6 @@ def _decades(fine: float, largest: float) -> dict[float, str]:
 
 
 def _tracks(ax: Any, view: SceneView) -> None:
-    """A row a model: its impacts, so that a missed or an extra one is seen at once."""
     shown = [model for model in view.looks if model in view.histories]
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:

@@ -1,15 +1,20 @@
-"""The pages of a finished run.
+"""The pages of a finished run, and whose turn it is to write into its folder.
 
-They are one folder that opens from the file system and needs no other place.
+The pages are one folder that opens from the file system and needs no other place.
 """
 
+import os
+import platform
 import re
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import tomlkit
+from filelock import FileLock, Timeout
 
 from rockcheck.reports import tables
 from rockcheck.reports.document import FIGURES, PAGES, csv, row_cells, write_assets, write_page
@@ -27,13 +32,13 @@ from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError, Record, Scene, experience
 from rockcheck.scenes.errors import printable, unknown_name
 from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.reading import MOST_BYTES, head_of
-from rockcheck.scenes.writing import made, script_text, write_whole
+from rockcheck.scenes.reading import MOST_BYTES, head_of, read_text
+from rockcheck.scenes.writing import made, no_link, script_text, write_whole
 from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call
 from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite.results import SEVERITY, Run
-from rockcheck.validation.suite.tables import shown
+from rockcheck.validation.suite.tables import files_of, junit, markdown, shown
 
 #: The page to open.
 INDEX = "index.html"
@@ -54,6 +59,54 @@ STUDIES = (
     ("Fragility", "fragility/index.html"),
     ("Trend", "trend/index.html"),
 )
+
+
+LOCK, HOLDER = ".lock", ".lock.holder"
+#: Time that a run waits for another one in the same folder: before it says so, and in all, s.
+SILENT, PATIENCE = 2.0, 600.0
+
+
+@contextmanager
+def _turn(folder: Path) -> Iterator[None]:
+    """Within this block no other run writes into `folder`.
+
+    A run that waits says for which one, and gives up after `PATIENCE` s.
+    """
+    lock, holder = FileLock(no_link(folder / LOCK)), folder / HOLDER
+    try:
+        lock.acquire(timeout=SILENT)
+    except Timeout:
+        other = ""
+        with suppress(InputError):  # it has just gone, or has not said who it is
+            other = printable(read_text(holder, most=1000))
+        whom = f"{other or 'another run'}, which holds {printable(folder / LOCK)}"
+        print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
+        try:
+            lock.acquire(timeout=PATIENCE)
+        except Timeout:
+            raise InputError(
+                f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another"
+                " --out"
+            ) from None
+    try:
+        write_whole(holder, f"process {os.getpid()} on {platform.node()}")
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        lock.release()
+
+
+def keep(run: Run, folder: Path) -> Path:
+    """Write run.json, its schema and the tables; returns run.json.
+
+    The histories are there already. Two runs take turns.
+    """
+    with _turn(folder):
+        for table in files_of(run):
+            write_whole(folder / f"{table.name}.csv", csv(table))
+        write_whole(folder / "junit.xml", junit(run))
+        write_whole(folder / "summary.md", markdown(run))
+        return run.save(folder)
 
 
 def write_figure(folder: Path, name: str, path: Path) -> Path:
@@ -82,32 +135,36 @@ def write_site(
 ) -> Path:
     """Write `index.html` and a page a scene and an ensemble, beside a finished run.
 
-    Figures and data are written with them. Returns the index.
+    Figures and data are written with them. Returns the index. Two runs take turns.
 
     In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are
     made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now.
     What belonged to scenes without a page is removed. Raises `InputError` where a wanted scene is
     not of the run.
     """
-    pages = _Pages(folder, wanted)
-    write_assets(folder)
-    stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
-    waiting = {
-        name: stamp
-        for name, stamp in stamps.items()
-        if afresh or stamp_in(folder / pages.links[name]) != stamp
-    }
-    for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
-        on_progress(done, len(waiting) + 1)
-    remove_site(folder, {INDEX, *pages.links.values()})
+    with _turn(folder):
+        pages = _Pages(folder, wanted)
+        write_assets(folder)
+        stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
+        waiting = {
+            name: stamp
+            for name, stamp in stamps.items()
+            if afresh or stamp_in(folder / pages.links[name]) != stamp
+        }
+        for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
+            on_progress(done, len(waiting) + 1)
+        _remove(folder, {INDEX, *pages.links.values()})
     return folder / INDEX
 
 
-def remove_site(folder: Path, kept: Collection[str] = ()) -> None:
-    """Remove the pages of an earlier run, with their figures and data; by their stamps.
+def remove_site(folder: Path) -> None:
+    """Remove the pages of an earlier run in `folder`: they show other numbers than its run.json."""
+    with _turn(folder):
+        _remove(folder)
 
-    Pages whose addresses are `kept` stay.
-    """
+
+def _remove(folder: Path, kept: Collection[str] = ()) -> None:
+    """Remove pages with their figures and data, by their stamps; addresses that are `kept` stay."""
     for page in (folder / INDEX, *(folder / PAGES).glob("*.html")):
         if page.relative_to(folder).as_posix() not in kept and stamp_in(page):
             for name in _belongings(page):

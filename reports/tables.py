@@ -71,21 +71,25 @@ def verdict_mark(cell: Cell) -> Mark:
 
 def worst_table(run: Run, links: Mapping[str, str]) -> Table:
     """What is not within tolerance, the worst first; `links` are the pages of the scenes."""
-    rows = [
-        _check_row(cell, check, links)
-        if check
-        else [
-            verdict_mark(cell),
-            Mark(cell.scene, link=links.get(cell.scene, "")),
-            cell.model,
-            "no history",
-            *[""] * 4,
-            None,
-            cell.reason,
-        ]
-        for cell, check in worst_first(run)[:WORST]
-    ]
-    return Table("worst", CHECKS, rows, "Not within tolerance, the worst first")
+    return Table(
+        "worst",
+        CHECKS,
+        [
+            _check_row(cell, check, links)
+            if check
+            else [
+                verdict_mark(cell),
+                Mark(cell.scene, link=links.get(cell.scene, "")),
+                cell.model,
+                "no history",
+                *[""] * 4,
+                None,
+                cell.reason,
+            ]
+            for cell, check in worst_first(run)[:WORST]
+        ],
+        "Not within tolerance, the worst first",
+    )
 
 
 def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
@@ -189,17 +193,16 @@ def measures_table(view: SceneView, against: str) -> Table:
                 row.setdefault(cell.model, (figure, check))
     models = [cell.model for cell in view.cells if any(cell.model in row for row in found.values())]
     firsts = {key: next(iter(row.values()))[0] for key, row in found.items()}
-    rows = [
-        [
-            Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
-            *(_measured(*found[key][m]) if m in found[key] else None for m in models),
-        ]
-        for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
-    ]
     return Table(
         "measures",
         [text("measure"), *map(Column, models)],
-        rows,
+        [
+            [
+                Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
+                *(_measured(*found[key][m]) if m in found[key] else None for m in models),
+            ]
+            for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
+        ],
         f"All measures against {label_of(against)}",
         folded=True,
     )
@@ -216,21 +219,6 @@ def _measured(figure: Figure, check: Check | None) -> Mark:
 
 def uncertainty_table(view: SceneView) -> Table:
     """Differences of a scene's models from their references, and their known uncertainty."""
-    rows = [
-        [
-            cell.model,
-            one.quantity,
-            label_of(one.against),
-            None if one.quantity == "outcome" else one.error,
-            unit(one.unit),
-            one.u_num,
-            one.u_input,
-            one.u_data,
-            Mark(one.verdict, more=one.reason),
-        ]
-        for cell in view.cells
-        for one in cell.explanations
-    ]
     return Table(
         "uncertainty",
         [
@@ -241,7 +229,21 @@ def uncertainty_table(view: SceneView) -> Table:
             *(Column(f"u_{name}") for name in ("num", "input", "D")),
             text("says"),
         ],
-        rows,
+        [
+            [
+                cell.model,
+                one.quantity,
+                label_of(one.against),
+                None if one.quantity == "outcome" else one.error,
+                unit(one.unit),
+                one.u_num,
+                one.u_input,
+                one.u_data,
+                Mark(one.verdict, more=one.reason),
+            ]
+            for cell in view.cells
+            for one in cell.explanations
+        ],
     )
 
 

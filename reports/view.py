@@ -16,8 +16,8 @@ from rockcheck.reports.style import Look, looks
 from rockcheck.scenes import History, InputError, Scene, kinematics
 from rockcheck.scenes.history import COLUMNS, events_path
 from rockcheck.scenes.reading import within
+from rockcheck.validation.discrepancy.compare import QUANTITIES, motion_of
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.motion import QUANTITIES, motion_of
 from rockcheck.validation.suite.results import Cell, Run, value_of
 
 Array = NDArray[np.float64]

@@ -1,9 +1,10 @@
 """Exceptions with messages of one line: unusable input, or a model that cannot finish."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import PurePath
+from typing import Any
 from unicodedata import category
 
 from pydantic import ValidationError
@@ -47,6 +48,13 @@ MOST_NAMES = 100
 def unknown_name(what: str, name: str, allowed: Iterable[str]) -> InputError:
     """An `InputError` for a name that is not among `allowed`, suggesting the nearest one."""
     return InputError(f"unknown {what} {printable(name)!r}{suggestion(name, allowed)}")
+
+
+def one_of(what: str, given: str, allowed: Collection[str]) -> Any:
+    """The name that was `given`; raises `unknown_name` unless it is among `allowed`."""
+    if given not in allowed:
+        raise unknown_name(what, given, allowed)
+    return given
 
 
 def suggestion(name: str, allowed: Iterable[str]) -> str:

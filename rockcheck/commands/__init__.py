@@ -1,4 +1,4 @@
-"""The commands of `rockcheck`, a module each, and their common options and output.
+"""The commands of `rockcheck`, and their common options and output.
 
 Tables or JSON go to stdout, progress to stderr.
 """
@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ from rich.progress import (
 )
 
 from rockcheck.reports.style import ENDINGS, kind_of, save_as
-from rockcheck.scenes.errors import InputError, inert, printable, unknown_name
+from rockcheck.scenes.errors import InputError, inert, printable
 from rockcheck.scenes.files import named_scenes
 from rockcheck.scenes.progress import OnProgress, announcing
 from rockcheck.scenes.recordings.sets import Odd
@@ -246,16 +246,6 @@ def told(found: Finding, folder: Path | None = None) -> NoReturn:
     raise typer.Exit(found.exit_code)
 
 
-def one_of(kind: str, given: str, choices: Collection[str]) -> Any:
-    """The choice that was `given`.
-
-    Raises `InputError` that names the `kind` and suggests the nearest choice.
-    """
-    if given not in choices:
-        raise unknown_name(kind, given, choices)
-    return given
-
-
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """The models by name, each with its settings; of all, those that are installed.
 
@@ -340,23 +330,17 @@ def usable_folder(folder: Path, *parts: str) -> Path:
     return path
 
 
-def scene_names(incomplete: str) -> list[str]:
-    """For the shell's completion: scenes that come with the package, and scene files here."""
-    return _completed(incomplete, named_scenes())
+def completing(
+    known: Callable[[], Iterable[str]], *, files: bool = True
+) -> Callable[[str], list[str]]:
+    """For the shell's completion: the names that are `known`, and the TOML `files` here."""
+
+    def complete(incomplete: str) -> list[str]:
+        here = sorted(path.name for path in Path().glob("*.toml")) if files else []
+        return [name for name in (*known(), *here) if name.startswith(incomplete)]
+
+    return complete
 
 
-def suite_names(incomplete: str) -> list[str]:
-    """For the shell's completion: suites that come with the package, and suite files here."""
-    from rockcheck.validation.suite.suites import named_suites
-
-    return _completed(incomplete, named_suites())
-
-
-def model_names(incomplete: str) -> list[str]:
-    """For the shell's completion: families of models."""
-    return [name for name in FAMILIES if name.startswith(incomplete)]
-
-
-def _completed(incomplete: str, names: Iterable[str]) -> list[str]:
-    here = sorted(path.name for path in Path().glob("*.toml"))
-    return [name for name in (*names, *here) if name.startswith(incomplete)]
+scene_names = completing(named_scenes)
+model_names = completing(lambda: FAMILIES, files=False)

@@ -1,6 +1,6 @@
 """The command `rockcheck`: finds and runs the commands, and prints errors in one line.
 
-Each command is a module of rockcheck.commands.
+Each command is a function of a module of rockcheck.commands.
 """
 
 import contextlib
@@ -30,8 +30,8 @@ from rockcheck.validation.suite.results import FAULT
 #: The commands, in the order of the help: where each is below this package, a module with
 #: its function `run` or another function of one; and an example.
 COMMANDS = {
-    "scenes": ("scenes", "rockcheck scenes"),
-    "new": ("scenes.new", "rockcheck new bookcase.toml"),
+    "scenes": ("simulate.scenes", "rockcheck scenes"),
+    "new": ("simulate.new", "rockcheck new bookcase.toml"),
     "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
@@ -40,7 +40,7 @@ COMMANDS = {
     "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("validate.accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "assess": ("assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
+    "assess": ("studies.assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
     "spectrum": ("studies.spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("studies.benchmark", "rockcheck benchmark --quick"),
     "conformance": (
@@ -48,8 +48,8 @@ COMMANDS = {
         "rockcheck conformance --engine mujoco --set settings=default",
     ),
     "stress": ("studies.stress", "rockcheck stress --quick"),
-    "report": ("report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
-    "warm": ("warm", "rockcheck warm"),
+    "report": ("validate.report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
+    "warm": ("simulate.warm", "rockcheck warm"),
 }
 
 #: Replacements of removed commands and options.
@@ -134,7 +134,6 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 
 
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
-    """The parameter, or the fields of its group as parameters."""
     if not is_dataclass(given.annotation):
         return [given.replace(kind=_NAMED)]
     hints, values = get_type_hints(given.annotation, include_extras=True), vars(given.default)
@@ -307,14 +306,13 @@ class _Pipe:
 @contextlib.contextmanager
 def _readers_may_go() -> Iterator[None]:
     """Within this block a closed stdout or stderr does not change the exit code."""
-    before = sys.stdout, sys.stderr
-    sys.stdout, sys.stderr = cast(TextIO, _Pipe(sys.stdout)), cast(TextIO, _Pipe(sys.stderr))
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-        sys.stdout, sys.stderr = before
+    out, err = (cast(TextIO, _Pipe(stream)) for stream in (sys.stdout, sys.stderr))
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            yield
+        finally:
+            out.flush()
+            err.flush()
 
 
 def _told(message: str, code: int) -> int:

@@ -17,11 +17,10 @@ from rockcheck.commands import (
 )
 from rockcheck.scenes import History, InputError, Scene, load_scene
 from rockcheck.scenes.errors import printable
-from rockcheck.validation.discrepancy.compare import Discrepancy, compare
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare, motion_of
 from rockcheck.validation.discrepancy.figures import value_words
 from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.discrepancy.motion import motion_of
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.suite.across import difference
 from rockcheck.validation.suite.results import Run
@@ -98,7 +97,6 @@ def run(
 def _finding(
     found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
 ) -> Finding:
-    """The finding on a comparison; `shift` (s) is that of the candidate."""
     motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [
@@ -125,22 +123,27 @@ def _finding(
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
         Text(items=notes, verdict="changed"),
     ]
-    data = {
-        "reference": found.reference,
-        "candidate": found.candidate,
-        "start": found.start,
-        "end": found.end,
-        "shift": shift,
-        "gap": found.gap,
-        "headline": headline(found),
-        "motion": {role: motion.model_dump() for role, motion in motions.items()},
-        "notes": {role: history.notes for role, history in histories.items()},
-        "figures": [
-            {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
-            for f in found.figures
-        ],
-    }
-    return Finding("comparison", models, "", blocks, data)
+    return Finding(
+        "comparison",
+        models,
+        "",
+        blocks,
+        {
+            "reference": found.reference,
+            "candidate": found.candidate,
+            "start": found.start,
+            "end": found.end,
+            "shift": shift,
+            "gap": found.gap,
+            "headline": headline(found),
+            "motion": {role: motion.model_dump() for role, motion in motions.items()},
+            "notes": {role: history.notes for role, history in histories.items()},
+            "figures": [
+                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
+                for f in found.figures
+            ],
+        },
+    )
 
 
 def headline(found: Discrepancy) -> str:

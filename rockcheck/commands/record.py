@@ -94,7 +94,6 @@ def _components(
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:
-    """What the samples amount to, as `--json` says it."""
     return {
         "file": path,
         "format": record.form,
@@ -137,12 +136,8 @@ def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
 
 def _picture(record: Recording) -> str:
     """The largest acceleration in each part of the motion, as bars."""
-    peaks = np.array(
-        [
-            np.max(part)
-            for part in np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
-        ]
-    )
+    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
+    peaks = np.array([np.max(part) for part in parts])
     levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
     return "".join(_MARKS[level] for level in levels)
 

@@ -1,8 +1,16 @@
-"""`rockcheck simulate`: one history."""
+"""`rockcheck scenes`, `new` and `simulate`: what there is, a scene file, one history.
 
+And `rockcheck warm`: compiles the models' code ahead, in several processes, so that a user waits
+for no compiler.
+"""
+
+import os
 import tempfile
+import time
 from collections import deque
+from collections.abc import Callable, Mapping
 from functools import partial
+from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,28 +18,87 @@ import typer
 
 from rockcheck.commands import (
     AllowCodeOption,
+    JobsOption,
     answer,
     check_file,
     console,
     model_names,
     playing,
+    progress,
     report_file,
     save_figure,
     scene_names,
     setting_of,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
-from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene, named_scenes
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.history import check_format
-from rockcheck.scenes.progress import listening, one_run
-from rockcheck.validation.discrepancy.motion import motion_of
-from rockcheck.validation.execute.models import FAMILIES, Work, build, check_allowed, is_own, play
+from rockcheck.scenes.progress import announcing, listening, one_run
+from rockcheck.scenes.writing import write_new
+from rockcheck.validation.discrepancy.compare import motion_of
+from rockcheck.validation.execute.models import (
+    FAMILIES,
+    REFERENCE,
+    Work,
+    build,
+    check_allowed,
+    is_own,
+    play,
+)
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
+from rockcheck.validation.finding import Column, Finding, Table, text
 
-#: The model that plays where none is named: the fair reference for engines.
-REFERENCE = "ebm-unilateral"
+
+def scenes() -> None:
+    """List the named scenes, suites and models, with a line each."""
+    from rockcheck.reports.document import show
+    from rockcheck.validation.suite.suites import named_suites
+
+    suites = {name: read_toml(path) for name, path in named_suites().items()}
+    listings = {
+        "scene": {name: load_scene(name).description for name in named_scenes()},
+        "suite": {name: one.get("description", "") for name, one in suites.items()},
+        "model": {name: family.summary for name, family in FAMILIES.items()},
+    }
+    tables = [
+        Table(title, [text(title), text("about", " ")], list(rows.items()), most=len(rows))
+        for title, rows in listings.items()
+    ]
+    show(Finding("scenes", "", "", tables), console())
+    answer({f"{title}s": rows for title, rows in listings.items()})
+
+
+def new(
+    path: Annotated[
+        Path, typer.Argument(metavar="FILE.toml", help="File to write; it must not exist yet.")
+    ],
+) -> None:
+    """Write a scene file to start from.
+
+    It is ready to run, and has a remark on every setting. A file that is there already is left as
+    it is.
+    """
+    if path.suffix.lower() != ".toml":
+        raise InputError(f"{printable(path)}: give the name of a .toml file")
+    content = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(
+        encoding="utf-8"
+    )
+    try:
+        write_new(path, content)
+    except FileExistsError:
+        raise InputError(f"{printable(path)}: is there already; it is left as it is") from None
+    except OSError as error:
+        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    scene = load_scene(path)
+    console().print(
+        f"{path}: a block of {2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m",
+        soft_wrap=True,
+    )
+    console().print(f"next: rockcheck simulate {path} --model ebm-unilateral", soft_wrap=True)
+    answer({"file": path})
 
 
 def run(
@@ -125,3 +192,57 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
         return History.load(Path(folder) / f"history{TABLE}")
+
+
+def _begin(*names: str) -> None:
+    for name in names:
+        build(name).simulate(load_scene("fig5a").replace(duration=0.1))
+
+
+def _engine_steps() -> None:
+    from rockcheck.engines.steps import adaptive_march, in_units_of
+
+    scene = load_scene("fig5a").replace(duration=0.1)
+    scene = in_units_of(scene.block.radius, scene)
+    adaptive_march(scene, lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
+
+
+#: The parts that are compiled, the longest first. The event loops of both kinds of friction share
+#: functions, so that one process compiles them in two thirds of the time.
+PARTS: Mapping[str, Callable[[], object]] = {
+    "the event-based models": partial(_begin, "ebm", "ebm-bouc-wen"),
+    "the continuous model": partial(_begin, "cm"),
+    "the physics engines: their adaptive steps": _engine_steps,
+}
+
+
+def compile_part(name: str) -> float:
+    """Compile one part of `PARTS`, or find it in the cache; returns how long that took, s."""
+    began = time.perf_counter()
+    PARTS[name]()
+    return time.perf_counter() - began
+
+
+def warm(jobs: JobsOption = None) -> None:
+    """Compile the models' code ahead.
+
+    Models compile their code on their first run on a machine, and once more after an update of
+    rockcheck; what is compiled already is only looked up. Afterwards no command waits for a
+    compiler.
+    """
+    from rockcheck.reports.document import show
+
+    console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
+    taken: dict[str, float] = {}
+    pool = Pool(min(jobs or os.cpu_count() or 1, len(PARTS)))
+    with progress("compiling") as on_progress, announcing(None), pool:
+        on_progress(0, len(PARTS), "")
+        for ended in pool.run(deque(Call(compile_part, (name,), key=name) for name in PARTS)):
+            if ended.error is not None:
+                raise ended.error
+            taken[ended.call.key] = ended.result
+            on_progress(len(taken), len(PARTS), ended.call.key)
+    seconds = {name: taken[name] for name in PARTS}
+    columns = [text("compiled code for"), Column("s", digits=2)]
+    show(Finding("warm", "", "", [Table("compiled", columns, list(seconds.items()))]), console())
+    answer({"seconds": seconds})

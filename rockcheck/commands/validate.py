@@ -1,5 +1,9 @@
-"""`rockcheck validate`: the main job; `rockcheck accept`: its figures become the expected ones."""
+"""`rockcheck validate`: the main job; `accept`: its figures become the expected ones.
 
+And `rockcheck report`: a finished run rendered again, or one of its figures for a paper.
+"""
+
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
@@ -15,26 +19,32 @@ from rockcheck.commands import (
     AllowCodeOption,
     Played,
     answer,
+    check_file,
     chosen_models,
+    completing,
     console,
     model_names,
     playing,
     progress,
-    suite_names,
     tell_left_out,
     tell_missing,
     told,
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.commands.report import keep, publish, withdraw
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
 from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import Suite, is_scene, load_suite, scene_suite
+from rockcheck.validation.suite.suites import (
+    Suite,
+    is_scene,
+    load_suite,
+    named_suites,
+    scene_suite,
+)
 from rockcheck.validation.suite.tables import finding_of, summary
 
 #: The folder of the trend's page.
@@ -77,7 +87,7 @@ _named = partial(
     typer.Argument,
     help="Named, or a .toml file (default: suite paper).",
     show_default=False,
-    autocompletion=suite_names,
+    autocompletion=completing(named_suites),
 )
 
 
@@ -129,10 +139,10 @@ def run(
             raise InputError(said, option)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
     how: Strict = "both" if strict == "both" else strict is not None
-    from rockcheck.reports import document
+    from rockcheck.reports import document, site
 
     finished = play(suite, folder, played, force=force, strict=how)
-    page = keep(finished, folder)
+    page = site.keep(finished, folder)
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
@@ -144,9 +154,10 @@ def run(
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
-            page = publish(folder, jobs=played.jobs, on_progress=on_progress)
+            jobs = played.jobs or os.cpu_count() or 1
+            page = site.write_site(folder, jobs=jobs, afresh=False, on_progress=on_progress)
     else:
-        withdraw(folder)
+        site.remove_site(folder)
     console().print(f"report: {page}", soft_wrap=True)
     more = {} if suite.judged else {"left_out": suite.left_out}
     answer(summary(finished) | more | {"report": page})
@@ -156,7 +167,6 @@ def run(
 def _suite(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[Suite, Path]:
-    """The suite to play, and its folder."""
     for option, given in vars(of_scene).items():
         if given and given != ALL:
             raise InputError("is for a scene: a suite says which models play what", f"--{option}")
@@ -169,7 +179,6 @@ def _suite(
 def _scene(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[Suite, Path]:
-    """A scene to play, as a suite, and its folder."""
     sets = record_sets(of_scene.records or (), of_scene.read or ())
     chosen = chosen_models(of_scene.models, of_scene.set or ())
     suite = scene_suite(name, chosen, records=sets, allow_code=allow_code)
@@ -261,3 +270,49 @@ def accept(
             exit_code=failed or int(bool(refused)),
         )
     )
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of a finished run.")],
+    scene: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--scene",
+            metavar="NAME",
+            help="A scene that gets a page, too (repeatable), or what -o draws: a scene, an"
+            " ensemble, or a figure of a study.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Draw that alone, and stop: .svg, .png or .pdf."),
+    ] = None,
+) -> None:
+    """Render the pages of a finished run again.
+
+    A run of more than 200 scenes has pages of 200: those that are not within tolerance, then the
+    nearest to a limit. With --scene NAME -o FILE.pdf: that figure alone, all models over time with
+    their differences and tolerances; of a study's folder the figure of that name.
+    """
+    from rockcheck.reports import document, site
+
+    if output is not None:
+        part = document if (folder / document.FIGURES).is_dir() else site
+        if scene is None or len(scene) != 1:
+            raise InputError("needs one --scene NAME", "--output")
+        check_file(output, "--output")
+        written = part.write_figure(folder, scene[0], output)
+        console().print(f"figure: {written}", soft_wrap=True)
+        answer({"figure": written})
+        return
+    Run.load(folder)
+    with progress("pages") as on_progress:
+        index = site.write_site(
+            folder,
+            jobs=os.cpu_count() or 1,
+            afresh=not scene,
+            wanted=scene or (),
+            on_progress=on_progress,
+        )
+    console().print(f"report: {index}", soft_wrap=True)
+    answer({"report": index})

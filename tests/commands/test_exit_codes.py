@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
-from rockcheck.commands import cli, report
+from rockcheck.commands import cli
 from rockcheck.commands.cli import EXIT_CODES
+from rockcheck.reports import site
 from rockcheck.validation.suite.results import Run
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
@@ -112,16 +113,16 @@ def test_no_binding_tells_what_it_still_holds_at_the_end(tmp_path):
 
 def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypatch, capsys):
     run = Run(suite="s", created="", reference="ebm", scenes={}, models=("ebm",), cells=())
-    monkeypatch.setattr(report, "SILENT", 0.0)
-    monkeypatch.setattr(report, "PATIENCE", 0.1)
+    monkeypatch.setattr(site, "SILENT", 0.0)
+    monkeypatch.setattr(site, "PATIENCE", 0.1)
     for lock, holder in (
         (FileLock(tmp_path / ".lock"), r"another run, which holds .*\.lock"),
-        (report._turn(tmp_path), f"process {os.getpid()} on .*"),
+        (site._turn(tmp_path), f"process {os.getpid()} on .*"),
     ):
-        with lock, pytest.raises(report.InputError, match=rf"waited 0\.1 s for {holder}"):
-            report.keep(run, tmp_path)
+        with lock, pytest.raises(site.InputError, match=rf"waited 0\.1 s for {holder}"):
+            site.keep(run, tmp_path)
         said = rf"rockcheck: waiting up to 0\.1 s for {holder}\n"
         assert re.fullmatch(said, capsys.readouterr().err)
-    report.keep(run, tmp_path)
+    site.keep(run, tmp_path)
     assert capsys.readouterr().err == ""
     assert not (tmp_path / ".lock.holder").exists()

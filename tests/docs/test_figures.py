@@ -13,7 +13,7 @@ import pytest
 import whole_runs
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
-from rockcheck.commands.scenes import new
+from rockcheck.commands.simulate import new
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.experience import Experience

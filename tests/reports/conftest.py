@@ -11,7 +11,7 @@ from rockcheck.scenes.observation import observe
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
-from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
 from rockcheck.validation.execute.store import HISTORIES
 from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
 

@@ -8,8 +8,7 @@ import shutil
 
 import pytest
 
-from rockcheck.commands.report import LOCK, keep
-from rockcheck.reports.site import write_site
+from rockcheck.reports.site import LOCK, keep, write_site
 from rockcheck.scenes import InputError
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.suite.results import RUN_FILE, Run

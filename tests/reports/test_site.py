@@ -282,7 +282,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
     np.testing.assert_array_equal(rows["peak_rotation_alpha ebm-unilateral"], expected)
     above, below = view.distributions().panels
     curve = next(one for one in above.series if one.label == "CM")
-    sample = view.samples["cm"]
+    sample = view.record.samples["cm"]
     shares = [np.mean((sample.peaks <= peak) & ~sample.fallen) for peak in curve.x]
     np.testing.assert_allclose(curve.y, shares, atol=1e-12)
     assert np.max(np.abs(below.series[0].y)) == pytest.approx(figures["ks_distance"], abs=1e-12)

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from rockcheck import ebm
-from rockcheck.commands.warm import PARTS
+from rockcheck.commands.simulate import PARTS
 from rockcheck.ebm.core import march
 from rockcheck.scenes import compiled
 from rockcheck.scenes.progress import announce, announcing, interruptible
@@ -290,7 +290,7 @@ def test_what_is_compiled_ahead_is_not_compiled_again(typed):
     assert list(json.loads(said.out)["seconds"]) == list(PARTS)
     assert said.err == ""
     code = (
-        "from rockcheck.commands.warm import PARTS;"
+        "from rockcheck.commands.simulate import PARTS;"
         "[run() for run in PARTS.values()];"
         "from rockcheck.ebm.core import march; print(sum(march.play.stats.cache_misses.values()),"
         " len(march.play.signatures) <= 1)"

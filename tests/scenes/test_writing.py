@@ -111,7 +111,7 @@ DOORS = {
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/scenes.py", "validation/studies/work_precision/timings.py"}
+    | {"commands/simulate.py", "validation/studies/work_precision/timings.py"}
     | {"reports/style.py", "reports/document.py", "validation/paper/measures.py"}
     | {"validation/studies/conformance/study.py"},
 }

@@ -241,9 +241,10 @@ class Pair:
 
     def channels(self, name: str) -> tuple[Array, Array]:
         """One column of both on `time`: reference, candidate."""
-        both = [WindowedHistory(one) for one in (self.reference, self.candidate)]
-        curves = [(one.channel("t"), one.channel(name)) for one in both]
-        reference, candidate = (np.interp(self.time, *curve) for curve in curves)
+        both = (WindowedHistory(one) for one in (self.reference, self.candidate))
+        reference, candidate = (
+            np.interp(self.time, one.channel("t"), one.channel(name)) for one in both
+        )
         return reference, candidate
 
     @cached_property

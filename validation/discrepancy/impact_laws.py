@@ -116,11 +116,13 @@ def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
     parts = int(np.flatnonzero(apart[:told] <= SAME)[-1]) + 1  # all start alike
     window = max(2, round(WINDOW / scene.output_step))
     start = max(0, parts - window)
-    branches = {
-        law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()
-    }
     return Landing(
-        t=float(scene.output_times[parts - 1]), start=start, parts=parts, branches=branches
+        t=float(scene.output_times[parts - 1]),
+        start=start,
+        parts=parts,
+        branches={
+            law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()
+        },
     )
 
 

@@ -179,11 +179,12 @@ def time_shift(reference: History, candidate: History) -> float:
 
 def shifted(history: History, offset: float) -> History:
     """The same history `offset` s later."""
-    events = tuple(dataclasses.replace(event, t=event.t + offset) for event in history.event_list)
     return dataclasses.replace(
         history,
         channels={**history.channels, "t": history.channels["t"] + offset},
-        event_list=events,
+        event_list=tuple(
+            dataclasses.replace(event, t=event.t + offset) for event in history.event_list
+        ),
     )
 
 
@@ -226,8 +227,7 @@ def mean_history(tests: Sequence[History]) -> History:
     }
     if "slip" in stacked:
         scatter["last_slip"] = float(np.std(stacked["slip"][:, -1], ddof=1))
-    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1))
-    factor = quantile / np.sqrt(len(tests))
+    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1) / np.sqrt(len(tests))
     return dataclasses.replace(
         first,
         channels=channels,

@@ -12,7 +12,7 @@ import numpy as np
 
 from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene
 from rockcheck.scenes.base import MOST
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import one_of, printable
 from rockcheck.validation.execute.pool import Failure, guarded
 from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
 
@@ -22,7 +22,6 @@ class Model(Protocol):
 
     def simulate(self, scene: Scene) -> History:
         """The block's motion; raises `scenes.ModelFailure` where the model cannot finish."""
-        ...  # pragma: no cover
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,8 @@ class Family:
     compiled: str = ""
 
 
+#: The fair reference for engines, and the model that forbids flight.
+REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
 ENGINES = "rockcheck.engines"
 COMPILED = ("numba", "llvmlite", "numpy", "scipy")
 #: Further libraries of the engines that step adaptively.
@@ -126,9 +127,7 @@ def family(name: str) -> Family:
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
-    if name not in FAMILIES:
-        raise unknown_name("model", name, FAMILIES)
-    return FAMILIES[name]
+    return FAMILIES[one_of("model", name, FAMILIES)]
 
 
 def engine_names() -> tuple[str, ...]:
@@ -298,11 +297,11 @@ def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:
     found = [guarded(_end_of, work, scene) for scene in scenes]
     costs = [one[2] for one in found if not isinstance(one, Failure)]
     ends = [(None, one.reason) if isinstance(one, Failure) else one[:2] for one in found]
-    cost = {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
     record = {
         "peaks": [peak for peak, _ in ends],
         "outcomes": [outcome for _, outcome in ends],
-        "cost": {**cost, "worker_seconds": time.perf_counter() - began},
+        "cost": {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
+        | {"worker_seconds": time.perf_counter() - began},
     }
     traces = (one.traceback for one in found if isinstance(one, Failure) and one.traceback)
     return Played(record, traceback=next(traces, ""))

@@ -101,9 +101,12 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
         "drift": drift,
         "why": why,
     }
-    measure = MEASURES[check.figure.measure]
     again = judge(
-        check.figure, Tolerance(**line), kind=check.kind, measure=measure, floor=check.floor
+        check.figure,
+        Tolerance(**line),
+        kind=check.kind,
+        measure=MEASURES[check.figure.measure],
+        floor=check.floor,
     )
     return line if again.verdict == "pass" else again.reason
 
@@ -148,9 +151,7 @@ def _table(tables: Any, path: tuple[str, ...]) -> Any:
 
 def _round(value: float, down: bool = False) -> float:
     """`value` with two digits, rounded up (or down)."""
-    if value == 0.0:
-        return 0.0
-    unit = 10.0 ** (math.floor(math.log10(abs(value))) - 1)
+    unit = 10.0 ** (math.floor(math.log10(abs(value) or 1.0)) - 1)
     steps = math.floor(value / unit) if down else math.ceil(value / unit * (1.0 - 1e-12))
     return float(f"{steps * unit:.2g}")
 

@@ -342,30 +342,31 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         peaks = _peaks(run)
-        reference = peaks.pop(run.reference, {})
-        for model, own in peaks.items():
-            found[model] += [(reference[place], own[place]) for place in own if place in reference]
-    return {model: pairs for model, pairs in found.items() if pairs}
+        for (model, scene, n), peak in peaks.items():
+            reference = peaks.get((run.reference, scene, n))
+            if model != run.reference and reference is not None:
+                found[model].append((reference, peak))
+    return found
 
 
-def _peaks(run: Run) -> dict[str, dict[tuple[str, int], float]]:
-    """The peak rotations that allow a ratio, by model, and by scene and number in its ensemble."""
+def _peaks(run: Run) -> dict[tuple[str, str, int], float]:
+    """The peak rotations that allow a ratio, by model, scene and number in its ensemble."""
     every = [
-        (cell.model, (cell.scene, 0), cell.outcome, value_of(cell.figures, "peak_rotation"))
+        (cell.model, cell.scene, 0, cell.outcome, value_of(cell.figures, "peak_rotation"))
         for cell in run.cells
         if cell.status == "done"
     ]
     every += [
-        (model, (drawn.name, n), drawn.outcomes[model][n], peak)
+        (model, drawn.name, n, drawn.outcomes[model][n], peak)
         for drawn in run.ensembles
         for model, peaks in drawn.peaks.items()
         for n, peak in enumerate(peaks)
     ]
-    found: defaultdict[str, dict[tuple[str, int], float]] = defaultdict(dict)
-    for model, place, outcome, peak in every:
-        if peak is not None and peak > LEAST and not outcome.startswith("overturned"):
-            found[model][place] = peak
-    return found
+    return {
+        (model, scene, n): peak
+        for model, scene, n, outcome, peak in every
+        if peak is not None and peak > LEAST and not outcome.startswith("overturned")
+    }
 
 
 def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:

@@ -105,12 +105,8 @@ class BatchRecord(Stored):
     cost: CostRecord
 
 
-class Window(NamedTuple):
-    """A window as tolerances name it, its end (s; None: the whole time), and its measures."""
-
-    name: str
-    until: float | None
-    measures: Sequence[str]
+#: A window as tolerances name it, its end (s; None: the whole time), and its measures.
+Window = tuple[str, float | None, Sequence[str]]
 
 
 class Compared(NamedTuple):
@@ -157,7 +153,7 @@ def _of_scene(
 ) -> T:
     """A result of type `kind` on a scene, by the code of a module; kept in the store."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
-    key = provenance.cell_key(scene, "ebm-unilateral", depends)
+    key = provenance.cell_key(scene, models.REFERENCE, depends)
     return kept(store, name_of(scene.name, what, key), kind, compute)
 
 
@@ -240,7 +236,6 @@ def by_any(
 
 
 def _away(figure: Figure) -> float:
-    """Distance of a figure from its ideal; infinity where it has no value."""
     ideal = DIFFERENCES[figure.measure].ideal
     return float("inf") if figure.value is None or ideal is None else abs(figure.value - ideal)
 
@@ -282,9 +277,9 @@ def _compute(
     for reference, extra in asked.values():
         yardstick = store.load(reference.name) if reference else None
         others = under_other_laws(scene, reference.variant) if reference and landing else {}
-        for window in _windows(reference, extra, horizon):
-            rivals = others if window.until is None or window.until > parted else {}
-            figures += by_any(candidate, yardstick, rivals, scene, window)
+        for name, until, measures in _windows(reference, extra, horizon):
+            rivals = others if until is None or until > parted else {}
+            figures += by_any(candidate, yardstick, rivals, scene, (name, until, measures))
     return ComparisonRecord(
         figures=tuple(figures),
         impact_law=landing.followed_by(candidate, scene) if landing else None,
@@ -302,7 +297,7 @@ def _windows(
         found.setdefault(what.window, []).append(what.measure)
     ends = {"": None, HORIZON: horizon}
     return [
-        Window(name, ends[name] if name in ends else float(name[:-1]), measures)
+        (name, ends[name] if name in ends else float(name[:-1]), measures)
         for name, measures in found.items()
     ]
 

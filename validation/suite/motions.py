@@ -38,6 +38,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
@@ -181,22 +182,18 @@ class Distribution(Frozen):
         return float(self.lognormal[0] * np.exp(self.lognormal[1] * chance.standard_normal()))
 
 
-def _never_negative(given: Distribution | None) -> Distribution | None:
-    if given is not None and given.uniform is not None and given.uniform[0] < 0.0:
-        raise InputError("the lower end must be 0 or more", "uniform")
-    return given
-
-
-def _positive(given: Distribution) -> Distribution:
-    if given.uniform is not None and given.uniform[0] <= 0.0:
-        raise InputError("the lower end must be more than 0", "uniform")
+def _bounded(given: Distribution | None, *, positive: bool = False) -> Distribution | None:
+    low = given.uniform[0] if given and given.uniform else math.inf
+    if low < 0.0 or (positive and low == 0.0):
+        said = "more than 0" if positive else "0 or more"
+        raise InputError(f"the lower end must be {said}", "uniform")
     return given
 
 
 class Pulse(Frozen):
     """A Ricker pulse of random phase: `period` (s) and `amplitude` (m/s^2)."""
 
-    period: Annotated[Distribution, AfterValidator(_positive)]
+    period: Annotated[Distribution, AfterValidator(partial(_bounded, positive=True))]
     amplitude: Distribution
 
     def draw(self, chance: np.random.Generator) -> Record:
@@ -251,8 +248,8 @@ class Ensemble(Frozen):
     #: Scenes that one worker plays in one go.
     batch: Annotated[int, Field(ge=1)] = 25
     scene: dict[str, Any]
-    friction: Annotated[Distribution | None, AfterValidator(_never_negative)] = None
-    gap: Annotated[Distribution | None, AfterValidator(_never_negative)] = None
+    friction: Annotated[Distribution | None, AfterValidator(_bounded)] = None
+    gap: Annotated[Distribution | None, AfterValidator(_bounded)] = None
     pulse: Pulse | None = None
     noise: Noise | None = None
 

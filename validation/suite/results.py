@@ -18,9 +18,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path, PurePath
 from typing import Any, Literal
 
+import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import InputError, Scene
@@ -30,6 +32,7 @@ from rockcheck.scenes.reading import read_json, within
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
 from rockcheck.validation.discrepancy.impact_laws import LawFollowed
+from rockcheck.validation.discrepancy.measures import Sample
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 from rockcheck.validation.uncertainty.population import Inputs
 
@@ -203,6 +206,14 @@ class EnsembleRecord(Stored):
     definition: dict[str, Any]
     peaks: dict[str, tuple[float | None, ...]]
     outcomes: dict[str, tuple[str, ...]]
+
+    @cached_property
+    def samples(self) -> dict[str, Sample]:
+        """By model: peaks (alpha, NaN where it failed) and outcomes of all scenes."""
+        return {
+            model: Sample(np.array(peaks, dtype=float), self.outcomes[model])
+            for model, peaks in self.peaks.items()
+        }
 
 
 class Run(Stored):

@@ -16,7 +16,7 @@ from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
-from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import (
     Played,
@@ -86,8 +86,14 @@ def run_suite(
     A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where
     `folder` cannot be used, and, when interrupted, `KeyboardInterrupt` after all results are kept.
     """
-    study = SuiteStudy(suite, folder)
-    found = run(study, folder, jobs=jobs, force=force, scheduler=scheduler, on_progress=on_progress)
+    found = run(
+        SuiteStudy(suite, folder),
+        folder,
+        jobs=jobs,
+        force=force,
+        scheduler=scheduler,
+        on_progress=on_progress,
+    )
     if not found.complete:
         raise KeyboardInterrupt
     finished: Run = found.data["run"]
@@ -198,7 +204,6 @@ class SuiteStudy(Study):
             self.store.put_record(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
-        """Compare and judge the cells of a scene, once all are there."""
         cells, found = self.planned[scene], dict[str, Cell]()
         if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
@@ -286,7 +291,6 @@ class SuiteStudy(Study):
         }
 
     def _cell(self, parts: Sequence[Planned], reference: Cell | None) -> Cell:
-        """The cell, compared and judged; `reference` is the reference's cell of that scene."""
         (planned,), record = parts, self.ended[parts[0]]
         if isinstance(record, Failure):
             return Cell(**self._about(parts, record.reason))
@@ -341,8 +345,9 @@ class SuiteStudy(Study):
         Only of those that finished, and whose numerical error is known.
         """
         own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
-        played = self.planned[scene]
-        scatters = {one.model: self.ended[played[one.model][0]].uncertainty for one in done}
+        scatters = {
+            one.model: self.ended[self.planned[scene][one.model][0]].uncertainty for one in done
+        }
         for cell in self.compared[scene]:
             against = {own.reference, own.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
@@ -352,10 +357,6 @@ class SuiteStudy(Study):
     def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
         planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
         played = {label: self._together(batches) for label, batches in planned.items()}
-        samples = {
-            label: Sample(np.array(one.peaks, dtype=float), one.outcomes)
-            for label, one in played.items()
-        }
         whole = EnsembleRecord(
             name=name,
             description=ensemble.description,
@@ -364,7 +365,7 @@ class SuiteStudy(Study):
             outcomes={label: one.outcomes for label, one in played.items()},
         )
         return whole, [
-            self._ensemble_cell(batches, samples, played[label].cost)
+            self._ensemble_cell(batches, whole.samples, played[label].cost)
             for label, batches in planned.items()
         ]
 

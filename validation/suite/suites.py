@@ -63,7 +63,7 @@ from pydantic import Field
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import one_of, printable, unknown_name
 from rockcheck.scenes.files import (
     UncertainScene,
     load_uncertain_scene,
@@ -73,9 +73,16 @@ from rockcheck.scenes.files import (
     uncertain_scene,
     uncertain_scene_from,
 )
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.discrepancy.statistics import STATISTICS
-from rockcheck.validation.execute.models import Work, build, check_allowed, family, is_own
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
+from rockcheck.validation.execute.models import (
+    PAPER_MODEL,
+    REFERENCE,
+    Work,
+    build,
+    check_allowed,
+    family,
+    is_own,
+)
 from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
 from rockcheck.validation.suite.results import Kind
 from rockcheck.validation.suite.tolerances import (
@@ -87,8 +94,6 @@ from rockcheck.validation.suite.tolerances import (
     parse_tolerances,
 )
 
-#: The fair reference for engines, and the model that forbids flight.
-REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
 #: Time limit (s) of a simulation without a suite.
 UNJUDGED_SECONDS = 900.0
 DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
@@ -130,7 +135,7 @@ class SuiteFile(Frozen):
 
     description: str = ""
     include: tuple[str, ...] = ()
-    reference: str = "ebm-unilateral"
+    reference: str = REFERENCE
     model_form: str = ""
     scenes: tuple[str, ...] = ()
     scene: tuple[dict[str, Any], ...] = ()
@@ -205,8 +210,7 @@ class Suite:
         """The suite with one cell, and the references that it is compared with."""
         own = self.owners.get(scene, self)
         for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
-            if name not in known:
-                raise unknown_name(f"{what} of the suite", name, known)
+            one_of(f"{what} of the suite", name, known)
         tolerances = {
             place: line
             for place, line in own.tolerances.items()
@@ -386,7 +390,6 @@ def is_scene(source: str) -> bool:
 def _check_names(
     given: SuiteFile, models: Collection[str], scenes: Collection[str], ensembles: Collection[str]
 ) -> None:
-    """Raise `InputError` where something is missing, named twice, or unknown."""
     known = ", ".join(models) or "none"
     count = Counter((*scenes, *(one.name for one in given.ensemble)))
     for wrong, key, said in (
@@ -413,12 +416,11 @@ def _tolerances(
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
         for place in tolerances:
-            if place.against not in (OWN_FIGURES, *models):
-                raise unknown_name(
-                    f"reference of [{place.scene}.{place.model}]",
-                    place.against,
-                    [OWN_FIGURES, *models],
-                )
+            one_of(
+                f"reference of [{place.scene}.{place.model}]",
+                place.against,
+                [OWN_FIGURES, *models],
+            )
     except InputError as error:
         raise InputError(f"{printable(path)}: {error}") from None
     return tolerances

@@ -27,6 +27,8 @@ from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
+#: Measures whose figure is yes or no.
+YES_NO = {measure.name for measure in MEASURES.values() if measure.yes_no}
 OUTCOMES = (
     "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
     " predictability; in alpha"
@@ -57,9 +59,8 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
 def not_shown(run: Run) -> list[str]:
     """A line with the number of scenes that are not `shown`; empty if there are none."""
     more = len(run.by_scene()) - len(shown(run))
-    if not more:
-        return []
-    return [f"and {more} more scenes, none of them worse; their figures are in figures.csv"]
+    said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
+    return [said] if more else []
 
 
 def finding_of(run: Run) -> Finding:
@@ -98,13 +99,17 @@ def verdict_table(run: Run) -> Table:
         for scene, of_scene in groupby(cells, key=lambda cell: cell.scene)
         for n, cell in enumerate(of_scene)
     ]
-    heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used")]
+    heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used", kind="used")]
     return Table("verdicts", [*heads, text("verdict")], rows, most=len(rows))
 
 
 def _verdict_row(cell: Cell) -> list[Any]:
     # a yes-or-no measure, or a limit of 0, is never near its limit
-    weighed = [one for one in cell.checks if one.verdict == "fail" or (one.limit and not asks(one))]
+    weighed = [
+        one
+        for one in cell.checks
+        if one.verdict == "fail" or (one.limit and one.figure.measure not in YES_NO)
+    ]
     near = max(weighed, key=used, default=None)
     unsure = ", not converged" if cell.converged is False else ""
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
@@ -113,9 +118,15 @@ def _verdict_row(cell: Cell) -> list[Any]:
     return [
         cell.model,
         judged if cell.status == "done" else cell.reason or "failed",
-        percent(near) if near else "",
+        _limit_used(near) if near else "",
         f"-{unsure}" if idle else Mark(f"{cell.words}{unsure}", state),
     ]
+
+
+def _limit_used(check: Check) -> float | str:
+    if check.figure.measure in YES_NO:
+        return value_words(check.figure.value, yes_no=True)
+    return "-" if check.words == "no tolerance yet" else used(check)
 
 
 def outcome_tables(run: Run) -> Iterator[Table]:
@@ -163,8 +174,11 @@ def summary(run: Run) -> dict[str, Any]:
         "reasons": list(verdict_lines(run)),
     }
     if not run.judged:
-        cells = [outcome_row(cell, run.reference) for cell in run.cells]
-        return common | {"judged": False, "reference": run.reference, "cells": cells}
+        return common | {
+            "judged": False,
+            "reference": run.reference,
+            "cells": [outcome_row(cell, run.reference) for cell in run.cells],
+        }
     return common | {
         "verdict": run.verdict,
         "wall_seconds": run.wall_seconds,
@@ -206,7 +220,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
 def improvements(run: Run) -> Iterator[str]:
     """The figures that are better than expected, a line each."""
     yield from (
-        f"{place(cell)}: {check.figure.title}: {check.reason}"
+        f"{cell.scene}, {cell.model}: {check.figure.title}: {check.reason}"
         for cell, check in run.checks()
         if check.verdict == "better"
     )
@@ -214,18 +228,14 @@ def improvements(run: Run) -> Iterator[str]:
 
 def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
     """Why a cell does not pass in a run of that strictness, a line each."""
+    place = f"{cell.scene}, {cell.model}"
     if cell.status != "done":
-        yield f"{place(cell)}: {cell.reason}"
+        yield f"{place}: {cell.reason}"
     yield from (
-        f"{place(cell)}: {check.figure.title}: {check.reason}"
+        f"{place}: {check.figure.title}: {check.reason}"
         for check in cell.checks
         if check.fails(strict)
     )
-
-
-def place(cell: Cell) -> str:
-    """The cell's scene and model."""
-    return f"{cell.scene}, {cell.model}"
 
 
 def used(check: Check) -> float:
@@ -239,7 +249,7 @@ def used(check: Check) -> float:
         return 0.0
     if check.verdict == "fail" or value is None or limit is None:
         return math.inf
-    if asks(check):
+    if check.figure.measure in YES_NO:
         return 0.0
     if check.ideal is None:  # an "at least" measure: the needed share of the value
         return limit / value if value > 0.0 else 0.0
@@ -248,25 +258,10 @@ def used(check: Check) -> float:
     return apart(value, check.ideal, floor) / limit if limit > 0.0 else 0.0
 
 
-def percent(check: Check) -> str:
-    """`used` in words; a yes-or-no measure has no share."""
-    if asks(check):
-        return value_words(check.figure.value, yes_no=True)
-    if check.words == "no tolerance yet":
-        return "-"
-    return f"{100.0 * used(check):.0f} %" if math.isfinite(used(check)) else "beyond"
-
-
-def asks(check: Check) -> bool:
-    """Whether the measure is a yes-or-no one."""
-    measure = MEASURES.get(check.figure.measure)
-    return measure is not None and measure.yes_no
-
-
 def share(check: Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
-    if asks(check):
+    if figure.measure in YES_NO:
         return f"{figure.windowed} {value_words(figure.value, yes_no=True)}"
     value = (
         "-"

@@ -44,10 +44,9 @@ from typing import Any
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen, NonNegative
-from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.errors import one_of, printable
 from rockcheck.validation.discrepancy.figures import Figure, Measure, between_rows
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.discrepancy.statistics import STATISTICS
+from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
 from rockcheck.validation.suite.results import Check, CheckVerdict, Kind
 from rockcheck.validation.uncertainty.numerical import Numerical
 
@@ -72,8 +71,7 @@ class Windowed:
     def parse(cls, text: str) -> Windowed:
         """Read "measure@window"; raises `InputError` for an unknown measure or bad window."""
         name, at, window = text.partition("@")
-        if name not in MEASURES:
-            raise unknown_name("measure", name, MEASURES)
+        one_of("measure", name, MEASURES)
         if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
             raise InputError(
                 f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"

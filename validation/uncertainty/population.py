@@ -23,7 +23,7 @@ from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.discrepancy.statistics import CONFIDENCE
+from rockcheck.validation.discrepancy.measures import CONFIDENCE
 
 Floats = NDArray[np.float64]
 #: Median and dispersion where no lognormal curve fits.

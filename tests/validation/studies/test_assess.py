@@ -14,7 +14,7 @@ from rockcheck import Event, EventBasedModel, Record, load_scene
 from rockcheck.commands.cli import main
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
-from rockcheck.validation.discrepancy.motion import motion_of, wall_speeds
+from rockcheck.validation.discrepancy.compare import motion_of, wall_speeds
 from rockcheck.validation.finding import Text
 from rockcheck.validation.studies.population.answers import Assessment
 

@@ -10,7 +10,7 @@ from scipy.stats import ttest_1samp
 
 from rockcheck.scenes import InputError
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.statistics import STATISTICS, Sample, Samples
+from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite

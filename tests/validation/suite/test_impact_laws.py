@@ -8,7 +8,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Work
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite.comparing import Window, by_any, landing_of, under_other_laws
+from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
@@ -166,6 +166,6 @@ def test_the_reference_itself_counts_where_it_is_nearer(suite_file):
         EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
         for law in ("moreau", "floor-first")
     )
-    whole = Window("", None, ["outcome_agrees", "peak_ratio"])
+    whole = ("", None, ["outcome_agrees", "peak_ratio"])
     found = by_any(one, one, {"floor-first": other}, scene, whole)
     assert [(figure.value, gap) for figure, gap, _ in found] == [(1.0, ""), (1.0, "")]

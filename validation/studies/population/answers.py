@@ -15,7 +15,7 @@ import numpy as np
 from rockcheck.scenes.experience import WIDTH, outside, trust_of
 from rockcheck.scenes.writing import finite
 from rockcheck.validation.criteria import CRITERIA
-from rockcheck.validation.discrepancy.motion import QUANTITIES, spread
+from rockcheck.validation.discrepancy.compare import QUANTITIES, spread
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
     Axis,

@@ -14,9 +14,9 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
 from rockcheck.scenes.files import UncertainScene, with_numbers
 from rockcheck.scenes.writing import columns_text
 from rockcheck.validation.criteria import CRITERIA, base_of
+from rockcheck.validation.discrepancy.compare import Motion, largest_reach, largest_slip, motion_of
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.impact_laws import parting_landing
-from rockcheck.validation.discrepancy.motion import Motion, largest_reach, largest_slip, motion_of
 from rockcheck.validation.execute.models import build, family
 from rockcheck.validation.studies.population.study import (
     A_RUN,
