@@ -203,6 +203,12 @@ def test_all_that_ci_installs_is_locked_by_hash():
     assert names <= locked, f"`make lock` is due: {names - locked}"
 
 
+def test_a_night_fuzzes_every_reader(nightly):
+    text = (ROOT / "tests/stress/test_hostile_input.py").read_text("utf-8")
+    table = text.partition("\nREADERS")[2].partition("\n}\n")[0]
+    assert set(re.findall(r'^    "(\w+)": ', table, flags=re.MULTILINE)) == set(nightly.READERS)
+
+
 def test_a_night_runs_all_parts_whatever_one_does(nightly, monkeypatch, tmp_path):
     """A part that fails fails the night, after all others; what cannot be run is told as such, and
     never as passed."""

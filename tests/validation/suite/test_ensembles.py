@@ -71,6 +71,11 @@ def test_scenes_are_drawn_alike_whatever_the_count(loaded):
         assert 4.0 <= np.max(np.abs(scene.excitation.samples)) <= 5.0
 
 
+def test_the_order_of_blocks_that_hardly_rock_is_no_distance():
+    still, noise = (Sample(np.full(10, size), ["at rest"] * 10) for size in (1e-12, 1e-9))
+    assert STATISTICS["ks_distance"].evaluate(Samples(still, noise)) == (0.0, "p = 1")
+
+
 def test_noise_has_the_spectrum_that_it_states(loaded):
     noise = loaded().ensembles["crowd"][0].noise.model_copy(update={"strong": 40.0})
     power = sum(

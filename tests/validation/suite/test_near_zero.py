@@ -1,6 +1,7 @@
 """What is judged near zero: errors, quantities and counts, their floors, what is better, and ratios
 to nothing."""
 
+import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from rockcheck import Block, Floor, Rest, Scene, compare
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.suite.across import _moved
 from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import improvements, junit, verdict_lines
+from rockcheck.validation.suite.tables import improvements, junit, used, verdict_lines
 from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
@@ -157,6 +158,30 @@ def test_the_rule(measure, line, more, values):
     if MEASURES[measure].role == "quantity" and not more:
         more = {"floor": 2.3e-5}
     assert {value: check(measure, value, tolerance, **more).verdict for value in values} == values
+
+
+@pytest.mark.parametrize(
+    ("measure", "line", "shares"),
+    [
+        ("theta_rms", {"limit": 0.5}, {0.125: 0.25, 0.0: 0.0, 0.75: math.inf, math.nan: math.inf}),
+        ("peak_ratio", {"limit": 0.5}, {1.125: 0.25, 0.875: 0.25, 1.5: 1.0}),
+        ("last_slip", {"expected": 0.5, "limit": 0.25}, {0.625: 0.5, 0.375: 0.5, 0.5: 0.0}),
+        # Of an "at least" measure the share of the value that is needed.
+        ("events_agree_until", {"limit": 8.0}, {8.0: 1.0, 16.0: 0.5, 7.0: math.inf}),
+        ("outcome_agrees", {"expected": 1.0, "limit": 0.0}, {1.0: 0.0, 0.0: math.inf}),
+        ("theta_rms", None, {0.125: math.inf}),
+    ],
+)
+def test_the_share_of_its_limit_that_a_figure_uses(measure, line, shares):
+    tolerance = line and Tolerance(**line)
+    assert {value: used(check(measure, value, tolerance)) for value in shares} == shares
+
+
+@pytest.mark.parametrize("value", [None, math.nan, math.inf])
+@pytest.mark.parametrize("note", ["", "m has no events"])
+def test_what_is_no_number_fails_and_says_why(value, note):
+    found = check("theta_rms", value, Tolerance(limit=0.5), note=note)
+    assert (found.verdict, found.reason) == ("fail", note or "not a number")
 
 
 def test_floors_come_from_the_rows_and_from_u_num():
