@@ -667,8 +667,9 @@ STATISTICS = by_name(
         "Kolmogorov-Smirnov distance",
         "1",
         "max |F_c - F_r| of the distributions of peak |theta|/alpha, the fallen beyond all others,"
-        " peaks below 1e-3 alike; the remark gives its p-value.\n\nTwo-sample Kolmogorov-Smirnov test: the probability of"
-        " such a distance between two samples of one distribution.",
+        " peaks below 1e-3 alike; the remark gives its p-value.\n\n"
+        "Two-sample Kolmogorov-Smirnov test: the probability of such a distance between two"
+        " samples of one distribution.",
         _ks_distance,
         resolution=1e-3,
     ),
