@@ -105,8 +105,12 @@ class BatchRecord(Stored):
     cost: CostRecord
 
 
-#: A window as tolerances name it, its end (s; None: the whole time), and its measures.
-Window = tuple[str, float | None, Sequence[str]]
+class Window(NamedTuple):
+    """A window as tolerances name it, its end (s; None: the whole time), and its measures."""
+
+    name: str
+    until: float | None
+    measures: Sequence[str]
 
 
 class Compared(NamedTuple):
@@ -277,9 +281,9 @@ def _compute(
     for reference, extra in asked.values():
         yardstick = store.load(reference.name) if reference else None
         others = under_other_laws(scene, reference.variant) if reference and landing else {}
-        for name, until, measures in _windows(reference, extra, horizon):
-            rivals = others if until is None or until > parted else {}
-            figures += by_any(candidate, yardstick, rivals, scene, (name, until, measures))
+        for window in _windows(reference, extra, horizon):
+            rivals = others if window.until is None or window.until > parted else {}
+            figures += by_any(candidate, yardstick, rivals, scene, window)
     return ComparisonRecord(
         figures=tuple(figures),
         impact_law=landing.followed_by(candidate, scene) if landing else None,
@@ -297,7 +301,7 @@ def _windows(
         found.setdefault(what.window, []).append(what.measure)
     ends = {"": None, HORIZON: horizon}
     return [
-        (name, ends[name] if name in ends else float(name[:-1]), measures)
+        Window(name, ends[name] if name in ends else float(name[:-1]), measures)
         for name, measures in found.items()
     ]
 
