@@ -39,6 +39,8 @@ ONE_THREAD = dict.fromkeys(
 AHEAD = 2
 #: Extra time (s) of the first call that uses compiled code, to compile it.
 COMPILING = 600.0
+#: How often a pool begins anew with new processes.
+MOST_BREAKS = 10
 #: Threads that a run allows this process; 0: one a core.
 THREADS: ContextVar[int] = ContextVar("threads", default=0)
 
@@ -135,6 +137,7 @@ class Pool:
     _pool: Any = field(default=None, init=False, repr=False)
     _environment: dict[str, str | None] = field(default_factory=dict, init=False, repr=False)
     _compiled: set[str] = field(default_factory=set, init=False, repr=False)
+    _breaks: int = field(default=0, init=False, repr=False)
 
     def __enter__(self) -> Self:
         from pebble import ProcessPool
@@ -174,6 +177,7 @@ class Pool:
         told: set[Call] = set()
         try:
             while waiting or running:
+                self._mend(waiting, running)
                 self._begin(waiting, running)
                 done = wait(
                     running,
@@ -182,6 +186,8 @@ class Pool:
                 ).done
                 if not done:
                     return
+                if self._mend(waiting, running):
+                    continue
                 for future in sorted(done, key=list(running).index):  # as they were begun
                     call, seconds = running.pop(future)
                     if call not in dict(running.values()):
@@ -193,6 +199,20 @@ class Pool:
         finally:
             for future in running:
                 future.cancel()
+
+    def _mend(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> bool:
+        """Start the processes anew if the pool is broken, and put their calls back to wait.
+
+        Pebble's pool breaks where a process ends before it was heard which call it began.
+        """
+        if self._pool.active or self._breaks == MOST_BREAKS:
+            return False
+        self._breaks += 1
+        self.__exit__(RuntimeError)
+        self.__enter__()
+        waiting.extendleft(reversed(dict.fromkeys(call for call, _ in running.values())))
+        running.clear()
+        return True
 
     def _begin(self, waiting: deque[Call], running: dict[Future[Any], tuple[Call, float]]) -> None:
         """Give each process a call, and one ahead.
@@ -309,6 +329,9 @@ class Cluster(Pool):
 
     def __exit__(self, *fault: Any) -> None:
         self._stack.__exit__(*fault)
+
+    def _mend(self, *_: Any) -> bool:
+        return False
 
     def _workers(self) -> Any:
         return self._pool.scheduler_info(n_workers=-1)["workers"]

@@ -3,10 +3,14 @@ back."""
 
 import json
 import math
+import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from collections import deque
+from concurrent.futures.process import BrokenProcessPool
 from xml.etree import ElementTree
 
 import pytest
@@ -265,6 +269,19 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
     with Pool(2) as pool:
         found = [ended.result for ended in pool.run(deque(calls))]
     assert [one.returncode for one in found if one != 2.0] == [0, 0]
+
+
+def test_a_pool_whose_processes_are_lost_begins_anew():
+    """One is lost before it has a call; all are lost by the pool itself while calls are waiting."""
+    with Pool(2) as pool:
+        os.kill(min(pool._pool._pool_manager.worker_manager.workers), signal.SIGKILL)
+        while pool._pool.active:
+            time.sleep(0.01)
+        ended = pool.run(deque(Call(math.sqrt, (n * n,)) for n in range(20)))
+        found = {next(ended).outcome}
+        pool._pool._pool_manager.handle_broken_pool(BrokenProcessPool("made up"))
+        found |= {one.outcome for one in ended}
+    assert found == set(range(20))
 
 
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
