@@ -83,22 +83,26 @@ def advance(run):
 @inner_kernel
 def after_event(block, base, run):
     """Selects the mode that follows, and notes the event unless the mode goes on."""
-    state, mode = run.state, run.state.mode
-    if state.known:
-        state.known = False
-        tell(run, state.event)
-        return
+    state = run.state
+    if not state.known:
+        select(block, base, run)
+    state.known = False
+    tell(run, state.event)
+
+
+@inner_kernel
+def select(block, base, run):
+    """Selects the mode that follows, and names the event: UNTOLD where the mode goes on."""
+    state, ended = run.state, code_of(run.state.mode)
     if state.guard > Guard.FAR_GAP:
         state.event = _release(block, state)
-    event, ended = state.event, code_of(mode)
-    if not modes.select(block, base, run):
-        state.ending = Ending.NOT_FINITE
-        return
+    event = state.event
     # Events that are changes of mode and nothing else.
     changes = event == Event.UPLIFT or event == Event.SLIPS or event == Event.LIFT_OFF
-    if (changes or event == Event.RELEASE) and code_of(mode) == ended:
-        return
-    tell(run, event)
+    if not modes.select(block, base, run):
+        state.ending, state.event = Ending.NOT_FINITE, Event.UNTOLD
+    elif (changes or event == Event.RELEASE) and code_of(state.mode) == ended:
+        state.event = Event.UNTOLD
 
 
 @inner_kernel

@@ -101,7 +101,7 @@ def fill_guards(block, state, a):
         _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
         a[Row.TABLE + Guard.LANDING, Row.COS] = -1.0
     else:
-        _fill_friction(block, mode, block.mu_s * mode.pull, a)
+        _fill_friction(block, mode, block.mu_s * mode.pull, state.holds, a)
     if mode.pivot == Pivot.SLIPPING and on_wall(mode):
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
         # of slip everywhere.
@@ -119,11 +119,14 @@ def fill_guards(block, state, a):
 
 
 @inner_kernel
-def _fill_friction(block, mode, mu, a):
-    """The floor's push, and the two sides of the friction cone |Q| <= mu P."""
-    if block.unilateral or mode.pivot == Pivot.SLIPPING:
+def _fill_friction(block, mode, mu, winds, a):
+    """The floor's push, and the two sides of the friction cone |Q| <= mu P.
+
+    Friction that `winds` (Bouc-Wen's) has no cone to leave.
+    """
+    if block.unilateral or mode.pivot == Pivot.SLIPPING or winds:
         _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
-    if mode.pivot == Pivot.STICK and not block.no_slip:
+    if mode.pivot == Pivot.STICK and not block.no_slip and not winds:
         _enter(a, Guard.CONE_PLUS, 2, Row.P, mu)
         _enter(a, Guard.CONE_MINUS, 2, Row.P, mu)
         a[Row.TABLE + Guard.CONE_PLUS, Row.Q], a[Row.TABLE + Guard.CONE_MINUS, Row.Q] = -1.0, 1.0
@@ -187,7 +190,7 @@ def _fill_flat_floor(block, mode, hangs, a):
         _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
     # A force below rounding is to stay what it is where P vanishes.
     least = block.mu_s == LEAST_FRICTION
-    _fill_friction(block, mode, 0.0 if least else block.mu_s, a)
+    _fill_friction(block, mode, 0.0 if least else block.mu_s, False, a)
     if least:
         a[Row.TABLE + Guard.CONE_PLUS, _CONSTANT] = block.mu_s
         a[Row.TABLE + Guard.CONE_MINUS, _CONSTANT] = block.mu_s

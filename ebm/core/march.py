@@ -22,7 +22,7 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 
 def loop_with(friction: ModuleType) -> object:
     """The function that plays a row of `play`: the event loop with the four doors of `friction`."""
-    expand, locate, looks_ahead = friction.expand, friction.locate, friction.LOOKS_AHEAD
+    expand, locate = friction.expand, friction.locate
     advance_friction, after_event = friction.advance, friction.after_event
 
     @inner_kernel
@@ -34,7 +34,7 @@ def loop_with(friction: ModuleType) -> object:
             if state.changing:
                 state.changing = False
                 after_event(block, base, run)
-            elif looks_ahead and steps.waits(base, state):
+            elif steps.waits(base, state):
                 steps.rest(block, base, run)
             elif steps.may_go_on(block, base, run):
                 step(block, base, run)

@@ -22,7 +22,7 @@ from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
 from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
-from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
@@ -127,21 +127,26 @@ def wrong_by(block, base, run, measured):
     else:
         order = tilt_series(block, base, run, look, 0.0, 0.0)
         state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
+        # Beyond Painleve's limit pull and push both solve the equations, or neither does.
+        if state.holds and a[Row.INVERSE, 0] <= 0.0 and mode.pull > 0 and mode.pivot != Pivot.STICK:
+            state.rules[Rule.PULLS] += 1
+            return np.inf
     guards.fill_guards(block, run.state, run.a)
     smooth = min(ground.next_kink(base.horizontal, t), ground.next_kink(base.vertical, t)) - t
     worst = 0.0
     for which in range(len(guards.KIND)):
         ahead = guards.seen(guards.KIND[which], smooth)
         if not guards.starts_positive(which, ahead, a):
-            worst = max(worst, _guard_wrong_by(mode, which, order, ahead, a, measured))
+            worst = max(worst, _guard_wrong_by(state, which, order, ahead, a, measured))
             if worst == np.inf:
                 break
     return worst
 
 
 @inner_kernel
-def _guard_wrong_by(mode, which, order, ahead, a, measured):
+def _guard_wrong_by(state, which, order, ahead, a, measured):
     """What one guard adds to `wrong_by`."""
+    mode = state.mode
     noise, degree = series.NOISE[guards.KIND[which]], guards.guard(which, order, a)
     if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -contacts.SLOW:
         return 0.0  # a closing contact is the impact handler's
@@ -149,7 +154,8 @@ def _guard_wrong_by(mode, which, order, ahead, a, measured):
     never = sign <= 0 and which == Guard.PHI and (mode.pivot != Pivot.OFF or sign < 0)
     if never or not math.isfinite(a[Row.GUARD, 0]):
         return np.inf
-    if sign > 0 or (sign == 0 and which != Guard.SLIP):
+    # A pivot that has not yielded (Bouc-Wen) may stand.
+    if sign > 0 or (sign == 0 and (which != Guard.SLIP or state.holds)):
         return 0.0
     if not measured:
         return np.inf
@@ -212,14 +218,18 @@ def _write(number, first, mode):
 
 
 @inner_kernel
-def _possible(block, mode, motion, at):
+def _possible(block, state, at):
     """Whether the contacts of the mode are closed and its slip agrees with the motion."""
+    mode, motion = state.mode, state.motion
     flat, mine = mode.family == Family.FLAT, mode.tip + 2 * mode.far
     if (not block.unilateral and at.floor) if mode.pivot == Pivot.OFF else not at.floor:
         return False
     if mode.pivot != Pivot.OFF and mode.pull < 0 and not _may_pull(block, mode, flat, mine):
         return False
     if block.no_slip and mode.pivot == Pivot.SLIPPING:
+        return False
+    # Friction that winds (Bouc-Wen's) lets the pivot slip, however little, unless two walls hold it.
+    if state.holds and (mode.pivot == Pivot.STICK) != (mine == 3 and not flat):
         return False
     if flat and not _flat_on(mode, mine, at.upright_walls):
         return False
@@ -323,7 +333,7 @@ def _touching(block, base, state):
     return _Touching(favoured, first, floor, v, walls, near, away, _FLAT_TRIES)
 
 
-@inner_kernel
+@called_kernel
 def select(block, base, run):
     """Writes the consistent mode into the state, or the one that is wrong by least.
 
@@ -347,8 +357,8 @@ def select(block, base, run):
     if chosen < 0:
         return False
     _write(chosen, at.first, mode)
-    rule = Rule.MODE_AGAIN if least <= state.least_slack else Rule.LEAST_CONTRADICTION
-    state.rules[rule] += 1
+    again = least <= state.least_slack
+    state.rules[Rule.MODE_AGAIN if again else Rule.LEAST_CONTRADICTION] += 1
     state.slack = max(least, state.least_slack)
     state.least_slack *= 2.0
     return True
@@ -390,4 +400,4 @@ def _comes_up(block, state, at, number, again):
         return False
     _write(number, at.first, mode)
     tried = state.tried[code_of(mode)] != 0
-    return tried == again and _possible(block, mode, state.motion, at)
+    return tried == again and _possible(block, state, at)

@@ -32,8 +32,8 @@ import numpy as np
 from rockcheck.ebm.core.block import side_of, wall_turn
 from rockcheck.ebm.core.ground import fill_series
 from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
-from rockcheck.ebm.core.names import Family, Pivot, Row, Shape
-from rockcheck.ebm.core.series import WIDTH, product, slope, value
+from rockcheck.ebm.core.names import Family, Kind, Pivot, Row, Shape
+from rockcheck.ebm.core.series import NOISE, WIDTH, product, slope, value
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -99,10 +99,42 @@ def tilt_series(block, base, run, order, enough, reach):
     a[Row.Y, 1] = motion.vy
     if mode.pivot == Pivot.STICK and mode.tip != mode.far:
         return _lean_series(block, side, mode.tip != 0, order, a)
-    if mode.pivot == Pivot.SLIPPING and not on_wall(mode):
-        kappa = block.mu_k * mode.slip * mode.pull
+    if mode.pivot == Pivot.SLIPPING and not on_wall(mode) and not run.state.holds:
+        kappa = friction(block, run.state)
         return _slide_series(block.spin, kappa, order, enough, reach, a)
-    return _contact_series(block, mode, order, enough, reach, a)
+    return _contact_series(block, run.state, order, enough, reach, a)
+
+
+@inner_kernel
+def friction(block, state):
+    """kappa of the friction Q = -kappa P with which the pivot slips, or with which it begins to.
+
+    That of a pivot that has not yielded is Bouc-Wen's, whose z is known in the world's frame.
+    """
+    mode = state.mode
+    if state.holds:
+        return block.mu_k * mode.sense * state.zeta * mode.pull
+    return block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
+
+
+@inner_kernel
+def _late_friction(block, mode, k, a):
+    """Coefficient k of what the later terms of z add to the friction -kappa P."""
+    a[Row.LATE, k] = -block.mu_k * mode.pull * _products(a, Row.Z, Row.P, 1, k, k)
+    return a[Row.LATE, k]
+
+
+@inner_kernel
+def _wind(block, mode, k, a):
+    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2.
+
+    Those of V and z up to k are given. The pivot loads where V z > 0.
+    """
+    rate = a[Row.V, k]
+    if mode.slip * a[Row.Z, 0] > -NOISE[Kind.POSITION]:
+        a[Row.Z2, k] = product(a, Row.Z, Row.Z, k)
+        rate -= product(a, Row.V, Row.Z2, k)
+    a[Row.Z, k + 1] = rate / (block.yields * (k + 1))
 
 
 @inner_kernel
@@ -320,17 +352,16 @@ def _contact_rows(acting, a):
 
 
 @called_kernel
-def _contact_series(block, mode, order, enough, reach, a):
+def _contact_series(block, state, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term; returns the order.
 
     The matrix of the unknown forces is the same for each term.
     """
+    mode, winds = state.mode, state.holds
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
-    # Q = -kappa P.
-    kappa = block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
     side = side_of(block, mode.sense)
-    acting = _Acting(side, block.spin, kappa, floor, tip, far)
+    acting = _Acting(side, block.spin, friction(block, state), floor, tip, far)
     n = _contact_rows(acting, a)
     s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
     scale = 1.0
@@ -342,15 +373,23 @@ def _contact_series(block, mode, order, enough, reach, a):
         -a[Row.OMEGA, 0] * c0,
         a[Row.OMEGA, 0] * s0,
     )
+    a[Row.Z, 0] = mode.sense * state.zeta
     for k in range(order - 1):
         i = k + 2
         # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at
         # order k, the unknown.
         ds = -_products(a, Row.OMEGA, Row.COS, 0, k, k + 1)
         dc = _products(a, Row.OMEGA, Row.SIN, 0, k, k + 1)
-        moment = _moment_of_lower_orders(acting, k, a)
-        free = ds * (i - 1.0), dc * (i - 1.0), moment
+        along, moment = -a[Row.U, k], _moment_of_lower_orders(acting, k, a)
+        if winds:
+            along += _late_friction(block, mode, k, a)
+            moment += product(a, Row.COS, Row.LATE, k)
+        free = ds * (i - 1.0), dc * (i - 1.0), along, moment
         ax, ay, aphi = _accelerations(acting, n, free, k, a)
+        if winds:
+            a[Row.Q, k] += a[Row.LATE, k]
+            a[Row.V, k] = (k + 1) * (a[Row.XI, k + 1] - a[Row.SIN, k + 1])
+            _wind(block, mode, k, a)
         if static:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
@@ -397,9 +436,9 @@ def _accelerations(acting, n, free, k, a):
     """Coefficient k of the accelerations (xi, y, phi), the constraints being kept.
 
     The n contact forces for that are written into the workspace. `free` are the accelerations of
-    sine and cosine but for phi's own, and the moment of the forces' lower coefficients.
+    sine and cosine but for phi's own, and what moves xi and phi but for the unknown forces.
     """
-    side, (ks, kc, moment) = acting.side, free
+    side, (ks, kc, along, moment) = acting.side, free
     # The rates of s'.
     tip_reach, far_reach = (
         side.tip_sin * kc - side.tip_cos * ks,
@@ -407,7 +446,7 @@ def _accelerations(acting, n, free, k, a):
     )
     s, c = a[Row.SIN, 0], a[Row.COS, 0]
     tip_arm, far_arm = _wall_arms(side, s, c)
-    ax, ay, aphi = -a[Row.U, k], -a[Row.G, k], acting.spin * moment
+    ax, ay, aphi = along, -a[Row.G, k], acting.spin * moment
     r = 0
     for which in range(3):
         if _acts(acting, which):
@@ -474,12 +513,17 @@ def flat_series(block, base, run, order):
     mode, motion, a = run.state.mode, run.state.motion, run.a
     base_series(base, run.state.t, 1.0, order, a)
     a[Row.XI, 0], a[Row.XI, 1], a[Row.Y, 0], a[Row.Y, 1] = motion.x, motion.vx, motion.y, motion.vy
-    press = mode.tip - mode.far
+    press, kappa = mode.tip - mode.far, friction(block, run.state)
+    a[Row.Z, 0] = run.state.zeta
     for k in range(order - 1):
         a[Row.P, k] = a[Row.G, k] if mode.pivot != Pivot.OFF else 0.0
         a[Row.Q, k] = a[Row.NA, k] = 0.0
         if mode.pivot == Pivot.SLIPPING:
-            a[Row.Q, k] = -block.mu_k * mode.slip * mode.pull * a[Row.P, k]
+            a[Row.Q, k] = -kappa * a[Row.P, k]
+            if run.state.holds:
+                a[Row.Q, k] += _late_friction(block, mode, k, a)
+                a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
+                _wind(block, mode, k, a)
         if mode.pivot == Pivot.STICK:
             a[Row.Q, k] = a[Row.U, k]
         elif press != 0:

@@ -67,22 +67,11 @@ Row = _rows(
         "ANGLE": 1,
         # The guards of the mode: the weights of the series in each (see ebm.core.guards).
         "TABLE": len(Guard) - 1,
-        # Bouc-Wen friction: z, V and what the recurrences need.
+        # Bouc-Wen friction: z, its square, the slip velocity, and the friction of z's later terms.
         "Z": 1,
-        "V": 1,
         "Z2": 1,
-        "SPIN2": 1,
-        "WEIGHT": 1,
-        "ARM": 1,
-        "TURN": 1,
-        "REACH": 1,
-        "INERTIA": 1,
-        "LOAD": 1,
-        "PUSH": 1,
-        "ZA": 1,
-        "LEVER": 1,
-        "DEN": 1,
-        "TORQUE": 1,
+        "V": 1,
+        "LATE": 1,
     }
 )
 
