@@ -23,7 +23,7 @@ import math
 
 from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import Event, Family, Guard, Kind, Pivot, Row
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, note
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -42,7 +42,7 @@ def expand(block, base, run, reach):
         order = tilt_series(block, base, run, order, 0.0, reach)
     h = series.step_size(a, Row.U, Row.G, order - 1, last, reach)
     if mode.pivot == Pivot.SLIPPING:
-        if state.holds:
+        if state.winds:
             h = series.force_step(a, Row.Z, order - 1, state.tolerance_rad, h)
         h = series.step_size(a, Row.XI, Row.XI, order - 1, last, h)
         if mode.family == Family.TILT:
@@ -52,89 +52,63 @@ def expand(block, base, run, reach):
 
 @inner_kernel
 def locate(block, run):
-    """The first event of the step, as with Coulomb's friction, or z reaching zero.
-
-    Where the pivot unloads, z comes to the sign of V there: from then on the pivot loads.
-    """
-    state, mode, a = run.state, run.state.mode, run.a
+    """The first event of the step. One more guard: z comes to the sense of slip."""
     guards.fill_guards(block, run.state, run.a)
     guards.first_event(run)
-    noise = series.NOISE[Kind.POSITION]
-    if _winds(state) and mode.slip * a[Row.Z, 0] <= -noise:
-        tau, degree = state.tau, state.order - 1
-        for k in range(degree + 1):
-            a[Row.GUARD, k] = -mode.slip * a[Row.Z, k]
-        root = series.first_root(a, Row.GUARD, degree, tau, tau, noise, series.AHEAD, run.stack)
-        if root != series.NO_ROOT:
-            state.tau, state.guard = root, Guard.LOADS
 
 
 @inner_kernel
 def advance(run):
     """Moves z to the end of a step. Where it has come to +-1 the pivot has yielded."""
     state, mode = run.state, run.state.mode
-    if not _winds(state):
+    if mode.pivot != Pivot.SLIPPING or not state.winds:
         return
+    sense = mode.sense * mode.slip
     state.zeta = mode.sense * series.value(run.a, Row.Z, state.order - 1, state.tau)
-    left = 1.0 - mode.sense * mode.slip * state.zeta
-    if left < min(_NEARLY * max(state.tolerance_rad, series.NOISE[Kind.POSITION]), 1.0):
+    near = _NEARLY * max(state.tolerance_rad, series.NOISE[Kind.POSITION])
+    if 1.0 - sense * state.zeta < min(near, 1.0):
         before = mode_code(state)
-        _yield(state)
+        state.zeta, state.winds = float(sense), False
         note(run, Event.SLIPS, before)
-
-
-@inner_kernel
-def _winds(state):
-    """Whether z changes with the slip."""
-    return state.mode.pivot == Pivot.SLIPPING and state.holds
-
-
-@inner_kernel
-def _yield(state):
-    """The pivot has yielded: z is the sense of slip, and stays so."""
-    state.zeta, state.holds = float(state.mode.sense * state.mode.slip), False
 
 
 @called_kernel
 def after_event(block, base, run):
     """The mode that follows an event, or the start; notes the event.
 
-    A pivot that stands has Coulomb's friction at first, of which z is the share. z goes on through
-    everything else.
+    Where the pivot has stood, friction begins as Coulomb's: so does the mode, and z is the share
+    that it takes. Through all else z goes on.
     """
     state, mode, motion, which = run.state, run.state.mode, run.state.motion, run.state.guard
     if which == Guard.LOADS or (which == Guard.SLIP and mode.family == Family.TILT):
         _turn(run)
         return
     contacts.upright(block, motion)
-    still = motion.theta == 0.0 and motion.w == 0.0
-    stands = still and (motion.vx == 0.0 or which == Guard.SLIP)
-    starts, slip = math.isnan(state.zeta), mode.slip
-    state.holds = not (stands or starts)
+    flat = motion.theta == 0.0 and motion.w == 0.0
+    stands = flat and (motion.vx == 0.0 or which == Guard.SLIP)
+    begins = stands or math.isnan(state.zeta)
     if stands:
+        # As the push of the floor ends, friction fails: what moves in between is rounding.
         state.t = ground.weightless_at(base.vertical, state.t)
+    state.winds = not begins
     coulomb.select(block, base, run)
-    if which == Guard.SLIP and mode.pivot == Pivot.SLIPPING and mode.family == Family.FLAT:
-        state.holds, mode.slip = True, -slip
-    elif not state.holds:
-        state.zeta, state.holds = _share(block, run), True
-        if mode.family == Family.TILT:
-            modes.select(block, base, run)
-    if mode.pivot == Pivot.SLIPPING and mode.sense * mode.slip * state.zeta == 1.0:
-        state.holds = False
+    slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
+    if begins and not (slides and which == Guard.SLIP):
+        state.zeta = _share(block, run)
+    state.winds = True
+    if begins and mode.family == Family.TILT and not modes.select(block, base, run):
+        state.ending = Ending.NOT_FINITE
+    state.winds = mode.pivot != Pivot.SLIPPING or mode.sense * mode.slip * state.zeta != 1.0
     coulomb.tell(run, state.event)
 
 
 @inner_kernel
 def _share(block, run):
-    """z where the pivot has stood: the share of the friction that Coulomb's takes."""
-    mode, a = run.state.mode, run.a
+    """The share z of the friction that the selected mode has with Coulomb's law."""
+    mode, held = run.state.mode, -run.state.mode.sense * run.a[Row.Q, 0]
     if mode.pivot == Pivot.SLIPPING:
         return float(mode.sense * mode.slip)
-    most, held = block.mu_k * abs(a[Row.P, 0]), -mode.sense * a[Row.Q, 0]
-    if held == 0.0:
-        return 0.0
-    return held / most if abs(held) < most else math.copysign(1.0, held)
+    return held / max(block.mu_k * abs(run.a[Row.P, 0]), abs(held), contacts.SLOW)
 
 
 @inner_kernel
@@ -148,7 +122,7 @@ def _turn(run):
     if state.guard == Guard.LOADS:
         state.zeta = 0.0
         return
-    yielded = not state.holds
-    state.holds, mode.slip = True, -mode.slip
+    yielded = not state.winds
+    state.winds, mode.slip = True, -mode.slip
     if yielded:
         note(run, Event.STICKS, state.before)

@@ -46,7 +46,7 @@ GUARDS: dict[int, tuple[int, ...]] = {
     Guard.SLIP: (Kind.RATE, Row.PHI, Row.SIN, Row.XI),
     Guard.UPLIFT_PLUS: (Kind.FORCE, Row.P, Row.Q),
     Guard.UPLIFT_MINUS: (Kind.FORCE, Row.P, Row.Q),
-    Guard.LOADS: (Kind.POSITION,),
+    Guard.LOADS: (Kind.POSITION, Row.Z),
 }
 KIND = np.array([GUARDS[which][0] for which in range(len(GUARDS))])
 _MOST = max(map(len, GUARDS.values())) - 1
@@ -89,6 +89,9 @@ def fill_guards(block, state, a):
     mode = state.mode
     for which in range(len(KIND)):
         drop(a, which)
+    unloads = mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]
+    if state.winds and mode.pivot == Pivot.SLIPPING and unloads:
+        _enter(a, Guard.LOADS, 1, Row.Z, -float(mode.slip))
     if mode.family == Family.FLAT:
         _fill_flat(block, mode, a)
         return
@@ -101,7 +104,7 @@ def fill_guards(block, state, a):
         _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
         a[Row.TABLE + Guard.LANDING, Row.COS] = -1.0
     else:
-        _fill_friction(block, mode, block.mu_s * mode.pull, state.holds, a)
+        _fill_friction(block, mode, block.mu_s * mode.pull, state.winds, a)
     if mode.pivot == Pivot.SLIPPING and on_wall(mode):
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
         # of slip everywhere.

@@ -92,7 +92,7 @@ def begin(block, base, run):
     state.steps = state.events = state.wall_impacts = state.rows = state.gains = 0
     state.largest_gain = state.floor_impulse = state.wall_impulse = 0.0
     state.rules[:] = 0
-    state.holds = state.known = False
+    state.winds = state.known = False
     state.began = state.place = 0.0
     settle.no_impacts(state)
     modes.forget(state)

@@ -127,10 +127,6 @@ def wrong_by(block, base, run, measured):
     else:
         order = tilt_series(block, base, run, look, 0.0, 0.0)
         state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
-        # Beyond Painleve's limit pull and push both solve the equations, or neither does.
-        if state.holds and a[Row.INVERSE, 0] <= 0.0 and mode.pull > 0 and mode.pivot != Pivot.STICK:
-            state.rules[Rule.PULLS] += 1
-            return np.inf
     guards.fill_guards(block, run.state, run.a)
     smooth = min(ground.next_kink(base.horizontal, t), ground.next_kink(base.vertical, t)) - t
     worst = 0.0
@@ -155,7 +151,7 @@ def _guard_wrong_by(state, which, order, ahead, a, measured):
     if never or not math.isfinite(a[Row.GUARD, 0]):
         return np.inf
     # A pivot that has not yielded (Bouc-Wen) may stand.
-    if sign > 0 or (sign == 0 and (which != Guard.SLIP or state.holds)):
+    if sign > 0 or (sign == 0 and (which != Guard.SLIP or state.winds)):
         return 0.0
     if not measured:
         return np.inf
@@ -228,8 +224,8 @@ def _possible(block, state, at):
         return False
     if block.no_slip and mode.pivot == Pivot.SLIPPING:
         return False
-    # Friction that winds (Bouc-Wen's) lets the pivot slip, however little, unless two walls hold it.
-    if state.holds and (mode.pivot == Pivot.STICK) != (mine == 3 and not flat):
+    # Friction that winds (Bouc-Wen's) lets the pivot slip, however little, unless it is wedged.
+    if state.winds and (mode.pivot == Pivot.STICK) != (mine == 3 and not flat):
         return False
     if flat and not _flat_on(mode, mine, at.upright_walls):
         return False

@@ -99,7 +99,7 @@ def tilt_series(block, base, run, order, enough, reach):
     a[Row.Y, 1] = motion.vy
     if mode.pivot == Pivot.STICK and mode.tip != mode.far:
         return _lean_series(block, side, mode.tip != 0, order, a)
-    if mode.pivot == Pivot.SLIPPING and not on_wall(mode) and not run.state.holds:
+    if mode.pivot == Pivot.SLIPPING and not on_wall(mode) and not run.state.winds:
         kappa = friction(block, run.state)
         return _slide_series(block.spin, kappa, order, enough, reach, a)
     return _contact_series(block, run.state, order, enough, reach, a)
@@ -107,12 +107,12 @@ def tilt_series(block, base, run, order, enough, reach):
 
 @inner_kernel
 def friction(block, state):
-    """kappa of the friction Q = -kappa P with which the pivot slips, or with which it begins to.
+    """The friction Q = -kappa P of a pivot that slips, as kappa; with z, as it is now.
 
     That of a pivot that has not yielded is Bouc-Wen's, whose z is known in the world's frame.
     """
     mode = state.mode
-    if state.holds:
+    if state.winds:
         return block.mu_k * mode.sense * state.zeta * mode.pull
     return block.mu_k * mode.slip * mode.pull if mode.pivot == Pivot.SLIPPING else 0.0
 
@@ -357,7 +357,7 @@ def _contact_series(block, state, order, enough, reach, a):
 
     The matrix of the unknown forces is the same for each term.
     """
-    mode, winds = state.mode, state.holds
+    mode, winds = state.mode, state.winds
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
     side = side_of(block, mode.sense)
@@ -520,7 +520,7 @@ def flat_series(block, base, run, order):
         a[Row.Q, k] = a[Row.NA, k] = 0.0
         if mode.pivot == Pivot.SLIPPING:
             a[Row.Q, k] = -kappa * a[Row.P, k]
-            if run.state.holds:
+            if run.state.winds:
                 a[Row.Q, k] += _late_friction(block, mode, k, a)
                 a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
                 _wind(block, mode, k, a)

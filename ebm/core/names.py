@@ -49,7 +49,8 @@ Row = _rows(
         "Q": 1,
         "NA": 1,
         "NB": 1,
-        # The guard that is looked at.
+        "Z": 1,
+        # The guard that is looked at. Those before it are the series that guards combine.
         "GUARD": 1,
         # What the general solution needs: known terms, forces found, arms, and the walls' push.
         "KNOWN": 1,
@@ -67,8 +68,7 @@ Row = _rows(
         "ANGLE": 1,
         # The guards of the mode: the weights of the series in each (see ebm.core.guards).
         "TABLE": len(Guard) - 1,
-        # Bouc-Wen friction: z, its square, the slip velocity, and the friction of z's later terms.
-        "Z": 1,
+        # Bouc-Wen friction: the square of z, the slip velocity, and the friction of z's later terms.
         "Z2": 1,
         "V": 1,
         "LATE": 1,

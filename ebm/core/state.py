@@ -110,9 +110,9 @@ STATE = record(
     # Impulses of the last impact.
     floor_impulse="f8",
     wall_impulse="f8",
-    # Bouc-Wen friction: its variable z, and whether the pivot has not yielded.
+    # Bouc-Wen friction: its variable z, and whether that winds, the pivot not having yielded.
     zeta="f8",
-    holds="?",
+    winds="?",
     # Counts: steps, events, wall impacts, rows written; impacts that added energy, and the largest
     # gain; the modelling choices, a Rule each.
     steps="i8",
@@ -227,7 +227,7 @@ def mode_code(state):
     if mode.family == Family.FLAT:
         return 0 if mode.pivot == Pivot.STICK else 1
     wall = 2 if on_wall(mode) else 0
-    return wall + (2 if mode.pivot == Pivot.STICK or state.holds else 3)
+    return wall + (2 if mode.pivot == Pivot.STICK or state.winds else 3)
 
 
 @inner_kernel
