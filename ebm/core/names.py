@@ -68,7 +68,7 @@ Row = _rows(
         "ANGLE": 1,
         # The guards of the mode: the weights of the series in each (see ebm.core.guards).
         "TABLE": len(Guard) - 1,
-        # Bouc-Wen friction: the square of z, the slip velocity, and the friction of z's later terms.
+        # Bouc-Wen friction: the square of z, the slip velocity, the friction of z's later terms.
         "Z2": 1,
         "V": 1,
         "LATE": 1,
