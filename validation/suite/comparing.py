@@ -27,7 +27,7 @@ from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, value_of
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
@@ -80,7 +80,7 @@ class Planned(Task):
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
 #: request.
-Asked = tuple[Planned | None, list[Windowed]]
+Asked = tuple[Planned | None, list[str]]
 
 
 class CellRecord(Stored):
@@ -252,12 +252,12 @@ def compared(
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
     horizon = None  # s; up to it, histories can be compared point by point
-    if any(what.window == HORIZON for _, extra in asked.values() for what in extra):
+    if any(what.endswith(f"@{HORIZON}") for _, extra in asked.values() for what in extra):
         horizon = _of_scene(
             store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
         )
     against = [
-        [name, reference.key if reference else "", list(map(str, extra))]
+        [name, reference.key if reference else "", extra]
         for name, (reference, extra) in asked.items()
     ]
     # with the code of this module and of `compare`
@@ -292,13 +292,14 @@ def _compute(
 
 
 def _windows(
-    reference: Planned | None, extra: Iterable[Windowed], horizon: float | None
+    reference: Planned | None, extra: Iterable[str], horizon: float | None
 ) -> list[Window]:
     """The whole time with all measures but those on request, and the windows of `extra`."""
     known = DIFFERENCES if reference else FIGURES
     found = {"": [measure.name for measure in known.values() if not measure.on_request]}
     for what in extra:
-        found.setdefault(what.window, []).append(what.measure)
+        measure, _, window = what.partition("@")
+        found.setdefault(window, []).append(measure)
     ends = {"": None, HORIZON: horizon}
     return [
         Window(name, ends[name] if name in ends else float(name[:-1]), measures)

@@ -56,9 +56,9 @@ from rockcheck.validation.suite.tolerances import (
     MEASURES,
     OWN_FIGURES,
     Place,
-    Windowed,
     floor_of,
     judge,
+    measure_of,
 )
 from rockcheck.validation.uncertainty import numerical
 from rockcheck.validation.uncertainty.population import Inputs
@@ -300,7 +300,7 @@ class SuiteStudy(Study):
         floor = partial(floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
-        same_equations = Place(scene.name, planned.model, own.reference, Windowed("theta_rms"))
+        same_equations = Place(scene.name, planned.model, own.reference, "theta_rms")
         if moved and reference and own.kind(same_equations) == "numerical":
             checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
         return Cell(
@@ -332,7 +332,7 @@ class SuiteStudy(Study):
                 sorted(
                     p.what
                     for p in required
-                    if p.against == name and (p.what.window or p.what.definition.on_request)
+                    if p.against == name and ("@" in p.what or measure_of(p.what).on_request)
                 ),
             )
             for name in self.own[planned.place].yardsticks(required)
@@ -423,16 +423,15 @@ def _checks(
     required: Mapping[Place, Kind],
     figures: Sequence[Compared],
     floor: Callable[[Measure], float],
-    beside: Mapping[tuple[str, str], float | None] = MappingProxyType({}),
+    beside: Mapping[str, float | None] = MappingProxyType({}),
 ) -> Iterator[Check]:
     """The judged figures of a cell; none if its suite judges nothing.
 
-    `beside` has the reference's own figures, by measure and window, where these are yardsticks.
+    `beside` has the reference's own figures, by "measure@window", where these are yardsticks.
     """
     known = {(one.figure.against or OWN_FIGURES, one.figure.windowed): one for one in figures}
     for place, kind in required.items() if own.judged else ():
-        what, line = place.what, own.tolerances.get(place)
-        measure = what.definition
+        line, measure = own.tolerances.get(place), measure_of(place.what)
         itself = place.against == OWN_FIGURES
         nothing = Figure(  # without a value, so that the check cannot pass
             measure=measure.name,
@@ -440,10 +439,10 @@ def _checks(
             unit=measure.unit,
             value=None,
             against="" if itself else place.against,
-            window=what.window,
+            window=place.what.partition("@")[2],
             note="not computed" if itself else f"{place.against} failed in this scene",
         )
-        found = known.get((place.against, str(what)), Compared(nothing))
+        found = known.get((place.against, place.what), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap
         yield judge(
             found.figure,
@@ -452,25 +451,20 @@ def _checks(
             measure=measure,
             gap=gap + SHIFTS if gap and kind == "measured" and not found.fall else gap,
             floor=floor(measure),
-            beside=beside.get((what.measure, what.window)) if line and kind == "absolute" else None,
+            beside=beside.get(place.what) if line and kind == "absolute" else None,
         )
 
 
-def as_expected(reference: Cell) -> dict[tuple[str, str], float | None]:
-    """The reference's own figures, by measure and window, but for those not as expected.
+def as_expected(reference: Cell) -> dict[str, float | None]:
+    """The reference's own figures by "measure@window", but for those not as expected.
 
     One that is not as expected itself is no yardstick.
     """
-    moved = {
-        (check.figure.measure, check.figure.window)
-        for check in reference.checks
-        if check.verdict != "pass" and not check.figure.against
-    }
-    return {
-        (one.measure, one.window): one.value
-        for one in reference.figures
-        if not one.against and (one.measure, one.window) not in moved
-    }
+    own = {one.windowed: one.value for one in reference.figures if not one.against}
+    for check in reference.checks:
+        if check.verdict != "pass" and not check.figure.against:
+            own.pop(check.figure.windowed, None)
+    return own
 
 
 def in_order(items: Sequence[Planned]) -> list[Planned]:

@@ -90,7 +90,7 @@ from rockcheck.validation.suite.tolerances import (
     OWN_FIGURES,
     Place,
     Tolerances,
-    Windowed,
+    measure_of,
     parse_tolerances,
 )
 
@@ -234,7 +234,7 @@ class Suite:
         if place in self.ensembles:
             require = Require(difference=require.ensemble)
         places = [
-            Place(place, model, against, Windowed.parse(text))
+            Place(place, model, against, text)
             for against, texts in (
                 (OWN_FIGURES, require.figures),
                 (self.reference, require.difference),
@@ -257,7 +257,7 @@ class Suite:
         from one that can.
         """
         if place.against == OWN_FIGURES:
-            return "exact" if place.what.definition.exact else "absolute"
+            return "exact" if measure_of(place.what).exact else "absolute"
         families = [self.models[label].family for label in (place.model, place.against)]
         if "measured" in families:
             return "measured"
@@ -406,7 +406,7 @@ def _check_names(
     for key, texts in given.require:
         book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
         for text in texts:
-            if Windowed.parse(text).measure not in book:
+            if measure_of(text).name not in book:
                 raise unknown_name(f"measure of require.{key}", text, book)
 
 
