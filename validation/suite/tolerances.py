@@ -133,12 +133,9 @@ def _spread(
     A scene's own line takes precedence; what it leaves out comes from the line for every scene.
     """
     own = {place: line for place, line in lines.items() if place.scene != EVERY}
-    completed = {place[1:] for place in own}
     for place, line in own.items():
-        below = lines.get(place._replace(scene=EVERY))
-        if isinstance(below, Mapping) and isinstance(line, Mapping):
-            line = {**below, **line}
-        yield place, line
+        yield place, _over(lines.get(place._replace(scene=EVERY)), line)
+    completed = {place[1:] for place in own}
     for place, line in lines.items():
         completes = place[1:] in completed and isinstance(line, Mapping) and "limit" not in line
         if place in own or completes:
@@ -147,6 +144,11 @@ def _spread(
         # Without a cell the line stays as it is, and is reported as a tolerance without a cell.
         every = (place._replace(scene=scene) for scene in scenes or [EVERY])
         yield from ((one, line) for one in every if one not in own)
+
+
+def _over(below: Any, line: Any) -> Any:
+    both = isinstance(below, Mapping) and isinstance(line, Mapping)
+    return {**below, **line} if both else line
 
 
 def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Any]]:
