@@ -112,6 +112,7 @@ class SuiteStudy(Study):
     """
 
     name = "suite"
+    record = CellRecord | BatchRecord
     kinds = (HISTORIES, COMPARISONS)
 
     def __init__(self, suite: Suite, folder: Path) -> None:
@@ -184,7 +185,7 @@ class SuiteStudy(Study):
         found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            self.ended[task] = _record_of(task).model_validate(found)
+            self.ended[task] = self._adapter.validate_python(found)
             self.read_back.add(task)
         return self.ended.get(task)
 
@@ -193,7 +194,7 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        self.ended[task] = _record_of(task).model_validate(record.record)
+        self.ended[task] = self._adapter.validate_python(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -356,45 +357,42 @@ class SuiteStudy(Study):
 
     def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
         planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
-        played = {label: self._together(batches) for label, batches in planned.items()}
+        played = {label: list(map(self._batch, batches)) for label, batches in planned.items()}
         whole = EnsembleRecord(
             name=name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
-            peaks={label: one.peaks for label, one in played.items()},
-            outcomes={label: one.outcomes for label, one in played.items()},
+            peaks={at: tuple(p for one in some for p in one.peaks) for at, some in played.items()},
+            outcomes={
+                at: tuple(o for one in some for o in one.outcomes) for at, some in played.items()
+            },
         )
         return whole, [
-            self._ensemble_cell(batches, whole.samples, played[label].cost)
-            for label, batches in planned.items()
+            self._ensemble_cell(planned[label], [one.cost for one in some], whole.samples)
+            for label, some in played.items()
         ]
 
-    def _together(self, batches: Sequence[Planned]) -> BatchRecord:
-        """Batches as one; each scene of a batch that failed has its reason."""
-        found: list[BatchRecord] = []
-        for batch in batches:
-            one, count = self.ended[batch], len(batch.numbers)
-            if isinstance(one, Failure):
-                one = BatchRecord(
-                    peaks=(None,) * count, outcomes=(one.reason,) * count, cost=CostRecord()
-                )
-            found.append(one)
-        return BatchRecord(
-            peaks=tuple(peak for one in found for peak in one.peaks),
-            outcomes=tuple(outcome for one in found for outcome in one.outcomes),
-            cost=CostRecord(
-                **{name: sum(getattr(one.cost, name) for one in found) for name in ADDED}
-            ),
-        )
+    def _batch(self, planned: Planned) -> BatchRecord:
+        """The record of a batch; of one that failed, each scene has its reason."""
+        found, count = self.ended[planned], len(planned.numbers)
+        if isinstance(found, Failure):
+            found = BatchRecord(
+                peaks=(None,) * count, outcomes=(found.reason,) * count, cost=CostRecord()
+            )
+        return found
 
     def _ensemble_cell(
-        self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
+        self,
+        batches: Sequence[Planned],
+        costs: Sequence[CostRecord],
+        samples: Mapping[str, Sample],
     ) -> Cell:
         name, label = batches[0].place, batches[0].model
         mine, reason = samples[label], ""
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
+        cost = CostRecord(**{name: sum(getattr(one, name) for one in costs) for name in ADDED})
         about = self._about(batches, reason) | {"cost": cost}
         if about["status"] != "done":
             return Cell(**about)
@@ -412,10 +410,6 @@ class SuiteStudy(Study):
             figures=tuple(one.figure for one in figures),
             checks=tuple(_checks(own, required, figures, attrgetter("resolution"))),
         )
-
-
-def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
-    return CellRecord if task.ensemble is None else BatchRecord
 
 
 def _checks(

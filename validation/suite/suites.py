@@ -325,6 +325,12 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     tables, tolerances_path = given.tolerances, path
     if tables is None:
         tables, tolerances_path = read_toml(beside) if beside.exists() else {}, beside
+    try:
+        tolerances = parse_tolerances(tables, _played(scenes, models))
+        for at in tolerances:
+            one_of(f"reference of [{at.scene}.{at.model}]", at.against, [OWN_FIGURES, *models])
+    except InputError as error:
+        raise InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(
         name=path.stem,
         path=path,
@@ -334,7 +340,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         scenes=scenes,
         ensembles=ensembles,
         models=models,
-        tolerances=_tolerances(tolerances_path, tables, scenes, models),
+        tolerances=tolerances,
         tolerances_path=tolerances_path,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
         left_out=tuple(left_out),
@@ -410,22 +416,6 @@ def _check_names(
                 raise unknown_name(f"measure of require.{key}", text, book)
 
 
-def _tolerances(
-    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, Work]
-) -> Tolerances:
-    try:
-        tolerances = parse_tolerances(tables, _played(scenes, models))
-        for place in tolerances:
-            one_of(
-                f"reference of [{place.scene}.{place.model}]",
-                place.against,
-                [OWN_FIGURES, *models],
-            )
-    except InputError as error:
-        raise InputError(f"{printable(path)}: {error}") from None
-    return tolerances
-
-
 def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
     return (
@@ -480,16 +470,14 @@ def _variant(
             else str(folder / str(files))
             for scene, files in settings["files"].items()
         }
-    if is_own(name):
-        try:
-            check_allowed(name, allow_code)
-        except InputError as error:
-            raise InputError(error.reason, f"models.{printable(label)}") from None
-        return Work(
-            label=label, family=name, settings=settings, search_path=(str(folder.absolute()),)
-        )
-    build(name, settings)
-    return Work(label=label, family=name, settings=settings)
+    if not is_own(name):
+        build(name, settings)
+        return Work(label=label, family=name, settings=settings)
+    try:
+        check_allowed(name, allow_code)
+    except InputError as error:
+        raise InputError(error.reason, f"models.{printable(label)}") from None
+    return Work(label=label, family=name, settings=settings, search_path=(str(folder.absolute()),))
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:

@@ -133,19 +133,19 @@ def outcome_tables(run: Run) -> Iterator[Table]:
     """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
-        rows = [_outcome_cells(cell, run.reference) for cell in cells.values()]
+        rows = []
+        for cell in cells.values():
+            known, done = outcome_row(cell, run.reference), cell.status == "done"
+            rows.append(
+                [
+                    cell.model,
+                    cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
+                    known["peak_rotation_alpha"],
+                    "ref." if cell.model == run.reference else known["apart_alpha"],
+                    f"{cell.cost.wall_seconds:.1f} s" if done else "",
+                ]
+            )
         yield Table("outcomes", columns, rows, scene)
-
-
-def _outcome_cells(cell: Cell, reference: str) -> list[Any]:
-    values, done = outcome_row(cell, reference), cell.status == "done"
-    return [
-        cell.model,
-        cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
-        values["peak_rotation_alpha"],
-        "ref." if cell.model == reference else values["apart_alpha"],
-        f"{cell.cost.wall_seconds:.1f} s" if done else "",
-    ]
 
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
