@@ -35,7 +35,7 @@ ISO_MOST_SAMPLES = 4000
 # Differences
 
 
-def _peak(columns: tuple[Array, Array]) -> float:
+def _peak(columns: Array) -> float:
     return float(np.max(np.abs(columns[1] - columns[0])))
 
 
