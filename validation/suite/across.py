@@ -341,32 +341,26 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     """
     found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
-        peaks = _peaks(run)
-        for (model, scene, n), peak in peaks.items():
-            reference = peaks.get((run.reference, scene, n))
-            if model != run.reference and reference is not None:
-                found[model].append((reference, peak))
+        # by model, scene and number in its ensemble
+        ends = {
+            (cell.model, cell.scene, 0): (cell.outcome, value_of(cell.figures, "peak_rotation"))
+            for cell in run.cells
+            if cell.status == "done"
+        } | {
+            (model, drawn.name, n): (outcome, peak)
+            for drawn in run.ensembles
+            for model, peaks in drawn.peaks.items()
+            for n, (outcome, peak) in enumerate(zip(drawn.outcomes[model], peaks, strict=True))
+        }
+        stands = {
+            key: peak
+            for key, (outcome, peak) in ends.items()
+            if peak is not None and peak > LEAST and not outcome.startswith("overturned")
+        }
+        for (model, scene, n), peak in stands.items():
+            if model != run.reference and (run.reference, scene, n) in stands:
+                found[model].append((stands[run.reference, scene, n], peak))
     return found
-
-
-def _peaks(run: Run) -> dict[tuple[str, str, int], float]:
-    """The peak rotations that allow a ratio, by model, scene and number in its ensemble."""
-    every = [
-        (cell.model, cell.scene, 0, cell.outcome, value_of(cell.figures, "peak_rotation"))
-        for cell in run.cells
-        if cell.status == "done"
-    ]
-    every += [
-        (model, drawn.name, n, drawn.outcomes[model][n], peak)
-        for drawn in run.ensembles
-        for model, peaks in drawn.peaks.items()
-        for n, peak in enumerate(peaks)
-    ]
-    return {
-        (model, scene, n): peak
-        for model, scene, n, outcome, peak in every
-        if peak is not None and peak > LEAST and not outcome.startswith("overturned")
-    }
 
 
 def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
