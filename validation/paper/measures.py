@@ -73,6 +73,8 @@ Measured = tuple[list[Row], dict[str, Any]]
 class Paper:
     """The 28 spectra on one grid: outcomes and safe nodes by place, and by friction without a wall.
 
+    `spectra` come in the order of `paper_panels`.
+
     `falls` are the nodes that overturn: one whose run failed is neither safe nor overturned.
     `least`: the lowest overturning amplitude of `SCANNED` by (gap, e) of a right wall, None without
     one; infinite where none overturns. `tongues`: by friction, the nodes of `near_one_impact` at
@@ -87,20 +89,13 @@ class Paper:
     ) -> None:
         self.frequencies, self.amplitudes = spectra[0].frequency_ratios, spectra[0].amplitude_ratios
         self.least, self.tongues = least or {}, tongues or {}
-        nodes = spectra[0].outcomes.shape
-        self.outcomes, self.alone = (
-            np.zeros((*SIZES, *nodes), np.int8),
-            np.zeros((2, *nodes), np.int8),
+        # by side, friction and wall, of which the first is none
+        grids = (np.array([getattr(one, what) for one in spectra]) for what in ("outcomes", "safe"))
+        outcomes, safe = (grid.reshape(*SIZES[:2], -1, *grid.shape[1:]) for grid in grids)
+        self.alone, self.safe_alone = outcomes[-1, :, 0], safe[-1, :, 0]
+        self.outcomes, self.safe = (
+            grid[:, :, 1:].reshape(*SIZES, *grid.shape[3:]) for grid in (outcomes, safe)
         )
-        self.safe, self.safe_alone = self.outcomes != 0, self.alone != 0
-        for one in spectra:
-            mu = AXES["friction"].index(one.scene.floor.friction)
-            if not one.scene.walls:
-                self.alone[mu], self.safe_alone[mu] = one.outcomes, one.safe
-            for wall in one.scene.walls:
-                side, e = AXES["side"].index(wall.side), RESTITUTIONS.index(wall.restitution)
-                place = side, mu, GAPS.index(wall.gap), e
-                self.outcomes[place], self.safe[place] = one.outcomes, one.safe
         self.falls, self.falls_alone = self.outcomes != SAFE, self.alone != SAFE
 
 
@@ -426,8 +421,8 @@ class Beyond:
 
 
 def _figure(side: int, mu: int) -> int:
-    shown = AXES["side"][side], AXES["friction"][mu]
-    return next(number for number, what in FIGURES.items() if what == shown)
+    figures = {shown: figure for figure, shown in FIGURES.items()}
+    return figures[AXES["side"][side], AXES["friction"][mu]]
 
 
 def _case(place: Place) -> str:

@@ -198,13 +198,11 @@ class Suite:
 
     def cells(self) -> Iterator[tuple[Scene, Work, Ensemble | None]]:
         """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
-        for part in self.parts:
-            for name, model in _played(part.scenes, part.models):
-                yield part.scenes[name], part.models[model], None
-        for part in self.parts:
-            for name, model in _played(part.ensembles, part.models):
-                ensemble, scene = part.ensembles[name]
-                yield scene, part.models[model], ensemble
+        for kind in ("scenes", "ensembles"):
+            for part in self.parts:
+                for name, model in _played(getattr(part, kind), part.models):
+                    ensemble, scene = part.ensembles.get(name) or (None, part.scenes[name])
+                    yield scene, part.models[model], ensemble
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
