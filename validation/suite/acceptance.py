@@ -55,7 +55,6 @@ def accept(
 def _accepted_in(
     suite: Suite, checks: Iterable[tuple[Cell, Check]], reason: str | None, write: bool
 ) -> tuple[list[str], list[str]]:
-    """`accept` of a suite that joins no others."""
     path, changes, refused = suite.tolerances_path, list[str](), list[str]()
     document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = (

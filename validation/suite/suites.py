@@ -180,7 +180,6 @@ class Suite:
 
     @cached_property
     def _judged(self) -> dict[tuple[str, str], list[Place]]:
-        """The places that have a tolerance, by scene and model."""
         found: dict[tuple[str, str], list[Place]] = {}
         for place in self.tolerances:
             found.setdefault((place.scene, place.model), []).append(place)
@@ -425,7 +424,6 @@ def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
-    """Several suites as one: names of scenes must differ, references must agree."""
     included = [
         load_suite(
             path.parent / name if Path(name).suffix.lower() == ".toml" else name,

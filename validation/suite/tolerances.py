@@ -33,8 +33,6 @@ reference solves the same equations and is itself as expected (`runner`). A rati
 defined*.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import ChainMap

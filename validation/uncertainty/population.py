@@ -7,8 +7,6 @@ itself is not known exactly (ASME V&V 20-2009, section 4, by sampling), and Sobo
 number matters most.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -397,7 +395,6 @@ def sensitivities(
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:
-    """The ends of the interval that holds `CONFIDENCE` of the values."""
     low, high = np.quantile(values, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
     return float(low), float(high)
 
