@@ -348,8 +348,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
         for events, matched in ((reference, partners), (candidate, taken))
     )
-    pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
-    return MatchedImpacts(pairs, *alone)
+    return MatchedImpacts(
+        [(reference[i], candidate[j]) for i, j in sorted(partners.items())], *alone
+    )
 
 
 def _strong(impacts: Sequence[Event]) -> list[bool]:

@@ -128,12 +128,11 @@ def difference(before: Run, after: Run) -> Finding:
         *map(text, ("scene", "model", "what")),
         *(Column(name, digits=6) for name in ("before", "after")),
     ]
-    table = Table("changed", columns, rows, most=len(rows))
     return Finding(
         "changes",
         f"{after.suite}, before and after",
         f"{after.suite}: {f'{words} changed' if words else 'nothing changed'}",
-        [*([table] if rows else []), Text(items=told)],
+        [*([Table("changed", columns, rows, most=len(rows))] if rows else []), Text(items=told)],
         data={
             "suite": after.suite,
             "verdict": [before.words, after.words],
@@ -312,11 +311,11 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         Table("figures", columns, rows, "What varied", on="page"),
         Table("runs", about, made, "Runs", on="page"),
     ]
-    counts = f"{len(found)} figures varied, {len(every) - len(found)} stayed the same"
     return Finding(
         "trend",
         f"{last.suite} over {len(moments)} runs",
-        f"{counts}. The last run: {last.verdict}.",
+        f"{len(found)} figures varied, {len(every) - len(found)} stayed the same. The last run:"
+        f" {last.verdict}.",
         blocks,
     )
 
@@ -369,5 +368,6 @@ def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
         return None
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
-    bias = math.exp(float(np.mean(ratios)) + 0.5 * scatter**2)
-    return Trust(bias=bias, scatter=scatter, count=len(pairs))
+    return Trust(
+        bias=math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter=scatter, count=len(pairs)
+    )

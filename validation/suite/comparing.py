@@ -74,8 +74,9 @@ class Planned(Task):
         """The history, or the peaks of a batch."""
         if self.ensemble is None:
             return models.play(self.variant, self.scene, uncertainty=self.uncertainty)
-        scenes = [self.ensemble.drawn(self.scene, n) for n in self.numbers]
-        return models.play_batch(self.variant, scenes)
+        return models.play_batch(
+            self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
+        )
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
@@ -177,8 +178,14 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
 
     if not may_fly(scene):
         return None
-    module = "validation.discrepancy.impact_laws"
-    return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
+    return _of_scene(
+        store,
+        scene,
+        "impact-laws",
+        "validation.discrepancy.impact_laws",
+        Landing | None,
+        landing,
+    )
 
 
 def under_other_laws(scene: Scene, variant: models.Work) -> dict[str, History]:

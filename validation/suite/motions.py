@@ -184,8 +184,9 @@ class Distribution(Frozen):
 def _bounded(given: Distribution | None, *, positive: bool = False) -> Distribution | None:
     low = given.uniform[0] if given and given.uniform else math.inf
     if low < 0.0 or (positive and low == 0.0):
-        said = "more than 0" if positive else "0 or more"
-        raise InputError(f"the lower end must be {said}", "uniform")
+        raise InputError(
+            f"the lower end must be {'more than 0' if positive else '0 or more'}", "uniform"
+        )
     return given
 
 

@@ -16,7 +16,7 @@ This module does not know how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePath
@@ -51,6 +51,11 @@ Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
 #: What fails besides figures out of a limit: nothing; changed figures and a model that is not
 #: installed; "both": better figures, too.
 Strict = bool | Literal["both"]
+FAILS: Mapping[Strict, tuple[CheckVerdict, ...]] = {
+    False: ("fail",),
+    True: ("fail", "changed"),
+    "both": ("fail", "changed", "better"),
+}
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
@@ -91,8 +96,7 @@ class Check(Stored):
 
     def fails(self, strict: Strict) -> bool:
         """Whether the check is out of tolerance in a run of that strictness."""
-        fails = ("fail", "changed", "better") if strict == "both" else ("fail", "changed")
-        return self.verdict in (fails if strict else ("fail",))
+        return self.verdict in FAILS[strict]
 
     @property
     def words(self) -> str:
@@ -279,11 +283,10 @@ class Run(Stored):
             return FAULT
         if self.verdict == "error":
             return 3
-        incomplete = bool(self.strict) and any(cell.status == "absent" for cell in self.cells)
         return int(
-            incomplete
-            or self.verdict == "fail"
+            self.verdict == "fail"
             or any(check.fails(self.strict) for _, check in self.checks())
+            or (bool(self.strict) and any(cell.status == "absent" for cell in self.cells))
         )
 
     @property
@@ -372,8 +375,14 @@ def value_of(
     figures: Iterable[Figure], measure: str, against: str = "", window: str = ""
 ) -> float | None:
     """The value of a measure among some figures, None without one."""
-    wanted = measure, against, window
-    return next((f.value for f in figures if (f.measure, f.against, f.window) == wanted), None)
+    return next(
+        (
+            f.value
+            for f in figures
+            if (f.measure, f.against, f.window) == (measure, against, window)
+        ),
+        None,
+    )
 
 
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:

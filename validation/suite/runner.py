@@ -112,7 +112,6 @@ class SuiteStudy(Study):
     """
 
     name = "suite"
-    record = CellRecord | BatchRecord
     kinds = (HISTORIES, COMPARISONS)
 
     def __init__(self, suite: Suite, folder: Path) -> None:
@@ -158,12 +157,13 @@ class SuiteStudy(Study):
                 for n in batches
             ]
         for numbers, depends in parts:
-            settings = {**variant.settings, **depends}
             yield Planned(
                 scene,
                 variant,
                 variant.label,
-                provenance.cell_key(scene, kind, settings, variant.search_path),
+                provenance.cell_key(
+                    scene, kind, {**variant.settings, **depends}, variant.search_path
+                ),
                 own.given.uncertainty,
                 ensemble,
                 numbers,
@@ -181,11 +181,11 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> Any:
         """The kept record of a batch, or of a cell whose history is whole; else None."""
-        whole = task.ensemble is None
-        found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
+        found = store.get_record(COMPARISONS, task.name) if task.ensemble else store.get(task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            self.ended[task] = self._adapter.validate_python(found)
+            kind = BatchRecord if task.ensemble else CellRecord
+            self.ended[task] = kind.model_validate(found)
             self.read_back.add(task)
         return self.ended.get(task)
 
@@ -194,7 +194,8 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        self.ended[task] = self._adapter.validate_python(record.record)
+        kind = BatchRecord if task.ensemble else CellRecord
+        self.ended[task] = kind.model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -392,8 +393,9 @@ class SuiteStudy(Study):
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
-        cost = CostRecord(**{name: sum(getattr(one, name) for one in costs) for name in ADDED})
-        about = self._about(batches, reason) | {"cost": cost}
+        about = self._about(batches, reason) | {
+            "cost": CostRecord(**{key: sum(getattr(one, key) for one in costs) for key in ADDED})
+        }
         if about["status"] != "done":
             return Cell(**about)
         own = self.own[name]

@@ -371,9 +371,8 @@ def scene_suite(
         tolerances={},
     )
     suite = _suite(given, path, source in known, allow_code)
-    here = (str(Path.cwd()),)
     variants = {
-        name: replace(one, search_path=here) if one.search_path else one
+        name: replace(one, search_path=(str(Path.cwd()),)) if one.search_path else one
         for name, one in suite.models.items()
     }
     return replace(suite, models=variants, judged=False)

@@ -99,8 +99,16 @@ def verdict_table(run: Run) -> Table:
         for scene, of_scene in groupby(cells, key=lambda cell: cell.scene)
         for n, cell in enumerate(of_scene)
     ]
-    heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used", kind="used")]
-    return Table("verdicts", [*heads, text("verdict")], rows, most=len(rows))
+    return Table(
+        "verdicts",
+        [
+            *map(text, ("scene", "model", "nearest to its limit")),
+            Column("used", kind="used"),
+            text("verdict"),
+        ],
+        rows,
+        most=len(rows),
+    )
 
 
 def _verdict_row(cell: Cell) -> list[Any]:
@@ -150,14 +158,15 @@ def outcome_tables(run: Run) -> Iterator[Table]:
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
     """The result of a cell in plain values; `peak_rotation_alpha` is None for a block that fell."""
-    fell = cell.outcome.startswith("overturned")
     return {
         "scene": cell.scene,
         "model": cell.model,
         "status": cell.status,
         "outcome": cell.outcome or None,
         "overturned_at_s": cell.overturned_at,
-        "peak_rotation_alpha": None if fell else value_of(cell.figures, "peak_rotation"),
+        "peak_rotation_alpha": None
+        if cell.outcome.startswith("overturned")
+        else value_of(cell.figures, "peak_rotation"),
         "apart_alpha": value_of(cell.figures, "theta_rms", reference, HORIZON),
         "wall_seconds": cell.cost.wall_seconds,
     }
@@ -282,13 +291,19 @@ def files_of(run: Run) -> Iterator[Table]:
     def row(cell: Cell, figure: Figure) -> list[Any]:
         return [cell.scene, cell.model, *(getattr(figure, name) for name in place[2:])]
 
-    checks = [
-        [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
-        for cell, check in run.checks()
-    ]
-    yield Table("checks", list(map(Column, (*place, "kind", *tolerance))), checks)
-    figures = [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures]
-    yield Table("figures", list(map(Column, (*place, "note"))), figures)
+    yield Table(
+        "checks",
+        list(map(Column, (*place, "kind", *tolerance))),
+        [
+            [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
+            for cell, check in run.checks()
+        ],
+    )
+    yield Table(
+        "figures",
+        list(map(Column, (*place, "note"))),
+        [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures],
+    )
 
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
@@ -326,7 +341,7 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     ran.time = 0.0 if cell.read_back else cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
-        unsure = None if cell.numerical.converged else Skipped
+        unsure = None if cell.converged else Skipped
         yield _case(place, "converged", unsure, "; ".join(cell.numerical.reasons))
     for check in cell.checks:
         failure = Failure if check.fails(strict) else None

@@ -85,8 +85,8 @@ def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
         history = decided(scene, player)
     except ModelFailure:
         return SAFE, 0.0, True
-    side = {"overturned left": LEFT, "overturned right": RIGHT}.get(history.outcome, SAFE)
-    return side, history.peak_rotation, False
+    sides = {"overturned left": LEFT, "overturned right": RIGHT}
+    return sides.get(history.outcome, SAFE), history.peak_rotation, False
 
 
 def decided(scene: Scene, player: Any) -> History:
