@@ -250,20 +250,19 @@ def side_decides(paper: Paper) -> Measured:
 def one_impact(paper: Paper) -> Measured:
     """Share of the nodes overturning with one impact without the wall that the wall makes safe."""
     rows, shares, f = [], [], paper.frequencies
-    for mu, tongue in sorted(paper.tongues.items()):
-        safe = paper.safe[0, AXES["friction"].index(mu), 0, 0]
-        for low, high in (ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)):
-            there = tongue & ((f >= low) & (f <= high))
-            part = float(np.mean(safe[there])) if there.any() else 0.0
-            where = f"ω_p/p {low:g} to {high:g}"
-            rows.append(
-                Row(
-                    f"μ {mu:g}, {where}",
-                    f"{there.sum()} nodes without the wall, of which it makes {share(part)} safe",
-                    part > 0.5 if low == ONE_IMPACT[0] else None,
-                )
+    ranges = ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)
+    for (mu, tongue), (low, high) in product(sorted(paper.tongues.items()), ranges):
+        nodes = tongue & ((f >= low) & (f <= high))
+        safe = paper.safe[0, AXES["friction"].index(mu), 0, 0][nodes]
+        part, where = float(np.mean(safe)) if safe.size else 0.0, f"ω_p/p {low:g} to {high:g}"
+        rows.append(
+            Row(
+                f"μ {mu:g}, {where}",
+                f"{safe.size} nodes without the wall, of which it makes {share(part)} safe",
+                part > 0.5 if low == ONE_IMPACT[0] else None,
             )
-            shares.append(f"{share(part)} at μ = {mu:g} and {where}")
+        )
+        shares.append(f"{share(part)} at μ = {mu:g} and {where}")
     return rows, {"shares": ", ".join(shares)}
 
 
@@ -307,21 +306,20 @@ def least_amplitude(paper: Paper) -> Measured:
 
 def restitution_rules(paper: Paper) -> Measured:
     """Largest share of nodes that differ between two gaps, against that between e, at mu = 0.6."""
-    rows, most = [], []
-    for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
-        by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
-        by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
-        rows.append(
-            Row(
-                f"{side} wall, μ 0.6",
-                f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-                f" at up to {share(by_e)} between e",
-                bool(by_gap < by_e),
-            )
+    safe = paper.safe[:, 1]
+    by_gap, by_e = (
+        [np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(one, 2)]) for one in some]
+        for some in (safe, safe.swapaxes(1, 2))
+    )
+    return [
+        Row(
+            f"{side} wall, μ 0.6",
+            f"the safe region differs at up to {share(gaps)} of the nodes between gaps,"
+            f" at up to {share(e)} between e",
+            bool(gaps < e),
         )
-        most.append((by_gap, by_e))
-    gaps, e = map(share, np.max(most, axis=0))
-    return rows, {"gaps": gaps, "e": e}
+        for side, gaps, e in zip(AXES["side"], by_gap, by_e, strict=True)
+    ], {"gaps": share(max(by_gap)), "e": share(max(by_e))}
 
 
 def likelier_side(paper: Paper) -> Measured:
