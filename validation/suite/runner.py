@@ -209,7 +209,7 @@ class SuiteStudy(Study):
         cells, found = self.planned[scene], dict[str, Cell]()
         if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
-        reference = self.own[scene].reference
+        reference = self.own[scene].given.reference
         for label in sorted(cells, key=lambda label: label != reference):
             found[label] = self._cell(cells[label], found.get(reference))
         self.compared[scene] = [found[label] for label in cells]
@@ -236,8 +236,8 @@ class SuiteStudy(Study):
             suite=suite.name,
             description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
-            reference=suite.reference,
-            model_form=suite.model_form,
+            reference=suite.given.reference,
+            model_form=suite.given.model_form,
             scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
             models=tuple(suite.models),
             cells=tuple(cells),
@@ -302,7 +302,7 @@ class SuiteStudy(Study):
         floor = partial(floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
-        same_equations = Place(scene.name, planned.model, own.reference, "theta_rms")
+        same_equations = Place(scene.name, planned.model, own.given.reference, "theta_rms")
         if moved and reference and own.kind(same_equations) == "numerical":
             checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
         return Cell(
@@ -351,7 +351,7 @@ class SuiteStudy(Study):
             one.model: self.ended[self.planned[scene][one.model][0]].uncertainty for one in done
         }
         for cell in self.compared[scene]:
-            against = {own.reference, own.model_form} - {cell.model}
+            against = {own.given.reference, own.given.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
             found = explanations(own.scenes[scene], cell, references, scatters, inputs)
             yield cell.model_copy(update={"explanations": tuple(found)})

@@ -160,8 +160,6 @@ class Suite:
     path: Path
     #: The keys of its file, such as the limits, and what it requires.
     given: SuiteFile = field(repr=False)
-    reference: str
-    model_form: str
     scenes: Mapping[str, Scene]
     models: Mapping[str, Work]
     tolerances: Tolerances = field(repr=False)
@@ -227,25 +225,25 @@ class Suite:
 
         `place` is a scene or an ensemble of this very suite, not of one that it joins.
         """
-        require = self.given.require
+        given, require = self.given, self.given.require
         if place in self.ensembles:
             require = Require(difference=require.ensemble)
         places = [
             Place(place, model, against, text)
             for against, texts in (
                 (OWN_FIGURES, require.figures),
-                (self.reference, require.difference),
-                (self.model_form, require.model_form),
+                (given.reference, require.difference),
+                (given.model_form, require.model_form),
             )
-            if against == OWN_FIGURES or (against and model not in (self.reference, against))
+            if against == OWN_FIGURES or (against and model not in (given.reference, against))
             for text in texts
         ]
         return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
 
     def yardsticks(self, checks: Iterable[Place]) -> list[str]:
         """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
-        named = (place.against for place in checks)
-        return list(dict.fromkeys((OWN_FIGURES, self.reference, self.model_form, *named)))
+        usual = OWN_FIGURES, self.given.reference, self.given.model_form
+        return list(dict.fromkeys((*usual, *(place.against for place in checks))))
 
     def kind(self, place: Place) -> Kind:
         """The kind of a check.
@@ -332,8 +330,6 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         name=path.stem,
         path=path,
         given=given,
-        reference=given.reference,
-        model_form=given.model_form,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
@@ -434,7 +430,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
     if twice := [name for name, count in names.items() if count > 1]:
         raise InputError(f"scene {twice[0]!r} is in two of the suites", "include")
-    if others := [suite.name for suite in included if suite.reference != first.reference]:
+    if others := [one.name for one in included if one.given.reference != first.given.reference]:
         raise InputError(f"{others[0]} and {first.name} have different references", "include")
     whole: dict[str, Any] = {
         what: {key: one for suite in included for key, one in getattr(suite, what).items()}
@@ -443,9 +439,12 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     return Suite(
         name=path.stem,
         path=path,
-        given=given,
-        reference=first.reference,
-        model_form=next((suite.model_form for suite in included if suite.model_form), ""),
+        given=given.model_copy(
+            update={
+                "reference": first.given.reference,
+                "model_form": next(filter(None, (s.given.model_form for s in included)), ""),
+            }
+        ),
         tolerances_path=path,
         left_out=tuple(name for suite in included for name in suite.left_out),
         included=tuple(included),
