@@ -122,8 +122,9 @@ def _iso_18571(pair: Pair) -> float:
     reference, candidate = (
         np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
     )
-    rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
-    return float(rating.overall_rating(ndigits=-1))
+    return float(
+        ISO18571(reference, candidate, dt=float(grid[1] - grid[0])).overall_rating(ndigits=-1)
+    )
 
 
 DIFFERENCES = by_name(

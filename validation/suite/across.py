@@ -304,12 +304,17 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
         for one in reversed(moments)
     ]
-    about = [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")]
     blocks: list[Block] = [
         Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
         Table("figures", columns, rows, "What varied", on="page"),
-        Table("runs", about, made, "Runs", on="page"),
+        Table(
+            "runs",
+            [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")],
+            made,
+            "Runs",
+            on="page",
+        ),
     ]
     return Finding(
         "trend",
@@ -323,8 +328,10 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
 def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment]) -> Panel:
     bad = [n for n, moment in enumerate(moments, 1) if name in moment.not_passed]
     marked = Series("not passed", bad, [values[n - 1] for n in bad], style="points")
-    whole = Series("", list(range(1, len(moments) + 1)), values)
-    return Panel(name.replace(": ", "\n", 1), [whole, marked])
+    return Panel(
+        name.replace(": ", "\n", 1),
+        [Series("", list(range(1, len(moments) + 1)), values), marked],
+    )
 
 
 #: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a

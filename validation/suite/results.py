@@ -190,11 +190,9 @@ class Cell(Stored):
     @property
     def words(self) -> str:
         """The verdict for people; "no tolerance yet" if only that keeps the cell from passing."""
-        waits = self.status == "done" and any(
-            check.words == "no tolerance yet" for check in self.checks
-        )
-        failed = any(check.words == "fail" for check in self.checks)
-        return "no tolerance yet" if waits and not failed else self.verdict
+        found = {check.words for check in self.checks if self.status == "done"}
+        waits = "no tolerance yet" in found and "fail" not in found
+        return "no tolerance yet" if waits else self.verdict
 
 
 class EnsembleRecord(Stored):
@@ -357,11 +355,14 @@ class Run(Stored):
             run = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
-        places = {*run.scenes, *(one.name for one in run.ensembles)}
         for key, names, allowed in (
             ("reference", {run.reference}, {*run.models}),
             ("cells.model", {cell.model for cell in run.cells}, {*run.models}),
-            ("cells.scene", {cell.scene for cell in run.cells}, places),
+            (
+                "cells.scene",
+                {cell.scene for cell in run.cells},
+                {*run.scenes, *(one.name for one in run.ensembles)},
+            ),
         ):
             if unknown := sorted(names - allowed):
                 raise InputError(

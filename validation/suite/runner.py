@@ -151,10 +151,9 @@ class SuiteStudy(Study):
             how = ensemble.model_dump(mode="json", exclude={"count", "batch", "description"})
             code = provenance.code_digest("rockcheck.validation.suite.motions")
             every = range(ensemble.count)
-            batches = [every[n : n + ensemble.batch] for n in every[:: ensemble.batch]]
             parts = [
                 (n, {"drawn": {"ensemble": how, "code": code, "numbers": [n.start, n.stop]}})
-                for n in batches
+                for n in (every[k : k + ensemble.batch] for k in every[:: ensemble.batch])
             ]
         for numbers, depends in parts:
             yield Planned(

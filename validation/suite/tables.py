@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Container, Iterator
-from itertools import groupby
 from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
@@ -92,12 +91,11 @@ def verdict_table(run: Run) -> Table:
 
     Of a large run, the scenes that are `shown`.
     """
-    places = set(shown(run))
-    cells = [cell for cell in run.cells if cell.scene in places]
+    cells = run.by_scene()
     rows = [
         ["" if n else scene, *_verdict_row(cell)]
-        for scene, of_scene in groupby(cells, key=lambda cell: cell.scene)
-        for n, cell in enumerate(of_scene)
+        for scene in shown(run)
+        for n, cell in enumerate(cells[scene].values())
     ]
     return Table(
         "verdicts",
@@ -341,8 +339,12 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     ran.time = 0.0 if cell.read_back else cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
-        unsure = None if cell.converged else Skipped
-        yield _case(place, "converged", unsure, "; ".join(cell.numerical.reasons))
+        yield _case(
+            place,
+            "converged",
+            None if cell.converged else Skipped,
+            "; ".join(cell.numerical.reasons),
+        )
     for check in cell.checks:
         failure = Failure if check.fails(strict) else None
         result = Skipped if check.verdict == "not defined" else failure

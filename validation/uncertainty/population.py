@@ -316,8 +316,9 @@ def propagate(
         )
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
-    sobol = qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed))
-    values = given.values(sobol.random(count))
+    values = given.values(
+        qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count)
+    )
     played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
     own = play_ensemble([given.scene], model)
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
