@@ -348,19 +348,19 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
         # by model, scene and number in its ensemble
-        ends = {
-            (cell.model, cell.scene, 0): (cell.outcome, value_of(cell.figures, "peak_rotation"))
+        ends = [
+            ((cell.model, cell.scene, 0), cell.outcome, value_of(cell.figures, "peak_rotation"))
             for cell in run.cells
             if cell.status == "done"
-        } | {
-            (model, drawn.name, n): (outcome, peak)
+        ] + [
+            ((model, drawn.name, n), drawn.outcomes[model][n], peak)
             for drawn in run.ensembles
             for model, peaks in drawn.peaks.items()
-            for n, (outcome, peak) in enumerate(zip(drawn.outcomes[model], peaks, strict=True))
-        }
+            for n, peak in enumerate(peaks)
+        ]
         stands = {
             key: peak
-            for key, (outcome, peak) in ends.items()
+            for key, outcome, peak in ends
             if peak is not None and peak > LEAST and not outcome.startswith("overturned")
         }
         for (model, scene, n), peak in stands.items():
