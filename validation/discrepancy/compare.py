@@ -99,11 +99,17 @@ def compare(
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
     if len(pair.time) == 0:
         raise InputError(f"{reference.model} and {candidate.model} have no time in common")
-    angle = "rad" if pair.alpha is None else "alpha"
     return Discrepancy(
         reference.model,
         candidate.model,
-        _figures(DIFFERENCES, measures, pair, angle, until, reference.model),
+        _figures(
+            DIFFERENCES,
+            measures,
+            pair,
+            "rad" if pair.alpha is None else "alpha",
+            until,
+            reference.model,
+        ),
         pair.start,
         pair.end,
         *_gap(pair, until),

@@ -239,23 +239,18 @@ class Pair:
         self.known = WindowedHistory(known, scene)
         self.alpha = scene.block.alpha if scene else known.alpha
 
-    def channels(self, name: str) -> tuple[Array, Array]:
-        """One column of both on `time`: reference, candidate."""
+    def channels(self, name: str) -> Array:
+        """One column of both on `time`: reference and candidate, a row each."""
         both = (WindowedHistory(one) for one in (self.reference, self.candidate))
-        reference, candidate = (
-            np.interp(self.time, one.channel("t"), one.channel(name)) for one in both
-        )
-        return reference, candidate
+        return np.array([np.interp(self.time, one.channel("t"), one.channel(name)) for one in both])
 
     @cached_property
-    def theta(self) -> tuple[Array, Array]:
+    def theta(self) -> Array:
         """Theta of both, in alpha (in rad where the block is unknown)."""
-        scale = self.alpha or 1.0
-        reference, candidate = self.channels("theta")
-        return reference / scale, candidate / scale
+        return self.channels("theta") / (self.alpha or 1.0)
 
     @property
-    def rocking(self) -> tuple[Array, Array]:
+    def rocking(self) -> Array:
         """`theta`; raises `Undefined` where the reference's peak is too small to divide by."""
         floor = Measure.resolution
         if self.alpha is not None and len(self.time) > 1:
@@ -271,14 +266,10 @@ class Pair:
         return self.theta
 
     @cached_property
-    def energies(self) -> tuple[Array, Array]:
+    def energies(self) -> Array:
         """Energy per unit mass of both, J/kg."""
-        columns = [self.channels(name) for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")]
-        block, gravity = self.known.block, self.known.gravity
-        first, second = (
-            np.asarray(kinematics.energy(block, gravity, *(c[k] for c in columns))) for k in (0, 1)
-        )
-        return first, second
+        columns = map(self.channels, ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+        return np.asarray(kinematics.energy(self.known.block, self.known.gravity, *columns))
 
     def mean(self, values: Array) -> float:
         """Mean over time, by the trapezoidal rule."""
@@ -287,7 +278,7 @@ class Pair:
         steps = np.diff(self.time)
         return float(np.sum(steps * 0.5 * (values[1:] + values[:-1])) / np.sum(steps))
 
-    def rms(self, columns: tuple[Array, Array]) -> float:
+    def rms(self, columns: Array) -> float:
         """RMS difference over time, sqrt(mean (candidate - reference)^2)."""
         return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
 
@@ -357,8 +348,9 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
         for events, matched in ((reference, partners), (candidate, taken))
     )
-    pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
-    return MatchedImpacts(pairs, *alone)
+    return MatchedImpacts(
+        [(reference[i], candidate[j]) for i, j in sorted(partners.items())], *alone
+    )
 
 
 def _strong(impacts: Sequence[Event]) -> list[bool]:

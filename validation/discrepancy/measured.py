@@ -142,8 +142,10 @@ def _meaning(column: str, shown: str) -> tuple[str, float]:
     if plain in MEANINGS:
         return MEANINGS[plain]
     if name := max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default=""):
-        said = f"{shown}: column {printable(column)!r}: give a unit of {name}:"
-        raise InputError(f"{said} {', '.join(UNITS[name])}")
+        raise InputError(
+            f"{shown}: column {printable(column)!r}: give a unit of {name}:"
+            f" {', '.join(UNITS[name])}"
+        )
     return column, 1.0
 
 

@@ -35,7 +35,7 @@ ISO_MOST_SAMPLES = 4000
 # Differences
 
 
-def _peak(columns: tuple[Array, Array]) -> float:
+def _peak(columns: Array) -> float:
     return float(np.max(np.abs(columns[1] - columns[0])))
 
 
@@ -93,8 +93,10 @@ def _impact_time(pair: Pair) -> tuple[float, str]:
 
 
 def _overturning_time(pair: Pair) -> float:
-    falls = (one.overturned_at for one in (pair.reference, pair.candidate))
-    first, second = (math.inf if at is None else at for at in falls)
+    first, second = (
+        math.inf if one.overturned_at is None else one.overturned_at
+        for one in (pair.reference, pair.candidate)
+    )
     return 0.0 if first == second else abs(second - first)
 
 
@@ -120,8 +122,9 @@ def _iso_18571(pair: Pair) -> float:
     reference, candidate = (
         np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
     )
-    rating = ISO18571(reference, candidate, dt=float(grid[1] - grid[0]))
-    return float(rating.overall_rating(ndigits=-1))
+    return float(
+        ISO18571(reference, candidate, dt=float(grid[1] - grid[0])).overall_rating(ndigits=-1)
+    )
 
 
 DIFFERENCES = by_name(
@@ -603,8 +606,10 @@ class Samples:
 
 def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
     """The peaks of both (alpha), limited to `fallen`, which is also the value of fallen blocks."""
-    both = samples.reference, samples.candidate
-    r, c = (np.where(one.fallen, fallen, np.minimum(one.peaks, fallen)) for one in both)
+    r, c = (
+        np.where(one.fallen, fallen, np.minimum(one.peaks, fallen))
+        for one in (samples.reference, samples.candidate)
+    )
     if np.any(np.isnan(r)) or np.any(np.isnan(c)):
         raise Unavailable("a model failed in some of the scenes")
     return r, c
@@ -613,8 +618,9 @@ def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
 def _ks_distance(samples: Samples) -> tuple[float, str]:
     from scipy.stats import ks_2samp
 
-    both = _distributions(samples, math.inf)
-    r, c = (np.where(peaks < SMALLEST_PEAK, 0.0, peaks) for peaks in both)
+    r, c = (
+        np.where(peaks < SMALLEST_PEAK, 0.0, peaks) for peaks in _distributions(samples, math.inf)
+    )
     # The test takes no infinities, but only order counts.
     ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[1]
     found = ks_2samp(ranks[: len(r)], ranks[len(r) :])

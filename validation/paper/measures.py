@@ -73,6 +73,8 @@ Measured = tuple[list[Row], dict[str, Any]]
 class Paper:
     """The 28 spectra on one grid: outcomes and safe nodes by place, and by friction without a wall.
 
+    `spectra` come in the order of `paper_panels`.
+
     `falls` are the nodes that overturn: one whose run failed is neither safe nor overturned.
     `least`: the lowest overturning amplitude of `SCANNED` by (gap, e) of a right wall, None without
     one; infinite where none overturns. `tongues`: by friction, the nodes of `near_one_impact` at
@@ -87,20 +89,13 @@ class Paper:
     ) -> None:
         self.frequencies, self.amplitudes = spectra[0].frequency_ratios, spectra[0].amplitude_ratios
         self.least, self.tongues = least or {}, tongues or {}
-        nodes = spectra[0].outcomes.shape
-        self.outcomes, self.alone = (
-            np.zeros((*SIZES, *nodes), np.int8),
-            np.zeros((2, *nodes), np.int8),
+        # by side, friction and wall, of which the first is none
+        grids = (np.array([getattr(one, what) for one in spectra]) for what in ("outcomes", "safe"))
+        outcomes, safe = (grid.reshape(*SIZES[:2], -1, *grid.shape[1:]) for grid in grids)
+        self.alone, self.safe_alone = outcomes[-1, :, 0], safe[-1, :, 0]
+        self.outcomes, self.safe = (
+            grid[:, :, 1:].reshape(*SIZES, *grid.shape[3:]) for grid in (outcomes, safe)
         )
-        self.safe, self.safe_alone = self.outcomes != 0, self.alone != 0
-        for one in spectra:
-            mu = AXES["friction"].index(one.scene.floor.friction)
-            if not one.scene.walls:
-                self.alone[mu], self.safe_alone[mu] = one.outcomes, one.safe
-            for wall in one.scene.walls:
-                side, e = AXES["side"].index(wall.side), RESTITUTIONS.index(wall.restitution)
-                place = side, mu, GAPS.index(wall.gap), e
-                self.outcomes[place], self.safe[place] = one.outcomes, one.safe
         self.falls, self.falls_alone = self.outcomes != SAFE, self.alone != SAFE
 
 
@@ -255,20 +250,19 @@ def side_decides(paper: Paper) -> Measured:
 def one_impact(paper: Paper) -> Measured:
     """Share of the nodes overturning with one impact without the wall that the wall makes safe."""
     rows, shares, f = [], [], paper.frequencies
-    for mu, tongue in sorted(paper.tongues.items()):
-        safe = paper.safe[0, AXES["friction"].index(mu), 0, 0]
-        for low, high in (ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)):
-            there = tongue & ((f >= low) & (f <= high))
-            part = float(np.mean(safe[there])) if there.any() else 0.0
-            where = f"ω_p/p {low:g} to {high:g}"
-            rows.append(
-                Row(
-                    f"μ {mu:g}, {where}",
-                    f"{there.sum()} nodes without the wall, of which it makes {share(part)} safe",
-                    part > 0.5 if low == ONE_IMPACT[0] else None,
-                )
+    ranges = ONE_IMPACT, (ONE_IMPACT[1], ONE_IMPACT[1] + 1.0)
+    for (mu, tongue), (low, high) in product(sorted(paper.tongues.items()), ranges):
+        nodes = tongue & ((f >= low) & (f <= high))
+        safe = paper.safe[0, AXES["friction"].index(mu), 0, 0][nodes]
+        part, where = float(np.mean(safe)) if safe.size else 0.0, f"ω_p/p {low:g} to {high:g}"
+        rows.append(
+            Row(
+                f"μ {mu:g}, {where}",
+                f"{safe.size} nodes without the wall, of which it makes {share(part)} safe",
+                part > 0.5 if low == ONE_IMPACT[0] else None,
             )
-            shares.append(f"{share(part)} at μ = {mu:g} and {where}")
+        )
+        shares.append(f"{share(part)} at μ = {mu:g} and {where}")
     return rows, {"shares": ", ".join(shares)}
 
 
@@ -312,21 +306,20 @@ def least_amplitude(paper: Paper) -> Measured:
 
 def restitution_rules(paper: Paper) -> Measured:
     """Largest share of nodes that differ between two gaps, against that between e, at mu = 0.6."""
-    rows, most = [], []
-    for side, safe in zip(AXES["side"], paper.safe[:, 1], strict=True):
-        by_gap = np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(safe, 2)])
-        by_e = np.max(np.mean(safe[:, 0] != safe[:, 1], axis=(-2, -1)))
-        rows.append(
-            Row(
-                f"{side} wall, μ 0.6",
-                f"the safe region differs at up to {share(by_gap)} of the nodes between gaps,"
-                f" at up to {share(by_e)} between e",
-                bool(by_gap < by_e),
-            )
+    safe = paper.safe[:, 1]
+    by_gap, by_e = (
+        [np.max([np.mean(a != b, axis=(-2, -1)) for a, b in combinations(one, 2)]) for one in some]
+        for some in (safe, safe.swapaxes(1, 2))
+    )
+    return [
+        Row(
+            f"{side} wall, μ 0.6",
+            f"the safe region differs at up to {share(gaps)} of the nodes between gaps,"
+            f" at up to {share(e)} between e",
+            bool(gaps < e),
         )
-        most.append((by_gap, by_e))
-    gaps, e = map(share, np.max(most, axis=0))
-    return rows, {"gaps": gaps, "e": e}
+        for side, gaps, e in zip(AXES["side"], by_gap, by_e, strict=True)
+    ], {"gaps": share(max(by_gap)), "e": share(max(by_e))}
 
 
 def likelier_side(paper: Paper) -> Measured:
@@ -426,8 +419,8 @@ class Beyond:
 
 
 def _figure(side: int, mu: int) -> int:
-    shown = AXES["side"][side], AXES["friction"][mu]
-    return next(number for number, what in FIGURES.items() if what == shown)
+    figures = {shown: figure for figure, shown in FIGURES.items()}
+    return figures[AXES["side"][side], AXES["friction"][mu]]
 
 
 def _case(place: Place) -> str:

@@ -6,6 +6,7 @@ The file keeps its comments and order.
 import math
 import re
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from typing import Any
 
 import tomlkit
@@ -37,51 +38,50 @@ def accept(
     now, is always refused; a figure that is not defined needs no line. Without `write` the file
     stays as it is.
     """
-    changes: list[str] = []
-    refused: list[str] = []
-    for part in suite.parts:
-        checks = [
-            (cell, check)
-            for cell, check in run.checks()
-            if (cell.scene in part.scenes or cell.scene in part.ensembles)
-            and check.verdict != "not defined"
-        ]
-        _accept(part, checks, reason, changes, refused, write)
+    checks = [pair for pair in run.checks() if pair[1].verdict != "not defined"]
+    found = [
+        _accepted_in(
+            part,
+            [(c, one) for c, one in checks if c.scene in part.scenes or c.scene in part.ensembles],
+            reason,
+            write,
+        )
+        for part in suite.parts
+    ]
+    changes, refused = (list(chain.from_iterable(lines)) for lines in zip(*found, strict=True))
     return changes, refused
 
 
-def _accept(
-    suite: Suite,
-    checks: Iterable[tuple[Cell, Check]],
-    reason: str | None,
-    changes: list[str],
-    refused: list[str],
-    write: bool,
-) -> None:
-    path = suite.tolerances_path
+def _accepted_in(
+    suite: Suite, checks: Iterable[tuple[Cell, Check]], reason: str | None, write: bool
+) -> tuple[list[str], list[str]]:
+    path, changes, refused = suite.tolerances_path, list[str](), list[str]()
     document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = (
         document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     )
-    before = len(changes)
     for cell, check in checks:
-        against, key = check.figure.against or OWN_FIGURES, check.figure.windowed
-        where = f"[{cell.scene}.{cell.model}.{against}] {key}"
-        line = _accepted(check, reason)
+        against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
+        where = f"[{cell.scene}.{cell.model}.{against}] {check.figure.windowed}"
         old = {name: getattr(check, name) for name in Tolerance.model_fields}
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
         elif line != old:
-            table = _table(tables, (cell.scene, cell.model, against))
             changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
             entry = tomlkit.inline_table()
             entry.update(line)
-            table[key] = entry
-    if write and len(changes) > before:
+            table = (
+                tables.setdefault(cell.scene, tomlkit.table(is_super_table=True))
+                .setdefault(cell.model, tomlkit.table(is_super_table=True))
+                .setdefault(against, tomlkit.table())
+            )
+            table[check.figure.windowed] = entry
+    if write and changes:
         try:
             write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
         except OSError as error:
             raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    return changes, refused
 
 
 def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
@@ -141,12 +141,6 @@ def _named(check: Check, line: Mapping[str, Any]) -> str:
     if line["limit"] < check.limit if at_least else line["limit"] > check.limit:
         return "loosened"
     return "tightened" if check.weighs == "pass" else "moved"
-
-
-def _table(tables: Any, path: tuple[str, ...]) -> Any:
-    for depth, name in enumerate(path, 1):
-        tables = tables.setdefault(name, tomlkit.table(is_super_table=depth < len(path)))
-    return tables
 
 
 def _round(value: float, down: bool = False) -> float:

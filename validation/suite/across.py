@@ -128,12 +128,11 @@ def difference(before: Run, after: Run) -> Finding:
         *map(text, ("scene", "model", "what")),
         *(Column(name, digits=6) for name in ("before", "after")),
     ]
-    table = Table("changed", columns, rows, most=len(rows))
     return Finding(
         "changes",
         f"{after.suite}, before and after",
         f"{after.suite}: {f'{words} changed' if words else 'nothing changed'}",
-        [*([table] if rows else []), Text(items=told)],
+        [*([Table("changed", columns, rows, most=len(rows))] if rows else []), Text(items=told)],
         data={
             "suite": after.suite,
             "verdict": [before.words, after.words],
@@ -305,18 +304,23 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
         for one in reversed(moments)
     ]
-    about = [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")]
     blocks: list[Block] = [
         Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
         Table("figures", columns, rows, "What varied", on="page"),
-        Table("runs", about, made, "Runs", on="page"),
+        Table(
+            "runs",
+            [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")],
+            made,
+            "Runs",
+            on="page",
+        ),
     ]
-    counts = f"{len(found)} figures varied, {len(every) - len(found)} stayed the same"
     return Finding(
         "trend",
         f"{last.suite} over {len(moments)} runs",
-        f"{counts}. The last run: {last.verdict}.",
+        f"{len(found)} figures varied, {len(every) - len(found)} stayed the same. The last run:"
+        f" {last.verdict}.",
         blocks,
     )
 
@@ -324,8 +328,10 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
 def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment]) -> Panel:
     bad = [n for n, moment in enumerate(moments, 1) if name in moment.not_passed]
     marked = Series("not passed", bad, [values[n - 1] for n in bad], style="points")
-    whole = Series("", list(range(1, len(moments) + 1)), values)
-    return Panel(name.replace(": ", "\n", 1), [whole, marked])
+    return Panel(
+        name.replace(": ", "\n", 1),
+        [Series("", list(range(1, len(moments) + 1)), values), marked],
+    )
 
 
 #: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
@@ -341,32 +347,26 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     """
     found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
-        peaks = _peaks(run)
-        for (model, scene, n), peak in peaks.items():
-            reference = peaks.get((run.reference, scene, n))
-            if model != run.reference and reference is not None:
-                found[model].append((reference, peak))
+        # by model, scene and number in its ensemble
+        ends = [
+            ((cell.model, cell.scene, 0), cell.outcome, value_of(cell.figures, "peak_rotation"))
+            for cell in run.cells
+            if cell.status == "done"
+        ] + [
+            ((model, drawn.name, n), drawn.outcomes[model][n], peak)
+            for drawn in run.ensembles
+            for model, peaks in drawn.peaks.items()
+            for n, peak in enumerate(peaks)
+        ]
+        stands = {
+            key: peak
+            for key, outcome, peak in ends
+            if peak is not None and peak > LEAST and not outcome.startswith("overturned")
+        }
+        for (model, scene, n), peak in stands.items():
+            if model != run.reference and (run.reference, scene, n) in stands:
+                found[model].append((stands[run.reference, scene, n], peak))
     return found
-
-
-def _peaks(run: Run) -> dict[tuple[str, str, int], float]:
-    """The peak rotations that allow a ratio, by model, scene and number in its ensemble."""
-    every = [
-        (cell.model, cell.scene, 0, cell.outcome, value_of(cell.figures, "peak_rotation"))
-        for cell in run.cells
-        if cell.status == "done"
-    ]
-    every += [
-        (model, drawn.name, n, drawn.outcomes[model][n], peak)
-        for drawn in run.ensembles
-        for model, peaks in drawn.peaks.items()
-        for n, peak in enumerate(peaks)
-    ]
-    return {
-        (model, scene, n): peak
-        for model, scene, n, outcome, peak in every
-        if peak is not None and peak > LEAST and not outcome.startswith("overturned")
-    }
 
 
 def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
@@ -375,5 +375,6 @@ def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
         return None
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
-    bias = math.exp(float(np.mean(ratios)) + 0.5 * scatter**2)
-    return Trust(bias=bias, scatter=scatter, count=len(pairs))
+    return Trust(
+        bias=math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter=scatter, count=len(pairs)
+    )

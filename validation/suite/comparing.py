@@ -19,7 +19,7 @@ from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.compare import compare, describe, too_short
-from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
 from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.execute import models, provenance
@@ -27,7 +27,7 @@ from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.suite.motions import Ensemble
 from rockcheck.validation.suite.results import Cell, CostRecord, value_of
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, Windowed
+from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
 from rockcheck.validation.uncertainty.population import Inputs, propagate
 
@@ -74,13 +74,14 @@ class Planned(Task):
         """The history, or the peaks of a batch."""
         if self.ensemble is None:
             return models.play(self.variant, self.scene, uncertainty=self.uncertainty)
-        scenes = [self.ensemble.drawn(self.scene, n) for n in self.numbers]
-        return models.play_batch(self.variant, scenes)
+        return models.play_batch(
+            self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
+        )
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
 #: request.
-Asked = tuple[Planned | None, list[Windowed]]
+Asked = tuple[Planned | None, list[str]]
 
 
 class CellRecord(Stored):
@@ -103,14 +104,6 @@ class BatchRecord(Stored):
     peaks: tuple[float | None, ...]
     outcomes: tuple[str, ...]
     cost: CostRecord
-
-
-class Window(NamedTuple):
-    """A window as tolerances name it, its end (s; None: the whole time), and its measures."""
-
-    name: str
-    until: float | None
-    measures: Sequence[str]
 
 
 class Compared(NamedTuple):
@@ -185,8 +178,14 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
 
     if not may_fly(scene):
         return None
-    module = "validation.discrepancy.impact_laws"
-    return _of_scene(store, scene, "impact-laws", module, Landing | None, landing)
+    return _of_scene(
+        store,
+        scene,
+        "impact-laws",
+        "validation.discrepancy.impact_laws",
+        Landing | None,
+        landing,
+    )
 
 
 def under_other_laws(scene: Scene, variant: models.Work) -> dict[str, History]:
@@ -210,38 +209,38 @@ def by_any(
     reference: History | None,
     others: Mapping[str, History],
     scene: Scene,
-    window: Window,
-) -> list[Compared]:
+    measures: Sequence[str],
+    window: str = "",
+    until: float | None = None,
+) -> Iterator[Compared]:
     """A history's figures against `reference`, those of BY_ANY against it under the nearest law.
 
     `others` are the reference's histories under other laws. The note of a figure names the law if
-    it is another one. Without a reference, the history's own figures.
+    it is another one. Without a reference, the history's own figures. Of a window, as tolerances
+    name it, that ends at `until` (s; None: the whole time).
     """
-    name, until, measures = window
     if reference is None:
-        own = describe(candidate, until=until, scene=scene, measures=measures)
-        figures = {one.measure: Compared(one, too_short(candidate, until)) for one in own}
-    else:
-        found = compare(reference, candidate, until=until, scene=scene, measures=measures)
-        figures = {one.measure: Compared(one, found.gap, found.fall) for one in found.figures}
+        gap = too_short(candidate, until)
+        for one in describe(candidate, until=until, scene=scene, measures=measures):
+            yield Compared(one.model_copy(update={"window": window}), gap)
+        return
     wanted = [measure for measure in measures if measure in BY_ANY]
-    for law, history in others.items():
-        other = compare(history, candidate, until=until, scene=scene, measures=wanted)
-        for rival in other.figures:
-            first = figures[rival.measure].figure
-            if _away(rival) < _away(first):
-                note = "; ".join(filter(None, (rival.note, f'impacts = "{law}"')))
-                nearer = rival.model_copy(update={"against": first.against, "note": note})
-                figures[rival.measure] = Compared(nearer, other.gap, other.fall)
-    return [
-        one._replace(figure=one.figure.model_copy(update={"window": name}))
-        for one in figures.values()
-    ]
+    found = {"": compare(reference, candidate, until=until, scene=scene, measures=measures)} | {
+        f'impacts = "{law}"': compare(history, candidate, until=until, scene=scene, measures=wanted)
+        for law, history in others.items()
+    }
+    for first in found[""].figures:
+        rivals = {law: one for law, one in found.items() if not law or first.measure in BY_ANY}
+        law = min(rivals, key=lambda law: _away(rivals[law].figure(first.measure)))
+        nearest = found[law].figure(first.measure)
+        note = "; ".join(filter(None, (nearest.note, law)))
+        change = {"against": first.against, "note": note, "window": window}
+        yield Compared(nearest.model_copy(update=change), found[law].gap, found[law].fall)
 
 
 def _away(figure: Figure) -> float:
     ideal = DIFFERENCES[figure.measure].ideal
-    return float("inf") if figure.value is None or ideal is None else abs(figure.value - ideal)
+    return math.inf if figure.value is None or ideal is None else abs(figure.value - ideal)
 
 
 def compared(
@@ -252,12 +251,12 @@ def compared(
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
     horizon = None  # s; up to it, histories can be compared point by point
-    if any(what.window == HORIZON for _, extra in asked.values() for what in extra):
+    if any(what.endswith(f"@{HORIZON}") for _, extra in asked.values() for what in extra):
         horizon = _of_scene(
             store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
         )
     against = [
-        [name, reference.key if reference else "", list(map(str, extra))]
+        [name, reference.key if reference else "", extra]
         for name, (reference, extra) in asked.items()
     ]
     # with the code of this module and of `compare`
@@ -281,9 +280,10 @@ def _compute(
     for reference, extra in asked.values():
         yardstick = store.load(reference.name) if reference else None
         others = under_other_laws(scene, reference.variant) if reference and landing else {}
-        for window in _windows(reference, extra, horizon):
-            rivals = others if window.until is None or window.until > parted else {}
-            figures += by_any(candidate, yardstick, rivals, scene, window)
+        known = DIFFERENCES if reference else FIGURES
+        for window, until, measures in _windows(known, extra, horizon):
+            rivals = others if until is None or until > parted else {}
+            figures += by_any(candidate, yardstick, rivals, scene, measures, window, until)
     return ComparisonRecord(
         figures=tuple(figures),
         impact_law=landing.followed_by(candidate, scene) if landing else None,
@@ -292,18 +292,16 @@ def _compute(
 
 
 def _windows(
-    reference: Planned | None, extra: Iterable[Windowed], horizon: float | None
-) -> list[Window]:
+    known: Mapping[str, Measure], extra: Iterable[str], horizon: float | None
+) -> Iterator[tuple[str, float | None, list[str]]]:
     """The whole time with all measures but those on request, and the windows of `extra`."""
-    known = DIFFERENCES if reference else FIGURES
-    found = {"": [measure.name for measure in known.values() if not measure.on_request]}
+    found = {"": [name for name, measure in known.items() if not measure.on_request]}
     for what in extra:
-        found.setdefault(what.window, []).append(what.measure)
+        name, _, window = what.partition("@")
+        found.setdefault(window, []).append(name)
     ends = {"": None, HORIZON: horizon}
-    return [
-        Window(name, ends[name] if name in ends else float(name[:-1]), measures)
-        for name, measures in found.items()
-    ]
+    for window, measures in found.items():
+        yield window, ends[window] if window in ends else float(window[:-1]), measures
 
 
 #: Quantities whose differences are explained, with their units.

@@ -50,7 +50,7 @@ from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
 from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive
 from rockcheck.scenes.errors import unknown_name
 from rockcheck.scenes.files import UncertainScene, uncertain_scene
-from rockcheck.scenes.recordings import Reading, Recording
+from rockcheck.scenes.recordings import Reading
 from rockcheck.scenes.recordings.recording import Word
 from rockcheck.scenes.recordings.sets import Odd, files_of, motions_of, verticals_of
 
@@ -86,15 +86,12 @@ def under_records(
     for given in sets:
         if unknown := [name for name in given.scenes if name not in scenes]:
             raise InputError(str(unknown_name("scene", unknown[0], scenes)), "records.scenes")
-        motions, upward, others = _motions(given, folder)
+        motions, others = _motions(given, folder)
         left_out += others
-        labels = _labels([motion for motion, _ in motions])
         chosen = given.scenes or tuple(scenes)
         shaken.update(chosen)
-        for name, (label, (motion, recording)) in product(
-            chosen, zip(labels, motions, strict=True)
-        ):
-            one = _shaken(scenes[name], label, (recording, upward.get(motion)), given.scale)
+        for name, (label, change) in product(chosen, motions):
+            one = _shaken(scenes[name], label, change)
             if one.scene.name in found:
                 raise InputError(
                     f"scene {one.scene.name!r} is named twice: two records have one name",
@@ -106,27 +103,34 @@ def under_records(
 
 def _motions(
     given: RecordSet, folder: Path
-) -> tuple[list[tuple[str, Recording]], Mapping[str, Recording], list[str]]:
-    """The motions of a set by name, horizontal and upward, and what is left out."""
+) -> tuple[list[tuple[str, dict[str, Record]]], list[str]]:
+    """The motions of a set by their labels, as what they replace; and what is left out."""
     files = files_of(given.files, folder)
     motions, left_out = motions_of(files, given)
-    if not given.vertical:
-        return motions, {}, left_out
-    return motions, verticals_of(files, given), [one for one in left_out if isinstance(one, Odd)]
+    upward = verticals_of(files, given) if given.vertical else {}
+    if given.vertical:
+        left_out = [one for one in left_out if isinstance(one, Odd)]
+    found = []
+    for label, (name, across) in zip(_labels([name for name, _ in motions]), motions, strict=True):
+        parts = {"excitation": (label, across)}
+        if name in upward:
+            parts["vertical"] = f"{label}, vertical", upward[name]
+        records = {
+            key: Record.from_samples(one.samples, one.time_step, given.scale).model_copy(
+                update={"source": source, "notes": one.notes}
+            )
+            for key, (source, one) in parts.items()
+        }
+        found.append((label, records))
+    return found, left_out
 
 
-def _shaken(
-    base: UncertainScene, label: str, motion: tuple[Recording, Recording | None], scale: float
-) -> UncertainScene:
+def _shaken(base: UncertainScene, label: str, change: Mapping[str, Record]) -> UncertainScene:
     """A scene under one motion, horizontal and perhaps vertical.
 
     Spreads of the excitation that it replaces are dropped.
     """
     scene = base.scene
-    horizontal, vertical = motion
-    change: dict[str, Any] = {"excitation": _record(horizontal, label, scale)}
-    if vertical is not None:
-        change["vertical"] = _record(vertical, f"{label}, vertical", scale)
     if base.spreads and not base.independent:
         raise InputError(
             "correlated numbers cannot be given together with [[records]]", "correlation"
@@ -139,11 +143,6 @@ def _shaken(
     name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
     duration = max(scene.duration, change["excitation"].quiet_after)
     return uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
-
-
-def _record(motion: Recording, label: str, scale: float) -> Record:
-    record = Record.from_samples(motion.samples, motion.time_step, scale)
-    return record.model_copy(update={"source": label, "notes": motion.notes})
 
 
 def _labels(names: Sequence[str]) -> list[str]:
@@ -185,8 +184,9 @@ class Distribution(Frozen):
 def _bounded(given: Distribution | None, *, positive: bool = False) -> Distribution | None:
     low = given.uniform[0] if given and given.uniform else math.inf
     if low < 0.0 or (positive and low == 0.0):
-        said = "more than 0" if positive else "0 or more"
-        raise InputError(f"the lower end must be {said}", "uniform")
+        raise InputError(
+            f"the lower end must be {'more than 0' if positive else '0 or more'}", "uniform"
+        )
     return given
 
 

@@ -16,7 +16,7 @@ This module does not know how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePath
@@ -51,6 +51,11 @@ Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
 #: What fails besides figures out of a limit: nothing; changed figures and a model that is not
 #: installed; "both": better figures, too.
 Strict = bool | Literal["both"]
+FAILS: Mapping[Strict, tuple[CheckVerdict, ...]] = {
+    False: ("fail",),
+    True: ("fail", "changed"),
+    "both": ("fail", "changed", "better"),
+}
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
 SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
@@ -91,8 +96,7 @@ class Check(Stored):
 
     def fails(self, strict: Strict) -> bool:
         """Whether the check is out of tolerance in a run of that strictness."""
-        fails = ("fail", "changed", "better") if strict == "both" else ("fail", "changed")
-        return self.verdict in (fails if strict else ("fail",))
+        return self.verdict in FAILS[strict]
 
     @property
     def words(self) -> str:
@@ -186,11 +190,9 @@ class Cell(Stored):
     @property
     def words(self) -> str:
         """The verdict for people; "no tolerance yet" if only that keeps the cell from passing."""
-        waits = self.status == "done" and any(
-            check.words == "no tolerance yet" for check in self.checks
-        )
-        failed = any(check.words == "fail" for check in self.checks)
-        return "no tolerance yet" if waits and not failed else self.verdict
+        found = {check.words for check in self.checks if self.status == "done"}
+        waits = "no tolerance yet" in found and "fail" not in found
+        return "no tolerance yet" if waits else self.verdict
 
 
 class EnsembleRecord(Stored):
@@ -279,11 +281,10 @@ class Run(Stored):
             return FAULT
         if self.verdict == "error":
             return 3
-        incomplete = bool(self.strict) and any(cell.status == "absent" for cell in self.cells)
         return int(
-            incomplete
-            or self.verdict == "fail"
+            self.verdict == "fail"
             or any(check.fails(self.strict) for _, check in self.checks())
+            or (bool(self.strict) and any(cell.status == "absent" for cell in self.cells))
         )
 
     @property
@@ -354,11 +355,14 @@ class Run(Stored):
             run = cls.model_validate(data)
         except ValidationError as error:
             raise InputError(f"{printable(path)}: {from_validation(error)}") from None
-        places = {*run.scenes, *(one.name for one in run.ensembles)}
         for key, names, allowed in (
             ("reference", {run.reference}, {*run.models}),
             ("cells.model", {cell.model for cell in run.cells}, {*run.models}),
-            ("cells.scene", {cell.scene for cell in run.cells}, places),
+            (
+                "cells.scene",
+                {cell.scene for cell in run.cells},
+                {*run.scenes, *(one.name for one in run.ensembles)},
+            ),
         ):
             if unknown := sorted(names - allowed):
                 raise InputError(
@@ -372,8 +376,14 @@ def value_of(
     figures: Iterable[Figure], measure: str, against: str = "", window: str = ""
 ) -> float | None:
     """The value of a measure among some figures, None without one."""
-    wanted = measure, against, window
-    return next((f.value for f in figures if (f.measure, f.against, f.window) == wanted), None)
+    return next(
+        (
+            f.value
+            for f in figures
+            if (f.measure, f.against, f.window) == (measure, against, window)
+        ),
+        None,
+    )
 
 
 def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:

@@ -56,9 +56,9 @@ from rockcheck.validation.suite.tolerances import (
     MEASURES,
     OWN_FIGURES,
     Place,
-    Windowed,
     floor_of,
     judge,
+    measure_of,
 )
 from rockcheck.validation.uncertainty import numerical
 from rockcheck.validation.uncertainty.population import Inputs
@@ -151,18 +151,18 @@ class SuiteStudy(Study):
             how = ensemble.model_dump(mode="json", exclude={"count", "batch", "description"})
             code = provenance.code_digest("rockcheck.validation.suite.motions")
             every = range(ensemble.count)
-            batches = [every[n : n + ensemble.batch] for n in every[:: ensemble.batch]]
             parts = [
                 (n, {"drawn": {"ensemble": how, "code": code, "numbers": [n.start, n.stop]}})
-                for n in batches
+                for n in (every[k : k + ensemble.batch] for k in every[:: ensemble.batch])
             ]
         for numbers, depends in parts:
-            settings = {**variant.settings, **depends}
             yield Planned(
                 scene,
                 variant,
                 variant.label,
-                provenance.cell_key(scene, kind, settings, variant.search_path),
+                provenance.cell_key(
+                    scene, kind, {**variant.settings, **depends}, variant.search_path
+                ),
                 own.given.uncertainty,
                 ensemble,
                 numbers,
@@ -180,11 +180,11 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> Any:
         """The kept record of a batch, or of a cell whose history is whole; else None."""
-        whole = task.ensemble is None
-        found = store.get(task.name) if whole else store.get_record(COMPARISONS, task.name)
+        found = store.get_record(COMPARISONS, task.name) if task.ensemble else store.get(task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            self.ended[task] = _record_of(task).model_validate(found)
+            kind = BatchRecord if task.ensemble else CellRecord
+            self.ended[task] = kind.model_validate(found)
             self.read_back.add(task)
         return self.ended.get(task)
 
@@ -193,7 +193,8 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        self.ended[task] = _record_of(task).model_validate(record.record)
+        kind = BatchRecord if task.ensemble else CellRecord
+        self.ended[task] = kind.model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
             write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
@@ -207,7 +208,7 @@ class SuiteStudy(Study):
         cells, found = self.planned[scene], dict[str, Cell]()
         if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
-        reference = self.own[scene].reference
+        reference = self.own[scene].given.reference
         for label in sorted(cells, key=lambda label: label != reference):
             found[label] = self._cell(cells[label], found.get(reference))
         self.compared[scene] = [found[label] for label in cells]
@@ -234,8 +235,8 @@ class SuiteStudy(Study):
             suite=suite.name,
             description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
-            reference=suite.reference,
-            model_form=suite.model_form,
+            reference=suite.given.reference,
+            model_form=suite.given.model_form,
             scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
             models=tuple(suite.models),
             cells=tuple(cells),
@@ -300,7 +301,7 @@ class SuiteStudy(Study):
         floor = partial(floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
-        same_equations = Place(scene.name, planned.model, own.reference, Windowed("theta_rms"))
+        same_equations = Place(scene.name, planned.model, own.given.reference, "theta_rms")
         if moved and reference and own.kind(same_equations) == "numerical":
             checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
         return Cell(
@@ -332,7 +333,7 @@ class SuiteStudy(Study):
                 sorted(
                     p.what
                     for p in required
-                    if p.against == name and (p.what.window or p.what.definition.on_request)
+                    if p.against == name and ("@" in p.what or measure_of(p.what).on_request)
                 ),
             )
             for name in self.own[planned.place].yardsticks(required)
@@ -349,53 +350,51 @@ class SuiteStudy(Study):
             one.model: self.ended[self.planned[scene][one.model][0]].uncertainty for one in done
         }
         for cell in self.compared[scene]:
-            against = {own.reference, own.model_form} - {cell.model}
+            against = {own.given.reference, own.given.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
             found = explanations(own.scenes[scene], cell, references, scatters, inputs)
             yield cell.model_copy(update={"explanations": tuple(found)})
 
     def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
         planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
-        played = {label: self._together(batches) for label, batches in planned.items()}
+        played = {label: list(map(self._batch, batches)) for label, batches in planned.items()}
         whole = EnsembleRecord(
             name=name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
-            peaks={label: one.peaks for label, one in played.items()},
-            outcomes={label: one.outcomes for label, one in played.items()},
+            peaks={at: tuple(p for one in some for p in one.peaks) for at, some in played.items()},
+            outcomes={
+                at: tuple(o for one in some for o in one.outcomes) for at, some in played.items()
+            },
         )
         return whole, [
-            self._ensemble_cell(batches, whole.samples, played[label].cost)
-            for label, batches in planned.items()
+            self._ensemble_cell(planned[label], [one.cost for one in some], whole.samples)
+            for label, some in played.items()
         ]
 
-    def _together(self, batches: Sequence[Planned]) -> BatchRecord:
-        """Batches as one; each scene of a batch that failed has its reason."""
-        found: list[BatchRecord] = []
-        for batch in batches:
-            one, count = self.ended[batch], len(batch.numbers)
-            if isinstance(one, Failure):
-                one = BatchRecord(
-                    peaks=(None,) * count, outcomes=(one.reason,) * count, cost=CostRecord()
-                )
-            found.append(one)
-        return BatchRecord(
-            peaks=tuple(peak for one in found for peak in one.peaks),
-            outcomes=tuple(outcome for one in found for outcome in one.outcomes),
-            cost=CostRecord(
-                **{name: sum(getattr(one.cost, name) for one in found) for name in ADDED}
-            ),
-        )
+    def _batch(self, planned: Planned) -> BatchRecord:
+        """The record of a batch; of one that failed, each scene has its reason."""
+        found, count = self.ended[planned], len(planned.numbers)
+        if isinstance(found, Failure):
+            found = BatchRecord(
+                peaks=(None,) * count, outcomes=(found.reason,) * count, cost=CostRecord()
+            )
+        return found
 
     def _ensemble_cell(
-        self, batches: Sequence[Planned], samples: Mapping[str, Sample], cost: CostRecord
+        self,
+        batches: Sequence[Planned],
+        costs: Sequence[CostRecord],
+        samples: Mapping[str, Sample],
     ) -> Cell:
         name, label = batches[0].place, batches[0].model
         mine, reason = samples[label], ""
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
-        about = self._about(batches, reason) | {"cost": cost}
+        about = self._about(batches, reason) | {
+            "cost": CostRecord(**{key: sum(getattr(one, key) for one in costs) for key in ADDED})
+        }
         if about["status"] != "done":
             return Cell(**about)
         own = self.own[name]
@@ -414,25 +413,20 @@ class SuiteStudy(Study):
         )
 
 
-def _record_of(task: Planned) -> type[CellRecord] | type[BatchRecord]:
-    return CellRecord if task.ensemble is None else BatchRecord
-
-
 def _checks(
     own: Suite,
     required: Mapping[Place, Kind],
     figures: Sequence[Compared],
     floor: Callable[[Measure], float],
-    beside: Mapping[tuple[str, str], float | None] = MappingProxyType({}),
+    beside: Mapping[str, float | None] = MappingProxyType({}),
 ) -> Iterator[Check]:
     """The judged figures of a cell; none if its suite judges nothing.
 
-    `beside` has the reference's own figures, by measure and window, where these are yardsticks.
+    `beside` has the reference's own figures, by "measure@window", where these are yardsticks.
     """
     known = {(one.figure.against or OWN_FIGURES, one.figure.windowed): one for one in figures}
     for place, kind in required.items() if own.judged else ():
-        what, line = place.what, own.tolerances.get(place)
-        measure = what.definition
+        line, measure = own.tolerances.get(place), measure_of(place.what)
         itself = place.against == OWN_FIGURES
         nothing = Figure(  # without a value, so that the check cannot pass
             measure=measure.name,
@@ -440,10 +434,10 @@ def _checks(
             unit=measure.unit,
             value=None,
             against="" if itself else place.against,
-            window=what.window,
+            window=place.what.partition("@")[2],
             note="not computed" if itself else f"{place.against} failed in this scene",
         )
-        found = known.get((place.against, str(what)), Compared(nothing))
+        found = known.get((place.against, place.what), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap
         yield judge(
             found.figure,
@@ -452,25 +446,20 @@ def _checks(
             measure=measure,
             gap=gap + SHIFTS if gap and kind == "measured" and not found.fall else gap,
             floor=floor(measure),
-            beside=beside.get((what.measure, what.window)) if line and kind == "absolute" else None,
+            beside=beside.get(place.what) if line and kind == "absolute" else None,
         )
 
 
-def as_expected(reference: Cell) -> dict[tuple[str, str], float | None]:
-    """The reference's own figures, by measure and window, but for those not as expected.
+def as_expected(reference: Cell) -> dict[str, float | None]:
+    """The reference's own figures by "measure@window", but for those not as expected.
 
     One that is not as expected itself is no yardstick.
     """
-    moved = {
-        (check.figure.measure, check.figure.window)
-        for check in reference.checks
-        if check.verdict != "pass" and not check.figure.against
-    }
-    return {
-        (one.measure, one.window): one.value
-        for one in reference.figures
-        if not one.against and (one.measure, one.window) not in moved
-    }
+    own = {one.windowed: one.value for one in reference.figures if not one.against}
+    for check in reference.checks:
+        if check.verdict != "pass" and not check.figure.against:
+            own.pop(check.figure.windowed, None)
+    return own
 
 
 def in_order(items: Sequence[Planned]) -> list[Planned]:

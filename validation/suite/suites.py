@@ -90,7 +90,7 @@ from rockcheck.validation.suite.tolerances import (
     OWN_FIGURES,
     Place,
     Tolerances,
-    Windowed,
+    measure_of,
     parse_tolerances,
 )
 
@@ -160,8 +160,6 @@ class Suite:
     path: Path
     #: The keys of its file, such as the limits, and what it requires.
     given: SuiteFile = field(repr=False)
-    reference: str
-    model_form: str
     scenes: Mapping[str, Scene]
     models: Mapping[str, Work]
     tolerances: Tolerances = field(repr=False)
@@ -180,7 +178,6 @@ class Suite:
 
     @cached_property
     def _judged(self) -> dict[tuple[str, str], list[Place]]:
-        """The places that have a tolerance, by scene and model."""
         found: dict[tuple[str, str], list[Place]] = {}
         for place in self.tolerances:
             found.setdefault((place.scene, place.model), []).append(place)
@@ -198,13 +195,11 @@ class Suite:
 
     def cells(self) -> Iterator[tuple[Scene, Work, Ensemble | None]]:
         """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
-        for part in self.parts:
-            for name, model in _played(part.scenes, part.models):
-                yield part.scenes[name], part.models[model], None
-        for part in self.parts:
-            for name, model in _played(part.ensembles, part.models):
-                ensemble, scene = part.ensembles[name]
-                yield scene, part.models[model], ensemble
+        for kind in ("scenes", "ensembles"):
+            for part in self.parts:
+                for name, model in _played(getattr(part, kind), part.models):
+                    ensemble, scene = part.ensembles.get(name) or (None, part.scenes[name])
+                    yield scene, part.models[model], ensemble
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
@@ -230,25 +225,25 @@ class Suite:
 
         `place` is a scene or an ensemble of this very suite, not of one that it joins.
         """
-        require = self.given.require
+        given, require = self.given, self.given.require
         if place in self.ensembles:
             require = Require(difference=require.ensemble)
         places = [
-            Place(place, model, against, Windowed.parse(text))
+            Place(place, model, against, text)
             for against, texts in (
                 (OWN_FIGURES, require.figures),
-                (self.reference, require.difference),
-                (self.model_form, require.model_form),
+                (given.reference, require.difference),
+                (given.model_form, require.model_form),
             )
-            if against == OWN_FIGURES or (against and model not in (self.reference, against))
+            if against == OWN_FIGURES or (against and model not in (given.reference, against))
             for text in texts
         ]
         return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
 
     def yardsticks(self, checks: Iterable[Place]) -> list[str]:
         """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
-        named = (place.against for place in checks)
-        return list(dict.fromkeys((OWN_FIGURES, self.reference, self.model_form, *named)))
+        usual = OWN_FIGURES, self.given.reference, self.given.model_form
+        return list(dict.fromkeys((*usual, *(place.against for place in checks))))
 
     def kind(self, place: Place) -> Kind:
         """The kind of a check.
@@ -257,7 +252,7 @@ class Suite:
         from one that can.
         """
         if place.against == OWN_FIGURES:
-            return "exact" if place.what.definition.exact else "absolute"
+            return "exact" if measure_of(place.what).exact else "absolute"
         families = [self.models[label].family for label in (place.model, place.against)]
         if "measured" in families:
             return "measured"
@@ -325,16 +320,20 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     tables, tolerances_path = given.tolerances, path
     if tables is None:
         tables, tolerances_path = read_toml(beside) if beside.exists() else {}, beside
+    try:
+        tolerances = parse_tolerances(tables, _played(scenes, models))
+        for at in tolerances:
+            one_of(f"reference of [{at.scene}.{at.model}]", at.against, [OWN_FIGURES, *models])
+    except InputError as error:
+        raise InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(
         name=path.stem,
         path=path,
         given=given,
-        reference=given.reference,
-        model_form=given.model_form,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
-        tolerances=_tolerances(tolerances_path, tables, scenes, models),
+        tolerances=tolerances,
         tolerances_path=tolerances_path,
         uncertain={name: one for name, one in uncertain.items() if one.spreads},
         left_out=tuple(left_out),
@@ -368,9 +367,8 @@ def scene_suite(
         tolerances={},
     )
     suite = _suite(given, path, source in known, allow_code)
-    here = (str(Path.cwd()),)
     variants = {
-        name: replace(one, search_path=here) if one.search_path else one
+        name: replace(one, search_path=(str(Path.cwd()),)) if one.search_path else one
         for name, one in suite.models.items()
     }
     return replace(suite, models=variants, judged=False)
@@ -406,24 +404,8 @@ def _check_names(
     for key, texts in given.require:
         book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
         for text in texts:
-            if Windowed.parse(text).measure not in book:
+            if measure_of(text).name not in book:
                 raise unknown_name(f"measure of require.{key}", text, book)
-
-
-def _tolerances(
-    path: Path, tables: Mapping[str, Any], scenes: Iterable[str], models: Mapping[str, Work]
-) -> Tolerances:
-    try:
-        tolerances = parse_tolerances(tables, _played(scenes, models))
-        for place in tolerances:
-            one_of(
-                f"reference of [{place.scene}.{place.model}]",
-                place.against,
-                [OWN_FIGURES, *models],
-            )
-    except InputError as error:
-        raise InputError(f"{printable(path)}: {error}") from None
-    return tolerances
 
 
 def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
@@ -437,7 +419,6 @@ def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
-    """Several suites as one: names of scenes must differ, references must agree."""
     included = [
         load_suite(
             path.parent / name if Path(name).suffix.lower() == ".toml" else name,
@@ -449,7 +430,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
     if twice := [name for name, count in names.items() if count > 1]:
         raise InputError(f"scene {twice[0]!r} is in two of the suites", "include")
-    if others := [suite.name for suite in included if suite.reference != first.reference]:
+    if others := [one.name for one in included if one.given.reference != first.given.reference]:
         raise InputError(f"{others[0]} and {first.name} have different references", "include")
     whole: dict[str, Any] = {
         what: {key: one for suite in included for key, one in getattr(suite, what).items()}
@@ -458,9 +439,12 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     return Suite(
         name=path.stem,
         path=path,
-        given=given,
-        reference=first.reference,
-        model_form=next((suite.model_form for suite in included if suite.model_form), ""),
+        given=given.model_copy(
+            update={
+                "reference": first.given.reference,
+                "model_form": next(filter(None, (s.given.model_form for s in included)), ""),
+            }
+        ),
         tolerances_path=path,
         left_out=tuple(name for suite in included for name in suite.left_out),
         included=tuple(included),
@@ -480,16 +464,14 @@ def _variant(
             else str(folder / str(files))
             for scene, files in settings["files"].items()
         }
-    if is_own(name):
-        try:
-            check_allowed(name, allow_code)
-        except InputError as error:
-            raise InputError(error.reason, f"models.{printable(label)}") from None
-        return Work(
-            label=label, family=name, settings=settings, search_path=(str(folder.absolute()),)
-        )
-    build(name, settings)
-    return Work(label=label, family=name, settings=settings)
+    if not is_own(name):
+        build(name, settings)
+        return Work(label=label, family=name, settings=settings)
+    try:
+        check_allowed(name, allow_code)
+    except InputError as error:
+        raise InputError(error.reason, f"models.{printable(label)}") from None
+    return Work(label=label, family=name, settings=settings, search_path=(str(folder.absolute()),))
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:

@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Container, Iterator
-from itertools import groupby
 from typing import Any
 
 from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
@@ -92,15 +91,22 @@ def verdict_table(run: Run) -> Table:
 
     Of a large run, the scenes that are `shown`.
     """
-    places = set(shown(run))
-    cells = [cell for cell in run.cells if cell.scene in places]
+    cells = run.by_scene()
     rows = [
         ["" if n else scene, *_verdict_row(cell)]
-        for scene, of_scene in groupby(cells, key=lambda cell: cell.scene)
-        for n, cell in enumerate(of_scene)
+        for scene in shown(run)
+        for n, cell in enumerate(cells[scene].values())
     ]
-    heads = [*map(text, ("scene", "model", "nearest to its limit")), Column("used", kind="used")]
-    return Table("verdicts", [*heads, text("verdict")], rows, most=len(rows))
+    return Table(
+        "verdicts",
+        [
+            *map(text, ("scene", "model", "nearest to its limit")),
+            Column("used", kind="used"),
+            text("verdict"),
+        ],
+        rows,
+        most=len(rows),
+    )
 
 
 def _verdict_row(cell: Cell) -> list[Any]:
@@ -133,31 +139,32 @@ def outcome_tables(run: Run) -> Iterator[Table]:
     """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
-        rows = [_outcome_cells(cell, run.reference) for cell in cells.values()]
+        rows = []
+        for cell in cells.values():
+            known, done = outcome_row(cell, run.reference), cell.status == "done"
+            rows.append(
+                [
+                    cell.model,
+                    cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
+                    known["peak_rotation_alpha"],
+                    "ref." if cell.model == run.reference else known["apart_alpha"],
+                    f"{cell.cost.wall_seconds:.1f} s" if done else "",
+                ]
+            )
         yield Table("outcomes", columns, rows, scene)
-
-
-def _outcome_cells(cell: Cell, reference: str) -> list[Any]:
-    values, done = outcome_row(cell, reference), cell.status == "done"
-    return [
-        cell.model,
-        cell.fate if done else Mark(cell.reason or "failed", cell.verdict),
-        values["peak_rotation_alpha"],
-        "ref." if cell.model == reference else values["apart_alpha"],
-        f"{cell.cost.wall_seconds:.1f} s" if done else "",
-    ]
 
 
 def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
     """The result of a cell in plain values; `peak_rotation_alpha` is None for a block that fell."""
-    fell = cell.outcome.startswith("overturned")
     return {
         "scene": cell.scene,
         "model": cell.model,
         "status": cell.status,
         "outcome": cell.outcome or None,
         "overturned_at_s": cell.overturned_at,
-        "peak_rotation_alpha": None if fell else value_of(cell.figures, "peak_rotation"),
+        "peak_rotation_alpha": None
+        if cell.outcome.startswith("overturned")
+        else value_of(cell.figures, "peak_rotation"),
         "apart_alpha": value_of(cell.figures, "theta_rms", reference, HORIZON),
         "wall_seconds": cell.cost.wall_seconds,
     }
@@ -282,13 +289,19 @@ def files_of(run: Run) -> Iterator[Table]:
     def row(cell: Cell, figure: Figure) -> list[Any]:
         return [cell.scene, cell.model, *(getattr(figure, name) for name in place[2:])]
 
-    checks = [
-        [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
-        for cell, check in run.checks()
-    ]
-    yield Table("checks", list(map(Column, (*place, "kind", *tolerance))), checks)
-    figures = [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures]
-    yield Table("figures", list(map(Column, (*place, "note"))), figures)
+    yield Table(
+        "checks",
+        list(map(Column, (*place, "kind", *tolerance))),
+        [
+            [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
+            for cell, check in run.checks()
+        ],
+    )
+    yield Table(
+        "figures",
+        list(map(Column, (*place, "note"))),
+        [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures],
+    )
 
 
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
@@ -326,8 +339,12 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
     ran.time = 0.0 if cell.read_back else cell.cost.worker_seconds
     yield ran
     if cell.numerical is not None:
-        unsure = None if cell.numerical.converged else Skipped
-        yield _case(place, "converged", unsure, "; ".join(cell.numerical.reasons))
+        yield _case(
+            place,
+            "converged",
+            None if cell.converged else Skipped,
+            "; ".join(cell.numerical.reasons),
+        )
     for check in cell.checks:
         failure = Failure if check.fails(strict) else None
         result = Skipped if check.verdict == "not defined" else failure

@@ -33,14 +33,11 @@ reference solves the same equations and is itself as expected (`runner`). A rati
 defined*.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import ChainMap
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.base import Finite, Frozen, NonNegative
@@ -60,31 +57,18 @@ EVERY = "*"
 STANDS_FOR = {"angle": "theta_rms", "m": "last_slip", "s": "end_time"}
 
 
-@dataclass(frozen=True, order=True)
-class Windowed:
-    """A measure over a window: "theta_rms", "theta_rms@8s" or "theta_rms@horizon"."""
+def measure_of(what: str) -> Measure:
+    """The measure of "theta_rms", "theta_rms@8s" or "theta_rms@horizon".
 
-    measure: str
-    window: str = ""
-
-    @classmethod
-    def parse(cls, text: str) -> Windowed:
-        """Read "measure@window"; raises `InputError` for an unknown measure or bad window."""
-        name, at, window = text.partition("@")
-        one_of("measure", name, MEASURES)
-        if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
-            raise InputError(
-                f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
-            )
-        return cls(name, window)
-
-    @property
-    def definition(self) -> Measure:
-        """The measure itself."""
-        return MEASURES[self.measure]
-
-    def __str__(self) -> str:
-        return f"{self.measure}@{self.window}" if self.window else self.measure
+    Raises `InputError` for an unknown measure or bad window.
+    """
+    name, at, window = what.partition("@")
+    one_of("measure", name, MEASURES)
+    if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
+        raise InputError(
+            f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
+        )
+    return MEASURES[name]
 
 
 class Tolerance(Frozen):
@@ -96,21 +80,19 @@ class Tolerance(Frozen):
     why: str = ""
 
 
-@dataclass(frozen=True, order=True)
-class Place:
-    """The place of a tolerance: scene, model, reference or "figures", and windowed measure."""
+class Place(NamedTuple):
+    """The place of a tolerance: scene, model, reference or "figures", and "measure@window"."""
 
     scene: str
     model: str
     against: str
-    what: Windowed
+    what: str
 
     def __str__(self) -> str:
         return f"{self.scene}.{self.model}.{self.against}: {self.what}"
 
 
 Tolerances = dict[Place, Tolerance]
-_Path = tuple[str, ...]
 
 
 def parse_tolerances(
@@ -122,66 +104,58 @@ def parse_tolerances(
     naming the place of an unusable line.
     """
     found: Tolerances = {}
-    for (scene, model, against, key), line in _spread(dict(_lines(tables, depth=4)), cells):
-        where = f"[{scene}.{model}.{against}] {key}"
+    for place, line in _spread(dict(_lines(tables)), list(cells)):
         try:
-            place = Place(scene, model, against, Windowed.parse(key))
+            measure = measure_of(place.what)
             if not isinstance(line, Mapping):
                 raise InputError("must be a table { expected, limit, drift, why }")
             tolerance = Tolerance(**line)
-            measure = place.what.definition
-            if (measure.name in FIGURES) != (against == OWN_FIGURES):
+            if (measure.name in FIGURES) != (place.against == OWN_FIGURES):
                 raise InputError(
                     f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}"
                 )
             if measure.ideal is None and measure.sense == "at most" and tolerance.expected is None:
                 raise InputError("is missing", "expected")
         except InputError as error:
+            where = f"[{'.'.join(place[:3])}] {place.what}"
             raise InputError(f"{printable(where)}: {error}") from None
         found[place] = tolerance
     return found
 
 
 def _spread(
-    lines: Mapping[_Path, Any], cells: Iterable[tuple[str, str]]
-) -> Iterator[tuple[_Path, Any]]:
+    lines: Mapping[Place, Any], cells: Sequence[tuple[str, str]]
+) -> Iterator[tuple[Place, Any]]:
     """The lines, with those for every scene repeated for each cell of the model.
 
     A scene's own line takes precedence; what it leaves out comes from the line for every scene.
     """
-    played = list(cells)
-    common = {path: line for path, line in lines.items() if path[0] == EVERY}
-    for path, line in lines.items():
-        below = common.get((EVERY, *path[1:]))
-        if path[0] != EVERY:
-            yield (
-                path,
-                {**below, **line}
-                if isinstance(below, Mapping) and isinstance(line, Mapping)
-                else line,
-            )
-    for (_, *rest), line in common.items():
-        scenes = [scene for scene, model in played if model == rest[0]]
-        completes = any(path[0] != EVERY and path[1:] == tuple(rest) for path in lines)
-        if completes and isinstance(line, Mapping) and "limit" not in line:
+    own = {place: line for place, line in lines.items() if place.scene != EVERY}
+    for place, line in own.items():
+        yield place, _over(lines.get(place._replace(scene=EVERY)), line)
+    completed = {place[1:] for place in own}
+    for place, line in lines.items():
+        completes = place[1:] in completed and isinstance(line, Mapping) and "limit" not in line
+        if place in own or completes:
             continue
+        scenes = [scene for scene, model in cells if model == place.model]
         # Without a cell the line stays as it is, and is reported as a tolerance without a cell.
-        yield from (
-            ((scene, *rest), line)
-            for scene in scenes or [EVERY]
-            if (scene, *rest) not in lines or scene == EVERY
-        )
+        every = (place._replace(scene=scene) for scene in scenes or [EVERY])
+        yield from ((one, line) for one in every if one not in own)
 
 
-def _lines(
-    tables: Mapping[str, Any], depth: int, above: tuple[str, ...] = ()
-) -> Iterator[tuple[tuple[str, ...], Any]]:
+def _over(below: Any, line: Any) -> Any:
+    both = isinstance(below, Mapping) and isinstance(line, Mapping)
+    return {**below, **line} if both else line
+
+
+def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Any]]:
     for name, inner in tables.items():
         path = (*above, str(name))
-        if len(path) == depth:
-            yield path, inner
+        if len(path) == len(Place._fields):
+            yield Place(*path), inner
         elif isinstance(inner, Mapping):
-            yield from _lines(inner, depth, path)
+            yield from _lines(inner, *path)
         else:
             raise InputError(f"{printable('.'.join(path))}: must be tables [scene.model.reference]")
 
@@ -269,7 +243,11 @@ def _verdict(
         return "fail", outside
     if expected is None or not (outside or moved > drift):
         return "pass", ""
-    if kind != "model form" and _nearer(value, expected, measure, perfect) > (line.drift or 0.0):
+    if measure.sense == "at least":
+        nearer = value - expected
+    else:
+        nearer = 0.0 if perfect is None else abs(expected - perfect) - abs(value - perfect)
+    if kind != "model form" and nearer > (line.drift or 0.0):
         return "better", f"{value:.6g} was {expected:.6g}" + (
             f", nearer to {perfect:.6g}" if perfect else ""
         )
@@ -278,13 +256,6 @@ def _verdict(
         if outside
         else ("changed", f"{value:.6g} was {expected:.6g} (drift allowed {drift:.2g})")
     )
-
-
-def _nearer(value: float, expected: float, measure: Measure, perfect: float | None) -> float:
-    """How much nearer the value is to a perfect one than the expected value; 0 without one."""
-    if measure.sense == "at least":
-        return value - expected
-    return 0.0 if perfect is None else abs(expected - perfect) - abs(value - perfect)
 
 
 def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:

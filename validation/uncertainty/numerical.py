@@ -174,7 +174,6 @@ def _quantity(
     reason: str = "",
     order: float | None = None,
 ) -> Quantity:
-    """A quantity: not converged where a reason is given, otherwise converged."""
     return Quantity(
         name=name,
         unit=unit,

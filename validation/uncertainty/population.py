@@ -7,8 +7,6 @@ itself is not known exactly (ASME V&V 20-2009, section 4, by sampling), and Sobo
 number matters most.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -87,8 +85,8 @@ def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
         history = decided(scene, player)
     except ModelFailure:
         return SAFE, 0.0, True
-    side = {"overturned left": LEFT, "overturned right": RIGHT}.get(history.outcome, SAFE)
-    return side, history.peak_rotation, False
+    sides = {"overturned left": LEFT, "overturned right": RIGHT}
+    return sides.get(history.outcome, SAFE), history.peak_rotation, False
 
 
 def decided(scene: Scene, player: Any) -> History:
@@ -318,8 +316,9 @@ def propagate(
         )
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
-    sobol = qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed))
-    values = given.values(sobol.random(count))
+    values = given.values(
+        qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count)
+    )
     played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
     own = play_ensemble([given.scene], model)
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
@@ -397,7 +396,6 @@ def sensitivities(
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:
-    """The ends of the interval that holds `CONFIDENCE` of the values."""
     low, high = np.quantile(values, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
     return float(low), float(high)
 
