@@ -171,8 +171,7 @@ class SceneView(View):
         NaN outside them and where there is no such column.
         """
         times = np.asarray(history.channels["t"], dtype=float)
-        unknown = np.full(len(times), math.nan)
-        values = np.asarray(history.channels.get(name, unknown), dtype=float)
+        values = np.asarray(history.channels.get(name, np.full(len(times), math.nan)), dtype=float)
         inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
         return np.where(inside, np.interp(self.t, times, values), math.nan)
 
@@ -215,8 +214,13 @@ class SceneView(View):
         """
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
-            drawn = [columns[name] for columns in self.drawn.values()]
-            sizes = np.nan_to_num(np.abs(np.array(drawn).reshape(-1, len(self.t))))
+            sizes = np.nan_to_num(
+                np.abs(
+                    np.array([columns[name] for columns in self.drawn.values()]).reshape(
+                        -1, len(self.t)
+                    )
+                )
+            )
             moving |= (sizes > max(STILL * sizes.max(initial=0.0), 1e-9)).any(axis=0)
         rows, whole = np.flatnonzero(moving), (float(self.t[0]), float(self.t[-1]))
         if not len(rows):
@@ -420,9 +424,8 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         numbered = chain([base], (f"{base}-{n}" for n in count(2)))
-        slug = next(one for one in numbered if one.lower() not in taken)
-        taken.add(slug.lower())
-        slugs[name] = slug
+        slugs[name] = next(one for one in numbered if one.lower() not in taken)
+        taken.add(slugs[name].lower())
     return slugs
 
 

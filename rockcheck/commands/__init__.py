@@ -196,8 +196,9 @@ def playing(
     title: str, models: Iterable[tuple[str, Mapping[str, Any]]]
 ) -> AbstractContextManager[OnProgress]:
     """Progress of `models` (family, settings) that play; it says if one may compile first."""
-    slow = any(compiles(*one) for one in models)
-    return progress(f"{title}, may compile first" if slow else title)
+    return progress(
+        f"{title}, may compile first" if any(compiles(*one) for one in models) else title
+    )
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:

@@ -70,8 +70,12 @@ def run(
     if plot is not None and found:
         from rockcheck.reports.show.drawing import recordings_figure
 
-        drawn = [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-        save_figure(recordings_figure(drawn), plot)
+        save_figure(
+            recordings_figure(
+                [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
+            ),
+            plot,
+        )
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
@@ -130,8 +134,15 @@ def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
         *(("note", printable(note, 200)) for note in record.notes),
     ]
     title = f"{path}, {record.component}" if record.component else str(path)
-    table = Table("record", [text("record"), text("value", " ")], rows)
-    show(Finding("record", title, "", [Text(title), table]), console())
+    show(
+        Finding(
+            "record",
+            title,
+            "",
+            [Text(title), Table("record", [text("record"), text("value", " ")], rows)],
+        ),
+        console(),
+    )
 
 
 def _picture(record: Recording) -> str:
@@ -150,12 +161,11 @@ def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
             raise InputError("needs records", "--read")
         return []
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
-    reading = {name: value for name, value in Reading(**given) if value is not None}
     return [
         RecordSet(
             files=tuple(str(record_path(word, Path()).absolute()) for word in records),
             scale=scale,
             vertical=vertical,
-            **reading,
+            **{name: value for name, value in Reading(**given) if value is not None},
         )
     ]

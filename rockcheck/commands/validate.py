@@ -36,7 +36,7 @@ from rockcheck.scenes.errors import InputError, printable
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance
 from rockcheck.validation.suite.across import moment_of, remember, trend_of
-from rockcheck.validation.suite.results import Run, Strict
+from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import (
     Suite,
@@ -135,32 +135,47 @@ def run(
     asked = _scene if is_scene(what) else _suite
     for option, given in (("--strict", strict), ("--history", history)):
         if given and asked is _scene:
-            said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
-            raise InputError(said, option)
+            raise InputError(
+                f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
+            )
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
-    how: Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document, site
 
-    finished = play(suite, folder, played, force=force, strict=how)
+    finished = play(
+        suite,
+        folder,
+        played,
+        force=force,
+        strict="both" if strict == "both" else strict is not None,
+    )
     page = site.keep(finished, folder)
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
-        moment = moment_of(finished, Path(finished.tolerances_file).parent)
-        trend = trend_of(remember(history, moment))
+        trend = trend_of(
+            remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
+        )
         document.show(trend, console())
         if report:
-            where = document.publish(trend, usable_folder(folder, TREND))
-            console().print(f"trend: {where}", soft_wrap=True)
+            console().print(
+                f"trend: {document.publish(trend, usable_folder(folder, TREND))}", soft_wrap=True
+            )
     if report:
         with progress("pages") as on_progress:
-            jobs = played.jobs or os.cpu_count() or 1
-            page = site.write_site(folder, jobs=jobs, afresh=False, on_progress=on_progress)
+            page = site.write_site(
+                folder,
+                jobs=played.jobs or os.cpu_count() or 1,
+                afresh=False,
+                on_progress=on_progress,
+            )
     else:
         site.remove_site(folder)
     console().print(f"report: {page}", soft_wrap=True)
-    more = {} if suite.judged else {"left_out": suite.left_out}
-    answer(summary(finished) | more | {"report": page})
+    answer(
+        summary(finished)
+        | ({} if suite.judged else {"left_out": suite.left_out})
+        | {"report": page}
+    )
     raise typer.Exit(finished.exit_code)
 
 
@@ -180,8 +195,12 @@ def _scene(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[Suite, Path]:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
-    chosen = chosen_models(of_scene.models, of_scene.set or ())
-    suite = scene_suite(name, chosen, records=sets, allow_code=allow_code)
+    suite = scene_suite(
+        name,
+        chosen_models(of_scene.models, of_scene.set or ()),
+        records=sets,
+        allow_code=allow_code,
+    )
     folder = usable_folder(out)
     if of_scene.models == ALL:
         tell_missing()
@@ -203,8 +222,7 @@ def _scene(
 
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    models = ((one.family, one.settings) for one in suite.models.values())
-    with playing(suite.name, models) as told:
+    with playing(suite.name, ((one.family, one.settings) for one in suite.models.values())) as told:
         how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
         return run_suite(suite, folder, **how)
 

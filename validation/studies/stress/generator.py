@@ -142,8 +142,11 @@ def _scene(
         start.pop("initial_height", None)
     if kind == "no-slip":
         start.pop("initial_velocity", None)
-    static = None if mu_s == mu or kind == "bouc-wen" else mu_s
-    settings["floor"] = Floor(friction=mu, static_friction=static, restitution=bounce)
+    settings["floor"] = Floor(
+        friction=mu,
+        static_friction=None if mu_s == mu or kind == "bouc-wen" else mu_s,
+        restitution=bounce,
+    )
     settings["output_step"] = settings["duration"] / ROWS
     for key in doubtful:
         try:
@@ -175,8 +178,9 @@ def loaded(
         else None
     )
     block = block.replace(centre_of_mass=centre, moment_of_inertia=own)
-    most = min(FRICTION[1], 0.999 * block.least_painleve_friction)
-    return block, FRICTION[1] if block.homogeneous else most
+    return block, FRICTION[1] if block.homogeneous else min(
+        FRICTION[1], 0.999 * block.least_painleve_friction
+    )
 
 
 def _log(r: np.random.Generator, low: float, high: float) -> float:
@@ -321,8 +325,7 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         else Rest()
     )
     walls = _exact_walls(r, block)
-    unit = math.sqrt(block.radius / gravity)
-    duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * unit, 2)
+    duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * math.sqrt(block.radius / gravity), 2)
     still = excitation.kind == "rest" and vertical.kind == "rest"
     if still and all(wall.restitution <= 0.5 for wall in walls) and r.random() < LONG:
         duration = LASTS
@@ -333,13 +336,16 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
         return sign * (size if size < 1.5 else 0.1)
 
-    low = tuple(size for size in SIZES if size < 1)
     start = _drawn(
         r,
         ("initial_rotation", 1.0 if excitation.kind == "rest" else 0.4, tilt),
         ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
         ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
+        (
+            "initial_height",
+            0.2,
+            lambda: 10.0 ** int(_pick(r, tuple(size for size in SIZES if size < 1))),
+        ),
     )
     return _scene(
         kind,

@@ -166,8 +166,11 @@ def check_run(
             figures["clearance"] = float(_wrong_clearance(model, played, seed))
     bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
-        counts = cost.energy_gains and (model.energy_cap or not bounces)
-        figures["impacts"] = cost.largest_energy_gain if counts else 0.0
+        figures["impacts"] = (
+            cost.largest_energy_gain
+            if cost.energy_gains and (model.energy_cap or not bounces)
+            else 0.0
+        )
     horizon = _Horizon(model, motion, seed)
     later = {
         "mirror": lambda: _mirror(model, motion),
@@ -262,8 +265,11 @@ def _contradicts(scene: Scene, history: History) -> bool:
     if history.outcome.startswith("overturned"):
         return backward or falls != [history.outcome] or kinds[-1] != history.outcome
     whole = len(history.channels["t"]) == len(scene.output_times)
-    upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
-    return backward or bool(falls) or not (whole and upright)
+    return (
+        backward
+        or bool(falls)
+        or not (whole and np.all(np.abs(history.channels["theta"]) < math.pi / 2))
+    )
 
 
 def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
@@ -310,9 +316,10 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
     u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
     unilateral = model.pivot == "unilateral"
-    pivots = scene.block.pivot("left"), scene.block.pivot("right")
+
     # A base that accelerates to the right tips the block to the left.
-    tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
+    left, right = scene.block.pivot("left"), scene.block.pivot("right")
+    tips = np.where(u > 0.0, left.arm / left.height, right.arm / right.height)
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
     rest = clear & motion.within("rest") & ~(motion.tip | motion.far)
     excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)
@@ -417,8 +424,9 @@ def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
 def _friction_power(motion: Motion) -> Floats:
     """Power of the floor's friction, natural units."""
     along, mu = motion.sign * motion.slip, motion.scene.floor.friction
-    flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(along)
-    power = np.where(motion.within("slide"), flat, 0.0)
+    power = np.where(
+        motion.within("slide"), -mu * np.abs(1.0 + motion.vertical) * np.abs(along), 0.0
+    )
     tilted = motion.within("slide-rock", "ladder")
     forces, _ = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
     power[tilted] = forces[1] * along[tilted]

@@ -74,25 +74,29 @@ class EventBased(Player):
 
         Every other unilateral run has the energy cap, Bouc-Wen yields within R/1000.
         """
-        every: dict[str, tuple[bool, Any]] = {
-            "friction": (self.kind == "no-slip", self.kind),
-            "impacts": (self.impacts != "moreau", self.impacts),
-            "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
-            "yield_displacement": (self.kind == "bouc-wen", 1e-3 * scene.block.radius),
+        return {
+            key: value
+            for key, (given, value) in {
+                "friction": (self.kind == "no-slip", self.kind),
+                "impacts": (self.impacts != "moreau", self.impacts),
+                "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
+                "yield_displacement": (self.kind == "bouc-wen", 1e-3 * scene.block.radius),
+            }.items()
+            if given
         }
-        return {key: value for key, (given, value) in every.items() if given}
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
-        settings: dict[str, Any] = {
-            "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
-            "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
-            "most_steps": MOST_STEPS,
-            "most_events": MOST_EVENTS,
-            **self.settings(scene, number),
-        }
         return check_run(
-            EventBasedModel(**settings),
+            EventBasedModel(
+                **{
+                    "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
+                    "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
+                    "most_steps": MOST_STEPS,
+                    "most_events": MOST_EVENTS,
+                    **self.settings(scene, number),
+                }
+            ),
             scene,
             seed=seed,
             audit=only in ("energy", "clearance") or (not only and number % AUDIT == 0),
@@ -178,8 +182,7 @@ class Approximate(Player):
         )
         level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
         way = math.sqrt(DEPTH) if self.label == "cm" else self.step
-        stated = speed * way + level * way**2
-        return motion.deepest / (2.0 * stated + 1e-5)
+        return motion.deepest / (2.0 * (speed * way + level * way**2) + 1e-5)
 
 
 ROUNDING = "scenes at which rounding decides"
@@ -481,8 +484,13 @@ class Chunk(Task):
         """The totals of the runs."""
         began, totals = time.process_time(), RunTotals(model=self.model)
         for number in range(self.first, self.first + self.count):
-            scene = PLAYERS[self.model].scene(self.seed, number)
-            totals.see(checked(self.model, scene, self.seed, number), self.seed, number)
+            totals.see(
+                checked(
+                    self.model, PLAYERS[self.model].scene(self.seed, number), self.seed, number
+                ),
+                self.seed,
+                number,
+            )
         totals.cpu_seconds = time.process_time() - began
         return totals
 

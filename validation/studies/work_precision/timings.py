@@ -106,8 +106,11 @@ class BatchSize:
 
 def at_level(rows: Sequence[BatchTime], case: str) -> BatchTime | None:
     """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
-    good = [row for row in rows if row.case == case and row.error_95 <= LEVEL]
-    return min(good, key=lambda row: row.cpu, default=None)
+    return min(
+        [row for row in rows if row.case == case and row.error_95 <= LEVEL],
+        key=lambda row: row.cpu,
+        default=None,
+    )
 
 
 #: The scene of the batches, whose pulse is another in each run.
@@ -349,8 +352,15 @@ def _batches(nodes: int) -> Iterator[Pair]:
     ):
         one, other = dear[1](), cheap[1]()
         apart = np.abs(one.peak - other.peak)[(one.side == 0) & (other.side == 0)]
-        change = float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha
-        yield "ebm", thing, "μs a trajectory", dear[0], cheap[0], change, remark
+        yield (
+            "ebm",
+            thing,
+            "μs a trajectory",
+            dear[0],
+            cheap[0],
+            float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha,
+            remark,
+        )
 
 
 def _timed(
