@@ -31,7 +31,7 @@ from rockcheck.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
+from rockcheck.commands.simulate import ReadOption, RecordsArgument, record_sets
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import InputError, NotInstalled, one_of, printable, unknown_name
