@@ -123,11 +123,6 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
     ]
 
 
-def scene_html(scene: Scene) -> str:
-    """The table of a scene in a notebook."""
-    return html_table(scene.name, scene_facts(scene))
-
-
 def history_html(history: History) -> str:
     """The table of a history in a notebook.
 

@@ -108,16 +108,6 @@ class Found:
         """All runs that count, with their case."""
         return [(case, run) for case, runs in self.runs.items() for run in runs]
 
-    @property
-    def failures(self) -> dict[str, str]:
-        """Why a run as it is failed, by case, and by the other model."""
-        runs = {case: one.runs[0] for case, one in self.shown.items()} | {
-            f"{case}, {model}": run
-            for model, others in self.others.items()
-            for case, run in others.items()
-        }
-        return {where: run.reason for where, run in runs.items() if run.reason}
-
     @cached_property
     def nominal(self) -> dict[str, Ran]:
         """By case, the run as it is, where it has a motion."""
@@ -221,14 +211,21 @@ def finding_of(found: Found) -> Finding:
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own.inputs else None}
     decided = study.recorded or numerical["converged"] or study.levels
+    # as they are, by case, and by the other model
+    as_it_is = {case: one.runs[0] for case, one in found.shown.items()} | {
+        f"{case}, {model}": run
+        for model, others in found.others.items()
+        for case, run in others.items()
+    }
+    failures = {where: run.reason for where, run in as_it_is.items() if run.reason}
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
         " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
-        exit_code=3 if found.failed or found.failures else int("" in found.sure and not decided),
-        failures=found.failures,
+        exit_code=3 if found.failed or failures else int("" in found.sure and not decided),
+        failures=failures,
         files={file_of(case): one.history for case, one in found.shown.items() if one.history},
     )
 

@@ -522,12 +522,14 @@ class Shrinking(Task):
 
         def shows(scene: Scene) -> bool:
             played = checked(broken.model, scene, broken.seed, broken.number, name)
-            if name not in played.broken or not played.figures[name] >= min(broken.figure, most):
-                return False
-            # A fault of the program: the same one.
             return (
-                broken.figure < math.inf
-                or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+                name in played.broken
+                and played.figures[name] >= min(broken.figure, most)
+                # A fault of the program: the same one.
+                and (
+                    broken.figure < math.inf
+                    or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+                )
             )
 
         if not shows(broken.scene):
