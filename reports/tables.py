@@ -65,8 +65,8 @@ def checks_table(cells: Iterable[Cell], name: str = "") -> Table:
 
 def verdict_mark(cell: Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
-    nothing = cell.verdict == "pass" and not cell.checks
-    return Mark("nothing judged") if nothing else Mark(VERDICTS[cell.verdict][0], cell.verdict)
+    judged = cell.verdict != "pass" or bool(cell.checks)
+    return Mark(VERDICTS[cell.verdict][0], cell.verdict) if judged else Mark("nothing judged")
 
 
 def worst_table(run: Run, links: Mapping[str, str]) -> Table:

@@ -214,13 +214,8 @@ class SceneView(View):
         """
         moving = np.zeros(len(self.t), dtype=bool)
         for name in ("theta", "slip_rate"):
-            sizes = np.nan_to_num(
-                np.abs(
-                    np.array([columns[name] for columns in self.drawn.values()]).reshape(
-                        -1, len(self.t)
-                    )
-                )
-            )
+            drawn = [columns[name] for columns in self.drawn.values()]
+            sizes = np.nan_to_num(np.abs(np.array(drawn).reshape(-1, len(self.t))))
             moving |= (sizes > max(STILL * sizes.max(initial=0.0), 1e-9)).any(axis=0)
         rows, whole = np.flatnonzero(moving), (float(self.t[0]), float(self.t[-1]))
         if not len(rows):

@@ -178,9 +178,8 @@ def loaded(
         else None
     )
     block = block.replace(centre_of_mass=centre, moment_of_inertia=own)
-    return block, FRICTION[1] if block.homogeneous else min(
-        FRICTION[1], 0.999 * block.least_painleve_friction
-    )
+    most = min(FRICTION[1], 0.999 * block.least_painleve_friction)
+    return block, FRICTION[1] if block.homogeneous else most
 
 
 def _log(r: np.random.Generator, low: float, high: float) -> float:
@@ -336,16 +335,13 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
         return sign * (size if size < 1.5 else 0.1)
 
+    low = tuple(size for size in SIZES if size < 1)
     start = _drawn(
         r,
         ("initial_rotation", 1.0 if excitation.kind == "rest" else 0.4, tilt),
         ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
         ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        (
-            "initial_height",
-            0.2,
-            lambda: 10.0 ** int(_pick(r, tuple(size for size in SIZES if size < 1))),
-        ),
+        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
     )
     return _scene(
         kind,

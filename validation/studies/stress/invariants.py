@@ -265,11 +265,8 @@ def _contradicts(scene: Scene, history: History) -> bool:
     if history.outcome.startswith("overturned"):
         return backward or falls != [history.outcome] or kinds[-1] != history.outcome
     whole = len(history.channels["t"]) == len(scene.output_times)
-    return (
-        backward
-        or bool(falls)
-        or not (whole and np.all(np.abs(history.channels["theta"]) < math.pi / 2))
-    )
+    upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
+    return backward or bool(falls) or not (whole and upright)
 
 
 def conditions(model: EventBasedModel, motion: Motion) -> dict[str, float]:
@@ -316,10 +313,9 @@ def _force_conditions(model: EventBasedModel, motion: Motion) -> tuple[float, fl
     u, g, w, mu_s = motion.u, 1.0 + motion.vertical, motion.w, motion.scene.floor.mu_s
     scale = 1.0 + np.abs(u) + np.abs(g) + w * w
     unilateral = model.pivot == "unilateral"
-
+    pivots = scene.block.pivot("left"), scene.block.pivot("right")
     # A base that accelerates to the right tips the block to the left.
-    left, right = scene.block.pivot("left"), scene.block.pivot("right")
-    tips = np.where(u > 0.0, left.arm / left.height, right.arm / right.height)
+    tips = np.where(u > 0.0, *(pivot.arm / pivot.height for pivot in pivots))
     limit = tips if model.friction == "no-slip" else np.minimum(tips, max(mu_s, 1e-9))
     rest = clear & motion.within("rest") & ~(motion.tip | motion.far)
     excess = _largest((np.abs(u) - limit * np.abs(g)) / scale, rest)

@@ -74,16 +74,13 @@ class EventBased(Player):
 
         Every other unilateral run has the energy cap, Bouc-Wen yields within R/1000.
         """
-        return {
-            key: value
-            for key, (given, value) in {
-                "friction": (self.kind == "no-slip", self.kind),
-                "impacts": (self.impacts != "moreau", self.impacts),
-                "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
-                "yield_displacement": (self.kind == "bouc-wen", 1e-3 * scene.block.radius),
-            }.items()
-            if given
+        every: dict[str, tuple[bool, Any]] = {
+            "friction": (self.kind == "no-slip", self.kind),
+            "impacts": (self.impacts != "moreau", self.impacts),
+            "energy_cap": (self.kind == "unilateral" and number % 2 == 1, True),
+            "yield_displacement": (self.kind == "bouc-wen", 1e-3 * scene.block.radius),
         }
+        return {key: value for key, (given, value) in every.items() if given}
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
