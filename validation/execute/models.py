@@ -137,8 +137,11 @@ def engine_names() -> tuple[str, ...]:
 
 def not_installed(name: str) -> str:
     """How to install the engine of that model; empty if it is installed, or none is needed."""
-    needed = family(name).module == ENGINES and not _class_of(name).installed()
-    return str(_class_of(name).hint()) if needed else ""
+    return (
+        str(_class_of(name).hint())
+        if (family(name).module == ENGINES and not _class_of(name).installed())
+        else ""
+    )
 
 
 def has_wheel(name: str) -> bool:
@@ -277,18 +280,23 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     began = time.perf_counter()
     history = _simulate(work, scene)
     cost = {key: value for key, value in vars(history.cost).items() if value is not None}
-    record = {
-        "outcome": history.outcome,
-        "notes": list(history.notes),
-        "settings": {  # as plain JSON values, sorted as the store returns them
-            str(key): value if isinstance(value, str | int | float | bool | None) else str(value)
-            for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
+    return Played(
+        {
+            "outcome": history.outcome,
+            "notes": list(history.notes),
+            "settings": {  # as plain JSON values, sorted as the store returns them
+                str(key): value
+                if isinstance(value, str | int | float | bool | None)
+                else str(value)
+                for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
+            },
+            "uncertainty": dict(history.uncertainty),
+            "numerical": _numerical(work, scene, history) if uncertainty else None,
+            "cost": {**cost, "worker_seconds": time.perf_counter() - began},
         },
-        "uncertainty": dict(history.uncertainty),
-        "numerical": _numerical(work, scene, history) if uncertainty else None,
-        "cost": {**cost, "worker_seconds": time.perf_counter() - began},
-    }
-    return Played(record, history.packed(), None if is_own(work.family) else history)
+        history.packed(),
+        None if is_own(work.family) else history,
+    )
 
 
 def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:

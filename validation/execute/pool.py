@@ -83,8 +83,9 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
     except MemoryError:
         return Failure("out of memory")
     except Exception as error:  # a task of whatever kind must not end the run
-        reason = printable(f"{type(error).__name__}: {error}", 300)
-        return Failure(reason, traceback=traceback.format_exc())
+        return Failure(
+            printable(f"{type(error).__name__}: {error}", 300), traceback=traceback.format_exc()
+        )
 
 
 def cores() -> int:
@@ -240,8 +241,11 @@ class Pool:
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
         """Give out a call with a limit of `seconds`; `first`: others wait for it to compile."""
-        limit = None if seconds == math.inf else seconds
-        return [self._pool.schedule(call.function, args=call.arguments, timeout=limit)]
+        return [
+            self._pool.schedule(
+                call.function, args=call.arguments, timeout=None if seconds == math.inf else seconds
+            )
+        ]
 
     def _error(self, future: Future[Any]) -> BaseException | None:
         return future.exception()

@@ -46,17 +46,22 @@ def cell_key(
     tables = map(Path, [given] if isinstance(given, str) else given)
     # of a measured history, and of its events
     files = [file for table in tables for file in (table, events_path(table)) if file.is_file()]
-    depends = {
-        "scene": scene.model_dump(mode="json"),
-        "model": name,
-        "settings": dict(settings),
-        "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
-        "code": code_digest(home(name), search_path),
-        "libraries": {library: version_of(library) for library in family(name).libraries},
-        "python": platform.python_version(),
-        "machine": platform.machine(),
-    }
-    return digest(json.dumps(depends, sort_keys=True, default=str))
+    return digest(
+        json.dumps(
+            {
+                "scene": scene.model_dump(mode="json"),
+                "model": name,
+                "settings": dict(settings),
+                "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
+                "code": code_digest(home(name), search_path),
+                "libraries": {library: version_of(library) for library in family(name).libraries},
+                "python": platform.python_version(),
+                "machine": platform.machine(),
+            },
+            sort_keys=True,
+            default=str,
+        )
+    )
 
 
 def digest(text: str) -> str:
@@ -100,8 +105,12 @@ def _kept(module: str) -> Path:
         for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
             for source in sorted(folder.rglob("*.py")):
                 content.update(source.name.encode() + b"\0" + source.read_bytes())
-    cache = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
-    return cache / "rockcheck" / "code" / f"{content.hexdigest()[:32]}.txt"
+    return (
+        Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
+        / "rockcheck"
+        / "code"
+        / f"{content.hexdigest()[:32]}.txt"
+    )
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
@@ -138,26 +147,18 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     parts = name.split(".")
     # rockcheck's folders do not lie in each other
     for depth in range(min(2, len(parts)) if parts[0] == OWN_PACKAGE else 1, 0, -1):
-        if origin := _origin(".".join(parts[:depth]), search_path):
+        try:
+            spec = find_spec(".".join(parts[:depth]))
+        except (ModuleNotFoundError, ValueError):
+            continue
+        if spec is None and depth == 1:
+            spec = PathFinder.find_spec(parts[0], list(search_path))
+        if spec and spec.origin:
             if depth == len(parts):
-                return origin
-            base = origin.parent.joinpath(*parts[depth:])
+                return Path(spec.origin)
+            base = Path(spec.origin).parent.joinpath(*parts[depth:])
             return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
     return None
-
-
-def _origin(name: str, search_path: tuple[str, ...]) -> Path | None:
-    """The file of a package or module of the interpreter's path, or, at the top, of `search_path`.
-
-    None where there is none.
-    """
-    try:
-        spec = find_spec(name)
-    except (ModuleNotFoundError, ValueError):
-        return None
-    if spec is None and "." not in name:
-        spec = PathFinder.find_spec(name, list(search_path))
-    return Path(spec.origin) if spec and spec.origin else None
 
 
 def _imports(
@@ -210,8 +211,9 @@ def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
     libraries = {library for known in FAMILIES.values() for library in known.libraries}
     found = {name: version_of(name) for name in sorted(libraries | {"pandas"})}
-    own = {"rockcheck": version_of("rockcheck"), "python": platform.python_version()}
-    return own | {name: version for name, version in found.items() if version != "absent"}
+    return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {
+        name: version for name, version in found.items() if version != "absent"
+    }
 
 
 def hardware() -> dict[str, str]:

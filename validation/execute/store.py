@@ -78,8 +78,11 @@ class Store:
         """
         for suffix, content in files.items():
             write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
-        hashes = {suffix: _hash(content) for suffix, content in files.items()}
-        self.put_record(HISTORIES, name, {**record, "files": hashes})
+        self.put_record(
+            HISTORIES,
+            name,
+            {**record, "files": {suffix: _hash(content) for suffix, content in files.items()}},
+        )
         if history is not None:
             self._remember(name, history)
 
@@ -119,8 +122,11 @@ class Store:
 
     def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
         """Keep a result that is one record, such as a cell's figures."""
-        sealed = {"content": content, "sha256": _seal(name, content)}
-        text = json.dumps(sealed, sort_keys=True, separators=(",", ":"))
+        text = json.dumps(
+            {"content": content, "sha256": _seal(name, content)},
+            sort_keys=True,
+            separators=(",", ":"),
+        )
         write_whole(self.folder / kind / f"{name}.json", text + "\n")
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:

@@ -258,8 +258,10 @@ def moving_base(loose: Motion, light: Motion, falling: Motion) -> float:
     """
     t, x, pulse = loose.t, loose.x, 2.0 * math.pi / SHAKE.period
     base = SHAKE.amplitude / pulse * (t - np.sin(pulse * t) / pulse)
-    strayed = float(np.max(np.abs(x - x[0] + base))) / float(np.max(np.abs(base)))
-    return max(strayed, _apart(light.theta, falling.theta) / SLENDER.alpha)
+    return max(
+        float(np.max(np.abs(x - x[0] + base))) / float(np.max(np.abs(base))),
+        _apart(light.theta, falling.theta) / SLENDER.alpha,
+    )
 
 
 # Hand methods that are exact. Base motions 3 % below and 3 % above the threshold.

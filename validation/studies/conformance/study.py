@@ -450,13 +450,12 @@ def changes(before: Path, after: Path) -> Finding:
 
 def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
     path = path / "run.json" if path.is_dir() else path
-    data = read_json(path)
     try:
         return {
             (row["engine"], row["settings"], row["id"]): row
             | {name: row[name] and float(row[name]) for name in ("value", "limit")}
             | {name: str(row[name]) for name in ("name", "version", "verdict")}
-            for row in data["tables"]["rows"]
+            for row in read_json(path)["tables"]["rows"]
         }
     except (ValueError, KeyError, TypeError):
         raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None
@@ -476,8 +475,6 @@ def export(folder: Path) -> list[str]:
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
-            velocity = list(map(BaseMotion(scene).velocity, t.tolist()))
-            accelerations = (one.acceleration(t) for one in (scene.excitation, scene.vertical))
             write_whole(
                 folder / f"{name}-base.csv",
                 table_text(
@@ -488,7 +485,13 @@ def export(folder: Path) -> list[str]:
                         "x_acceleration_m_s2",
                         "y_acceleration_m_s2",
                     ),
-                    np.column_stack([t, velocity, *accelerations]).tolist(),
+                    np.column_stack(
+                        [
+                            t,
+                            list(map(BaseMotion(scene).velocity, t.tolist())),
+                            *(one.acceleration(t) for one in (scene.excitation, scene.vertical)),
+                        ]
+                    ).tolist(),
                 ),
             )
     scenes: list[dict[str, Any]] = [
@@ -707,8 +710,10 @@ class Tune(Task):
 
         def dropped(setting: float) -> tuple[float, float]:
             """Restitution of the rebound, and penetration, m."""
-            parameters = {"restitution": setting, "friction": friction}
-            heights = _played(model, drop, parameters, step)[:, 1] - SQUAT.half_height
+            heights = (
+                _played(model, drop, {"restitution": setting, "friction": friction}, step)[:, 1]
+                - SQUAT.half_height
+            )
             later = heights[int((math.sqrt(2.0 * DROP / G) + 0.02) / step) :]
             return math.sqrt(max(float(np.max(later)), 0.0) / DROP), -float(np.min(heights))
 

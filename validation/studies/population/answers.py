@@ -108,16 +108,6 @@ class Found:
         """All runs that count, with their case."""
         return [(case, run) for case, runs in self.runs.items() for run in runs]
 
-    @property
-    def failures(self) -> dict[str, str]:
-        """Why a run as it is failed, by case, and by the other model."""
-        runs = {case: one.runs[0] for case, one in self.shown.items()} | {
-            f"{case}, {model}": run
-            for model, others in self.others.items()
-            for case, run in others.items()
-        }
-        return {where: run.reason for where, run in runs.items() if run.reason}
-
     @cached_property
     def nominal(self) -> dict[str, Ran]:
         """By case, the run as it is, where it has a motion."""
@@ -157,31 +147,27 @@ class Found:
         }
 
 
+#: Of a question: its sentences, what `--json` says, and its blocks.
+Answer = tuple[list[str], dict[str, Any], list[Block]]
+
+
 def finding_of(found: Found) -> Finding:
     """All answers, and what `--json` says."""
     study, own, scene = found.study, found.own, found.study.own.scene
     at_levels, levels = found.levels
-    overturning, gaps = overturning_of(found.runs), gaps_of(found)
-    contributions, criteria = contributions_of(found), [*criteria_of(found)]
-    outcomes = {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES}
-    # by name, the spread of each of the four figures, and the case of the largest
-    quantities = {
-        q.name: {
-            "unit": q.unit,
-            **spread([value for value, _ in found.moved[q.name]]),
-            "record": max(found.moved[q.name], key=operator.itemgetter(0), default=(0.0, None))[1],
-            "of": len(found.moved[q.name]),
-        }
-        for q in QUANTITIES
-    }
-    numerical = numerical_of(found)
+    falls, outcomes, happens = _falls(found)
+    moves, quantities, (how_far, *strips) = _moves(found)
+    safe, gaps, gap_blocks = _gaps(found)
+    sure, numerical, certainty = _certainty(found)
+    change, contributions, shares = _contributions(found)
+    hand, criteria, methods = _by_hand(found)
     answers = {
-        "Does it fall?": [_fall(found, overturning)],
-        "How far does it move?": _move(quantities),
-        "Which gap is safe?": [*_safe_gap(gaps)],
+        "Does it fall?": falls,
+        "How far does it move?": moves,
+        "Which gap is safe?": safe,
         "At which intensity does it fall?": [at_levels],
-        "How sure is that?": [*_sure(found, numerical), *_change(found, contributions)],
-        "What do hand methods say?": _by_hand(criteria),
+        "How sure is that?": [*sure, *change],
+        "What do hand methods say?": hand,
     }
     blocks: list[Block] = [
         Table(
@@ -189,34 +175,15 @@ def finding_of(found: Found) -> Finding:
             [text("question"), text("answer")],
             [[one, " ".join(said) or ASKS.get(one, "")] for one, said in answers.items()],
         ),
-        Table(
-            "outcomes",
-            [
-                text("outcome"),
-                Column("runs"),
-                *(
-                    Column(name, label, kind="percent", digits=4)
-                    for name, label in zip(
-                        INTERVAL, ("probability", "95 % from", "to"), strict=True
-                    )
-                ),
-            ],
-            [
-                *([name, count, None, None, None] for name, count in outcomes.items() if count),
-                ["overturned", *overturning.values()],
-            ],
-            "What happens",
-            note="The interval is Wilson's; draws of one record count as one record.",
-            on="all" if len(found.each) > 1 else "file",
-        ),
-        _quantities(quantities, found),
-        _criteria(criteria),
-        *_strips(found),
-        *_gaps(gaps["gaps"]),
+        *happens,
+        how_far,
+        *methods,
+        *strips,
+        *gap_blocks,
         *levels,
-        _contributions(contributions, found),
+        *shares,
         *_models(found),
-        *_certainty(own, numerical),
+        *certainty,
         Table(
             "methods",
             [text("name", "method"), text("formula"), text("source"), text("holds", "range")],
@@ -226,46 +193,156 @@ def finding_of(found: Found) -> Finding:
             folded=True,
         ),
         *_histories(found),
-        _runs(found),
-        *_notes(found),
+        *_runs(found),
     ]
     data = {
         "scene": scene.name,
         "model": study.model,
         **(study.levels.data if study.levels else {}),
         "runs": len(found.each),
-        "outcomes": outcomes,
-        "overturning": overturning,
-        "quantities": quantities,
-        "motion": quantities,
+        **outcomes,
+        **quantities,
         **gaps,
         "numerical": {key: numerical[key] for key in ("converged", "quantities")},
-        "contributions": contributions,
-        "criteria": criteria,
+        **contributions,
+        **criteria,
         "left_out": list(study.left_out),
     }
     if not study.recorded:
         data |= numerical | {"inputs": own.inputs.model_dump() if own.inputs else None}
-    sure = study.recorded or numerical["converged"] or study.levels
+    decided = study.recorded or numerical["converged"] or study.levels
+    # as they are, by case, and by the other model
+    as_it_is = {case: one.runs[0] for case, one in found.shown.items()} | {
+        f"{case}, {model}": run
+        for model, others in found.others.items()
+        for case, run in others.items()
+    }
+    failures = {where: run.reason for where, run in as_it_is.items() if run.reason}
     return Finding(
         "assess",
         f"Assessment: {scene.name}",
         " ".join(said for question in LEADS for said in answers[question]),
         blocks,
         data,
-        exit_code=3 if found.failed or found.failures else int("" in found.sure and not sure),
-        failures=found.failures,
+        exit_code=3 if found.failed or failures else int("" in found.sure and not decided),
+        failures=failures,
         files={file_of(case): one.history for case, one in found.shown.items() if one.history},
     )
 
 
-def overturning_of(runs: Mapping[str, Sequence[Ran]]) -> dict[str, Any]:
-    """How many runs overturn, and the probability with its interval (`share_of`)."""
-    some = [each for each in runs.values() if each]
+def _falls(found: Found) -> Answer:
+    """How many runs end how, and the probability of overturning with its interval (`share_of`)."""
+    study, count, name = found.study, len(found.each), found.study.own.scene.name
+    some = [each for each in found.runs.values() if each]
     hits = np.array([[sum(run.fell for run in each)] for each in some]).reshape(-1, 1)
     decided = np.array([[len(each)] for each in some]).reshape(-1, 1)
     ends = np.clip(np.ravel(share_of(hits, decided) if some else [math.nan] * 3), 0.0, 1.0)
-    return {"count": int(hits.sum()), **dict(zip(INTERVAL, finite(ends.tolist()), strict=True))}
+    overturning: dict[str, Any] = {
+        "count": int(hits.sum()),
+        **dict(zip(INTERVAL, finite(ends.tolist()), strict=True)),
+    }
+    outcomes = {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES}
+    if count == 0:
+        said = f"{name}: no run has a result."
+    elif count == 1:
+        outcome = found.each[0][1].outcome
+        said = f"{name} {FATES.get(outcome, outcome.replace('overturned ', 'overturns to the '))}."
+    else:
+        under = f"{len(found.runs)} records" if study.recorded else "its own base motion"
+        draws = f", {count} runs," if count > len(found.runs) else ""
+        share, low, high = (f"{100.0 * overturning[key]:.3g} %" for key in INTERVAL)
+        said = (
+            f"{name} under {under}{draws} overturns in {overturning['count']} of {count}"
+            f" ({share}; 95 %: {low} to {high})."
+        )
+    table = Table(
+        "outcomes",
+        [
+            text("outcome"),
+            Column("runs"),
+            *(
+                Column(name, label, kind="percent", digits=4)
+                for name, label in zip(INTERVAL, ("probability", "95 % from", "to"), strict=True)
+            ),
+        ],
+        [
+            *([name, number, None, None, None] for name, number in outcomes.items() if number),
+            ["overturned", *overturning.values()],
+        ],
+        "What happens",
+        note="The interval is Wilson's; draws of one record count as one record.",
+        on="all" if count > 1 else "file",
+    )
+    return [said], {"outcomes": outcomes, "overturning": overturning}, [table]
+
+
+def _moves(found: Found) -> Answer:
+    """The spread of each of the four figures of the runs that stand, and the largest's case."""
+    quantities: dict[str, Any] = {
+        q.name: {
+            "unit": q.unit,
+            **spread([value for value, _ in found.moved[q.name]]),
+            "record": max(found.moved[q.name], key=operator.itemgetter(0), default=(0.0, None))[1],
+            "of": len(found.moved[q.name]),
+        }
+        for q in QUANTITIES
+    }
+    shown = [q for q in QUANTITIES if quantities[q.name]["of"]]
+    told = [
+        f"{q.label} {quantities[q.name]['largest']:.3g} {UNITS.get(q.unit, q.unit)}" for q in shown
+    ]
+    several = len(found.shown) > 1 or bool(found.drawn)
+    columns = [
+        text("quantity", "how far it moves"),
+        *(
+            Column(name, label, digits=4, brief=several)
+            for name, label in (("median", ""), ("p16", "16 %"), ("p84", "84 %"))
+        ),
+        Column("largest", "largest" if several else "value", digits=4),
+        text("unit"),
+        text("record", "its record", brief=several),
+        Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
+    ]
+    strips = [
+        {
+            "label": f"{q.label}, {UNITS.get(q.unit, q.unit)}",
+            "values": [value for value, _ in found.moved[q.name]],
+        }
+        for q in shown
+        if quantities[q.name]["of"] > 1
+    ]
+    blocks: list[Block] = [
+        Table(
+            "quantities",
+            columns,
+            [
+                [
+                    q.label,
+                    *(
+                        UNITS.get(q.unit, q.unit)
+                        if c.name == "unit"
+                        else quantities[q.name][c.name]
+                        for c in columns[1:]
+                    ),
+                ]
+                for q in shown
+            ],
+            note="; ".join(f"{q.label}: {q.help}" for q in shown) + ".",
+            on="all" if shown else "file",
+        ),
+        Plot(
+            "motion",
+            "How far each run moves",
+            kind="strips",
+            data=strips,
+            note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
+        ),
+    ]
+    return (
+        [f"Where it stands, at most: {', '.join(told)}."] if told else [],
+        {"quantities": quantities, "motion": quantities},
+        blocks if strips else blocks[:1],
+    )
 
 
 def gaps_of(found: Found) -> dict[str, Any]:
@@ -289,9 +366,9 @@ def gaps_of(found: Found) -> dict[str, Any]:
                 "wall_speed": {key: speed[key] for key in ("median", "largest")},
             }
         )
+    fallen = [row["overturned"] for row in rows]
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
     reaches = (run.reach[side] for run in found.free for side in found.study.sides)
-    fallen = [row["overturned"] for row in rows]
     return {
         "gaps": rows,
         "clearance": max(reaches, default=None),
@@ -299,6 +376,74 @@ def gaps_of(found: Found) -> dict[str, Any]:
         "none_overturns_up_to": max((row["gap"] for row in safe), default=None),
         "monotonic": fallen == sorted(fallen),
     }
+
+
+def _gaps(found: Found) -> Answer:
+    """Which gap is safe, with the wall and without."""
+    data, said, blocks = gaps_of(found), [], list[Block]()
+    rows, safe, free = (data[key] for key in ("gaps", "none_overturns_up_to", "free_overturned"))
+    if rows:
+        said.append(
+            f"None overturns up to a gap of {safe:g} m."
+            if safe is not None
+            else f"Some overturn already at the smallest gap, {rows[0]['gap']:g} m."
+        )
+        blocks = _over_gaps([row | row["wall_speed"] for row in rows])
+    if not data["monotonic"]:
+        said.append("A larger gap is not always worse: see each.")
+    if data["clearance"] is not None:
+        falls = f"; {free} run{'s overturn' if free > 1 else ' overturns'}" if free else ""
+        said.append(f"Without the wall the largest reach is {data['clearance']:.3g} m{falls}.")
+    return said, data, blocks
+
+
+def _over_gaps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
+    across = [row["gap"] for row in rows]
+    return [
+        Plot(
+            "gaps",
+            "Which gap is safe",
+            panels=[
+                Panel(
+                    "share of the runs",
+                    [
+                        Series(name, across, [row[name] / row["runs"] for row in rows])
+                        for name in ("struck", "overturned")
+                    ],
+                ),
+                Panel(
+                    "speed at the wall, m/s",
+                    [
+                        Series(name, across, [row[name] for row in rows])
+                        for name in ("median", "largest")
+                    ],
+                ),
+            ],
+            x=Axis("clear gap, m"),
+            shared=False,
+        ),
+        Table(
+            "gaps",
+            [
+                Column("gap", "clear gap", "m"),
+                Column("runs"),
+                Column("overturned"),
+                Column("struck"),
+                Column("median", "speed, median", "m/s"),
+                Column("largest", "largest", "m/s"),
+            ],
+            [
+                [
+                    row["gap"],
+                    row["runs"],
+                    Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
+                    *(row[name] for name in ("struck", "median", "largest")),
+                ]
+                for row in rows
+            ],
+            note="Runs that strike the wall, also those that then overturn.",
+        ),
+    ]
 
 
 def contributions_of(found: Found) -> list[dict[str, Any]]:
@@ -309,12 +454,15 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
     forms = dict(found.apart)
     laws = forms.pop(LAW, ())
     peaks = [[run.peak for run in runs] for runs in found.runs.values() if runs]
-    own = found.own.inputs.figures[:1] if found.own.inputs else ()
+    inputs = found.own.inputs
     squares: dict[str, list[float]] = {
         "records": [float(np.var(list(map(np.mean, peaks)), ddof=1))] if len(peaks) > 1 else [],
         "inputs": [
             *(float(np.var(some)) for some in peaks if found.drawn),
-            *(((peak.high - peak.low) / (2.0 * WIDTH)) ** 2 for peak in own),
+            *(
+                ((peak.high - peak.low) / (2.0 * WIDTH)) ** 2
+                for peak in (inputs.figures[:1] if inputs else ())
+            ),
         ],
         STEPS: _by_steps(found),
         LAW: [(0.5 * difference) ** 2 for difference in laws],
@@ -328,6 +476,39 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
     ]
 
 
+def _contributions(found: Found) -> Answer:
+    """Where the uncertainty of the peak rotation comes from, and what would change the answer.
+
+    Nothing is said where no numerical error is known.
+    """
+    rows, inputs, said = contributions_of(found), found.own.inputs, list[str]()
+    known = [row["source"] for row in rows]
+    if rows and rows[0]["sd"] > MOVED and not (found.judged and STEPS not in known):
+        most = inputs.sensitivities[0].name if inputs and inputs.sensitivities else _leading(found)
+        what = CONTRIBUTIONS[rows[0]["source"]][-1].format(most)
+        said = [f"{what[0].upper()}{what[1:]} would change the answer most."]
+    asked = {STEPS: "no run is converged"} if found.judged else {}
+    missing = [
+        f"{name} ({asked.get(name, asks)})"
+        for name, (_, asks, _) in CONTRIBUTIONS.items()
+        if name not in known
+    ]
+    table = Table(
+        "contributions",
+        [
+            text("source"),
+            Column("share", kind="percent", digits=3),
+            Column("sd", "standard deviation", "α"),
+            text("what", "what it is", brief=False),
+        ],
+        [[row["source"], row["share"], row["sd"], CONTRIBUTIONS[row["source"]][0]] for row in rows],
+        "How sure",
+        note="Of the variance of the peak rotation; a block that falls counts as 1 α."
+        + (f" Not known: {', '.join(missing)}." if missing else ""),
+    )
+    return said, {"contributions": rows}, [table]
+
+
 def _by_steps(found: Found) -> list[float]:
     """Variances of the peak by the step or tolerance; a block that falls has the peak 1."""
     fallen = {
@@ -338,6 +519,19 @@ def _by_steps(found: Found) -> list[float]:
         for case, numerical in found.judged.items()
     ]
     return [(error / WIDTH) ** 2 for error in errors if error is not None]
+
+
+def _leading(found: Found) -> str:
+    """The number that was drawn with which the peak correlates most, within the cases."""
+    whole = [runs for runs in found.drawn.values() if not any(run.reason for run in runs)]
+    if not whole:
+        return "the uncertain numbers"
+    peaks = np.array([[run.peak for run in runs] for runs in whole])
+    peaks -= peaks.mean(axis=1, keepdims=True)
+    numbers = np.array([[value for _, value in draw] for draw in found.study.draws])
+    numbers -= numbers.mean(axis=0)
+    covariances = np.abs(peaks.sum(axis=0) @ numbers)
+    return found.study.draws[0][np.argmax(covariances / np.linalg.norm(numbers, axis=0))][0]
 
 
 def numerical_of(found: Found) -> dict[str, Any]:
@@ -362,6 +556,83 @@ def numerical_of(found: Found) -> dict[str, Any]:
         if numerical
         else "a model without step or tolerance; its numerical error is not known",
     }
+
+
+def _certainty(found: Found) -> Answer:
+    """How sure the scene's own figures are: of the step, the law of impacts, the inputs."""
+    (numerical, parts, inputs), data = (value for _, value in found.own), numerical_of(found)
+    blocks: list[Block] = []
+    if numerical:
+        columns = [
+            text("name", "quantity"),
+            *(Column(name, name, digits=4) for name in ("value", "u_num", "order")),
+            text("unit"),
+            text("verdict"),
+        ]
+        blocks += [
+            Table(
+                "numerical",
+                columns,
+                [[one[column.name] for column in columns] for one in data["quantities"]],
+                "Numerical uncertainty under the scene's own motion",
+                f"{data['scene']}, {data['model']}.",
+                folded=True,
+            ),
+            Text(items=numerical.reasons),
+        ]
+    if parts is not None:
+        blocks.append(
+            Text(
+                f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)",
+                verdict="changed",
+            )
+        )
+    if inputs:
+        blocks += [
+            Table(
+                "inputs",
+                [
+                    text("figure"),
+                    *(Column(name, digits=4) for name in ("value", "low", "high")),
+                    text("unit"),
+                ],
+                [
+                    [one.name, one.value, one.low, one.high, one.unit]
+                    for one in (*inputs.figures, inputs.overturns)
+                ],
+                "Uncertain inputs",
+                note=f"{inputs.samples} draws of {', '.join(inputs.names)}, played by"
+                f" {inputs.model}; 95 % of them between low and high.",
+            ),
+            Table(
+                "sensitivities",
+                [
+                    text("input", "what matters most for the peak"),
+                    Column("alone", kind="percent", digits=2),
+                    Column("with_others", kind="percent", digits=2),
+                ],
+                [
+                    [one.name, max(one.first, 0.0), max(one.total, 0.0)]
+                    for one in inputs.sensitivities
+                ],
+                on="all" if inputs.sensitivities else "file",
+            ),
+            Text(inputs.note),
+        ]
+    return _sure(found, data["converged"]), data, blocks
+
+
+def _sure(found: Found, converged: bool) -> list[str]:
+    if found.study.recorded:
+        judged = [one.converged for one in found.judged.values()]
+        laws = sum(
+            one.depends_on_law_from_s is not None for case, one in found.sure.items() if case
+        )
+        said = f"{sum(judged)} of {len(judged)} runs are numerically converged."
+        return [said, f"The law of impacts matters in {laws}."] if laws else [said]
+    if found.own.numerical is None:
+        return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
+    return ["Numerically converged." if converged else "Not converged: no figure of it is sure."]
 
 
 #: The event of a hand method: the figure of a run, its unit, and above what it happens.
@@ -396,226 +667,46 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
         }
 
 
-# The sentences.
-
-
-def _fall(found: Found, overturning: Mapping[str, Any]) -> str:
-    study, count = found.study, len(found.each)
-    name = study.own.scene.name
-    if count == 0:
-        return f"{name}: no run has a result."
-    if count == 1:
-        outcome = found.each[0][1].outcome
-        return f"{name} {FATES.get(outcome, outcome.replace('overturned ', 'overturns to the '))}."
-    under = f"{len(found.runs)} records" if study.recorded else "its own base motion"
-    draws = f", {count} runs," if count > len(found.runs) else ""
-    share, low, high = (f"{100.0 * overturning[key]:.3g} %" for key in INTERVAL)
-    return (
-        f"{name} under {under}{draws} overturns in {overturning['count']} of {count}"
-        f" ({share}; 95 %: {low} to {high})."
-    )
-
-
-def _move(quantities: Mapping[str, Any]) -> list[str]:
+def _by_hand(found: Found) -> Answer:
+    """In how many runs it overturns by hand methods, and how they agree with the simulation."""
+    rows = [*criteria_of(found)]
     told = [
-        f"{q.label} {largest:.3g} {UNITS.get(q.unit, q.unit)}"
-        for q in QUANTITIES
-        if (largest := quantities[q.name]["largest"]) is not None
-    ]
-    return [f"Where it stands, at most: {', '.join(told)}."] if told else []
-
-
-def _by_hand(criteria: Sequence[Mapping[str, Any]]) -> list[str]:
-    said = [
         f"{row['name']} in {row['predicts']} of {row['of']}"
-        for row in criteria
+        for row in rows
         if row["event"] == "overturns" and row["of"]
     ]
-    return [f"Hand methods let it overturn: {', '.join(said)}."] if said else []
-
-
-def _safe_gap(gaps: Mapping[str, Any]) -> Iterator[str]:
-    safe, fallen = gaps["none_overturns_up_to"], gaps["free_overturned"]
-    if gaps["gaps"]:
-        yield (
-            f"None overturns up to a gap of {safe:g} m."
-            if safe is not None
-            else f"Some overturn already at the smallest gap, {gaps['gaps'][0]['gap']:g} m."
-        )
-    if not gaps["monotonic"]:
-        yield "A larger gap is not always worse: see each."
-    if gaps["clearance"] is not None:
-        falls = f"; {fallen} run{'s overturn' if fallen > 1 else ' overturns'}" if fallen else ""
-        yield f"Without the wall the largest reach is {gaps['clearance']:.3g} m{falls}."
-
-
-def _sure(found: Found, numerical: Mapping[str, Any]) -> list[str]:
-    if found.study.recorded:
-        judged = [one.converged for one in found.judged.values()]
-        laws = sum(
-            one.depends_on_law_from_s is not None for case, one in found.sure.items() if case
-        )
-        said = f"{sum(judged)} of {len(judged)} runs are numerically converged."
-        return [said, f"The law of impacts matters in {laws}."] if laws else [said]
-    if found.own.numerical is None:
-        return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
-    return [
-        "Numerically converged."
-        if numerical["converged"]
-        else "Not converged: no figure of it is sure."
-    ]
-
-
-def _change(found: Found, contributions: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What would change the answer; nothing is said where no numerical error is known."""
-    unsure = found.judged and STEPS not in [row["source"] for row in contributions]
-    if unsure or not contributions or contributions[0]["sd"] <= MOVED:
-        return []
-    inputs = found.own.inputs
-    most = inputs.sensitivities[0].name if inputs and inputs.sensitivities else _leading(found)
-    said = CONTRIBUTIONS[contributions[0]["source"]][-1].format(most)
-    return [f"{said[0].upper()}{said[1:]} would change the answer most."]
-
-
-def _leading(found: Found) -> str:
-    """The number that was drawn with which the peak correlates most, within the cases."""
-    whole = [runs for runs in found.drawn.values() if not any(run.reason for run in runs)]
-    if not whole:
-        return "the uncertain numbers"
-    peaks = np.array([[run.peak for run in runs] for runs in whole])
-    peaks -= peaks.mean(axis=1, keepdims=True)
-    numbers = np.array([[value for _, value in draw] for draw in found.study.draws])
-    numbers -= numbers.mean(axis=0)
-    covariances = np.abs(peaks.sum(axis=0) @ numbers)
-    return found.study.draws[0][np.argmax(covariances / np.linalg.norm(numbers, axis=0))][0]
-
-
-# The blocks.
-
-
-def _quantities(quantities: Mapping[str, Any], found: Found) -> Table:
-    several = len(found.shown) > 1 or bool(found.drawn)
-    columns = [
-        text("quantity", "how far it moves"),
-        *(
-            Column(name, label, digits=4, brief=several)
-            for name, label in (("median", ""), ("p16", "16 %"), ("p84", "84 %"))
-        ),
-        Column("largest", "largest" if several else "value", digits=4),
-        text("unit"),
-        text("record", "its record", brief=several),
-        Column("of", "of runs that stand", help="Runs that have the figure.", brief=several),
-    ]
-    shown = [q for q in QUANTITIES if quantities[q.name]["of"]]
-    rows = [
+    table = Table(
+        "criteria",
         [
-            q.label,
-            *(
-                UNITS.get(q.unit, q.unit) if c.name == "unit" else quantities[q.name][c.name]
-                for c in columns[1:]
-            ),
-        ]
-        for q in shown
-    ]
-    return Table(
-        "quantities",
-        columns,
-        rows,
-        note="; ".join(f"{q.label}: {q.help}" for q in shown) + ".",
-        on="all" if rows else "file",
-    )
-
-
-def _strips(found: Found) -> Iterator[Block]:
-    strips = [
-        {
-            "label": f"{q.label}, {UNITS.get(q.unit, q.unit)}",
-            "values": [value for value, _ in found.moved[q.name]],
-        }
-        for q in QUANTITIES
-        if len(found.moved[q.name]) > 1
-    ]
-    if strips:
-        yield Plot(
-            "motion",
-            "How far each run moves",
-            kind="strips",
-            data=strips,
-            note="A point a run that stands; the bar goes from 16 to 84 %, its line is the median.",
-        )
-
-
-def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Iterator[Block]:
-    rows = [row | row["wall_speed"] for row in gaps]
-    across = [row["gap"] for row in rows]
-    if gaps:
-        yield Plot(
-            "gaps",
-            "Which gap is safe",
-            panels=[
-                Panel(
-                    "share of the runs",
-                    [
-                        Series(name, across, [row[name] / row["runs"] for row in rows])
-                        for name in ("struck", "overturned")
-                    ],
-                ),
-                Panel(
-                    "speed at the wall, m/s",
-                    [
-                        Series(name, across, [row[name] for row in rows])
-                        for name in ("median", "largest")
-                    ],
-                ),
-            ],
-            x=Axis("clear gap, m"),
-            shared=False,
-        )
-        yield Table(
-            "gaps",
-            [
-                Column("gap", "clear gap", "m"),
-                Column("runs"),
-                Column("overturned"),
-                Column("struck"),
-                Column("median", "speed, median", "m/s"),
-                Column("largest", "largest", "m/s"),
-            ],
-            [
-                [
-                    row["gap"],
-                    row["runs"],
-                    Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
-                    *(row[name] for name in ("struck", "median", "largest")),
-                ]
-                for row in rows
-            ],
-            note="Runs that strike the wall, also those that then overturn.",
-        )
-
-
-def _contributions(contributions: Sequence[Mapping[str, Any]], found: Found) -> Table:
-    """Where the uncertainty of the peak rotation comes from."""
-    known_of = {row["source"]: row for row in contributions}
-    asked = {STEPS: "no run is converged"} if found.judged else {}
-    missing = [
-        f"{name} ({asked.get(name, asks)})"
-        for name, (_, asks, _) in CONTRIBUTIONS.items()
-        if name not in known_of
-    ]
-    return Table(
-        "contributions",
-        [
-            text("source"),
-            Column("share", kind="percent", digits=3),
-            Column("sd", "standard deviation", "α"),
-            text("what", "what it is", brief=False),
+            text("name", "method"),
+            text("event", "it"),
+            Column("predicts", "says"),
+            Column("simulated", "is"),
+            Column("agrees"),
+            Column("estimate", help="Median of what it estimates."),
+            Column("motion", help="Median of the simulated motion."),
+            text("unit"),
+            Column("unsafe", help="Runs that moved farther than estimated."),
         ],
-        [[name, row["share"], row["sd"], CONTRIBUTIONS[name][0]] for name, row in known_of.items()],
-        "How sure",
-        note="Of the variance of the peak rotation; a block that falls counts as 1 α."
-        + (f" Not known: {', '.join(missing)}." if missing else ""),
+        [
+            [
+                *(row["name"], row["event"], f"{row['predicts']} of {row['of']}"),
+                *(row["simulated"], row["agrees"], row["estimate"]),
+                *(
+                    (None, "")
+                    if row["unsafe"] is None
+                    else (row["motion"], UNITS.get(row["unit"], row["unit"]))
+                ),
+                Mark(row["unsafe"], "changed" if row["unsafe"] else ""),
+            ]
+            for row in rows
+        ],
+        "What hand methods say",
+        note="Estimates to be judged, not judges: in how many runs it happens by the method and by"
+        " the simulation, and in how many both agree; medians of estimate and motion.",
     )
+    said = [f"Hand methods let it overturn: {', '.join(told)}."] if told else []
+    return said, {"criteria": rows}, [table]
 
 
 def _models(found: Found) -> Iterator[Block]:
@@ -651,112 +742,6 @@ def _models(found: Found) -> Iterator[Block]:
             f"Differences in peak rotation from {found.study.model}.",
             folded=True,
         )
-
-
-def _criteria(criteria: Sequence[Mapping[str, Any]]) -> Table:
-    columns = [
-        text("name", "method"),
-        text("event", "it"),
-        Column("predicts", "says"),
-        Column("simulated", "is"),
-        Column("agrees"),
-        Column("estimate", help="Median of what it estimates."),
-        Column("motion", help="Median of the simulated motion."),
-        text("unit"),
-        Column("unsafe", help="Runs that moved farther than estimated."),
-    ]
-    shown = [
-        {
-            **row,
-            "motion": None if row["unsafe"] is None else row["motion"],
-            "unit": "" if row["unsafe"] is None else UNITS.get(row["unit"], row["unit"]),
-            "predicts": f"{row['predicts']} of {row['of']}",
-            "unsafe": Mark(row["unsafe"], "changed" if row["unsafe"] else ""),
-        }
-        for row in criteria
-    ]
-    return Table(
-        "criteria",
-        columns,
-        [[row[column.name] for column in columns] for row in shown],
-        "What hand methods say",
-        note="Estimates to be judged, not judges: in how many runs it happens by the method and by"
-        " the simulation, and in how many both agree; medians of estimate and motion.",
-    )
-
-
-def _runs(found: Found) -> Table:
-    return Table(
-        "runs",
-        [
-            text("record" if found.study.recorded else "scene"),
-            text("outcome"),
-            *(Column(q.name, q.label, UNITS.get(q.unit, q.unit)) for q in QUANTITIES),
-        ],
-        [
-            [
-                Mark(case, link=file_of(case) if played.history else ""),
-                played.runs[0].outcome or "failed",
-                *(getattr(played.runs[0].motion, q.name, None) for q in QUANTITIES),
-            ]
-            for case, played in found.shown.items()
-        ],
-        "Each run",
-        on="page",
-        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows. Of a block"
-        " that falls only the speed at the wall is given.",
-    )
-
-
-def _certainty(own: Sure, numerical: Mapping[str, Any]) -> Iterator[Block]:
-    if own.numerical:
-        columns = [
-            text("name", "quantity"),
-            *(Column(name, name, digits=4) for name in ("value", "u_num", "order")),
-            text("unit"),
-            text("verdict"),
-        ]
-        yield Table(
-            "numerical",
-            columns,
-            [[one[column.name] for column in columns] for one in numerical["quantities"]],
-            "Numerical uncertainty under the scene's own motion",
-            f"{numerical['scene']}, {numerical['model']}.",
-            folded=True,
-        )
-        yield Text(items=own.numerical.reasons)
-    if (parts := numerical["depends_on_law_from_s"]) is not None:
-        yield Text(
-            f"from {parts:.3g} s on the motion depends on the law of impacts (docs, limits)",
-            verdict="changed",
-        )
-    if inputs := own.inputs:
-        yield Table(
-            "inputs",
-            [
-                text("figure"),
-                *(Column(name, digits=4) for name in ("value", "low", "high")),
-                text("unit"),
-            ],
-            [
-                [one.name, one.value, one.low, one.high, one.unit]
-                for one in (*inputs.figures, inputs.overturns)
-            ],
-            "Uncertain inputs",
-            note=f"{inputs.samples} draws of {', '.join(inputs.names)}, played by {inputs.model};"
-            " 95 % of them between low and high.",
-        )
-        yield Table(
-            "sensitivities",
-            [
-                text("input", "what matters most for the peak"),
-                Column("alone", kind="percent", digits=2),
-                Column("with_others", kind="percent", digits=2),
-            ],
-            [[one.name, max(one.first, 0.0), max(one.total, 0.0)] for one in inputs.sensitivities],
-            on="all" if inputs.sensitivities else "file",
-        )
-        yield Text(inputs.note)
 
 
 def _histories(found: Found) -> list[Block]:
@@ -809,18 +794,40 @@ def file_of(case: str) -> str:
     return f"histories/{case.replace(' ', '~')}.csv"
 
 
-def _notes(found: Found) -> list[Block]:
+def _runs(found: Found) -> Iterator[Block]:
+    """Each case as it is, and what is to be known about all of them."""
     study, drawn = found.study, found.drawn
+    yield Table(
+        "runs",
+        [
+            text("record" if study.recorded else "scene"),
+            text("outcome"),
+            *(Column(q.name, q.label, UNITS.get(q.unit, q.unit)) for q in QUANTITIES),
+        ],
+        [
+            [
+                Mark(case, link=file_of(case) if played.history else ""),
+                played.runs[0].outcome or "failed",
+                *(getattr(played.runs[0].motion, q.name, None) for q in QUANTITIES),
+            ]
+            for case, played in found.shown.items()
+        ],
+        "Each run",
+        on="page",
+        note=f"Each name leads to the run's history as CSV, in at most {MOST_ROWS} rows. Of a block"
+        " that falls only the speed at the wall is given.",
+    )
     beyond: dict[str, list[str]] = {}
     for case, one in study.cases.items():
         for line in outside(one.scene):
             beyond.setdefault(line, []).append(case)
     without = ", ".join(case for case in study.cases if drawn and case not in drawn)
-    others = found.at_gaps or drawn
+
     names = ", ".join(next(iter(study.cases.values())).names)
     told = {
         f"left out, since not all of its draws were played: {without}": without,
-        f"gaps and draws are played by {study.swift}": study.model != study.swift and others,
+        f"gaps and draws are played by {study.swift}": study.model != study.swift
+        and (found.at_gaps or drawn),
         f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them": names
         and not drawn
         and study.recorded,
@@ -833,7 +840,8 @@ def _notes(found: Found) -> list[Block]:
         ),
         *(line for line, holds in told.items() if holds),
     ]
-    return [Text(items=said, title="Notes", on="page")] if said else []
+    if said:
+        yield Text(items=said, title="Notes", on="page")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -851,7 +859,6 @@ class Assessment(Asked):
             for part, tasks in self.parts.items()
         }
         drawn = {case: _runs_of(tasks, ended) for case, tasks in self.parts["drawn"].items()}
-        count = len(self.draws)
         at_gaps = {
             gap: [
                 run for tasks in cases.values() for run in _runs_of(tasks, ended) if not run.reason
@@ -862,7 +869,9 @@ class Assessment(Asked):
             Found(
                 study=self,
                 shown=first["shown"],
-                drawn={case: some for case, some in drawn.items() if len(some) == count > 0},
+                drawn={
+                    case: some for case, some in drawn.items() if len(some) == len(self.draws) > 0
+                },
                 free=at_gaps.pop(math.inf, []),
                 at_gaps={gap: some for gap, some in at_gaps.items() if some},
                 others={

@@ -230,10 +230,6 @@ class Asked(Study):
     ) -> dict[str, list[Task]]:
         """By case, runs as tasks of at most `MOST_RUNS`; those of the case as it is are `shown`."""
         given = self.settings.get(model, {}) if settings is None else settings
-        parts = [
-            tuple(variants[first : first + MOST_RUNS])
-            for first in range(0, len(variants), MOST_RUNS)
-        ]
         return {
             case: [
                 Run(
@@ -246,7 +242,10 @@ class Asked(Study):
                     where=self._where,
                     **effort(model, given, len(part)),
                 )
-                for part in parts
+                for part in [
+                    tuple(variants[first : first + MOST_RUNS])
+                    for first in range(0, len(variants), MOST_RUNS)
+                ]
             ]
             for case, one in self.cases.items()
         }
@@ -255,8 +254,11 @@ class Asked(Study):
     def _where(self) -> Literal["worker", "here"]:
         """In this process where all of it takes less than a worker needs to start."""
         runs = len(self.cases) * (6 + len(self.draws)) * (1 + len(self.gaps))
-        fast = all(family(model).compiled for model in self.models)
-        return "here" if fast and runs * A_RUN < SOON else "worker"
+        return (
+            "here"
+            if all(family(model).compiled for model in self.models) and runs * A_RUN < SOON
+            else "worker"
+        )
 
     @cached_property
     def at_gaps(self) -> dict[float, dict[str, list[Task]]]:
@@ -277,8 +279,11 @@ class Asked(Study):
         "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
         among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
         """
-        walled = self.model == SWIFT and self.own.scene.walls
-        law = {LAW: self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)} if walled else {}
+        law = (
+            {LAW: self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)}
+            if self.model == SWIFT and self.own.scene.walls
+            else {}
+        )
         settings = self.settings.get(self.model, {})
         drawn = bool(self.samples) and not self.recorded
         return {

@@ -201,7 +201,7 @@ def blocks_of(
         Column("motions", brief=False),
         Column("undecided", "undecided runs", brief=False),
     ]
-    unit = [other["other_unit"]] if other else []
+
     series = []
     for one in curves:
         level, share, low, high, fit = zip(*one.points, strict=True)
@@ -223,7 +223,14 @@ def blocks_of(
         ),
         Table(
             "fits",
-            [*columns, *(Column(f"median_{one}", "median", one) for one in unit)],
+            [
+                *columns,
+                *(
+                    [Column(f"median_{other['other_unit']}", "median", other["other_unit"])]
+                    if other
+                    else []
+                ),
+            ],
             [
                 [
                     *(getattr(one, "label" if c.name == "case" else c.name) for c in columns),

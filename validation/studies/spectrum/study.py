@@ -51,12 +51,14 @@ LAWS = (
 )
 
 
-@dataclass
-class _Found:
-    spectra: dict[Panel, Spectrum] = field(default_factory=dict)
-    motions: dict[Panel, tiles.Played] = field(default_factory=dict)
-    paper: measures.Paper | None = None
-    agreement: Mapping[str, Any] | None = None
+#: Of a book's nodes: spectra and motions by panel, what the paper's sentences ask for, and the
+#: agreement of the other models.
+_Found = tuple[
+    dict[Panel, Spectrum],
+    dict[Panel, tiles.Played],
+    measures.Paper | None,
+    agreement.Agreement | None,
+]
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,8 @@ class Spectra(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The complete spectra, and the findings from them."""
-        found = self._found(tiles.Book(done))
-        panels, spectra = list(found.spectra), list(found.spectra.values())
+        by_panel, motions, paper, compared = self._found(tiles.Book(done))
+        panels, spectra = list(by_panel), list(by_panel.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
         answer = (
             f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
@@ -97,19 +99,18 @@ class Spectra(Study):
         laws = any(one.depends_on_law is not None for one in spectra)
         blocks: list[Block] = [
             Text(ABOUT, on="page"),
-            *self._figures(found),
-            self._shares(found.spectra, laws),
+            *self._figures(by_panel, motions),
+            self._shares(by_panel, laws),
             *([Text(LAWS, on="page")] if laws else ()),
         ]
-        if found.paper:
-            claims = measures.claims_of(found.paper)
+        if paper:
+            claims = measures.claims_of(paper)
             tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
                 f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
             )
-            blocks += measures.blocks(found.paper, claims)
-        compared = found.agreement
+            blocks += measures.blocks(paper, claims)
         if self._papers and not self.compared:
             compared, panels = read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
@@ -126,7 +127,7 @@ class Spectra(Study):
             },
             files={
                 f"{self._stem(panel)}.{kind}": write(one, self._about(panel, one))
-                for panel, one in found.spectra.items()
+                for panel, one in by_panel.items()
                 for kind, write in (("csv", _csv), ("npz", _npz))
             },
             exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
@@ -145,21 +146,25 @@ class Spectra(Study):
 
     def _found(self, book: tiles.Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
-        found, fast = _Found(), compiled(build(self.request.model, self.request.settings))
+        spectra: dict[Panel, Spectrum] = {}
+        motions: dict[Panel, tiles.Played] = {}
+        fast = compiled(build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         for panel in self.panels:
             one = self._spectrum(book, panel)
             nodes = self._nodes(panel.scene, i.ravel(), j.ravel(), "motions") if fast else []
-            (found.motions[panel],) = book.ask(nodes) or [tiles.Played()]
+            (motions[panel],) = book.ask(nodes) or [tiles.Played()]
             if one is not None:
-                found.spectra[panel] = one
-        if len(found.spectra) < len(self.panels):
-            return found
-        if self._papers:
-            found.paper = self._paper(book, list(found.spectra.values()))
-        if self.compared:
-            found.agreement = agreement.agree(book, found.spectra, self.request, self.compared)
-        return found
+                spectra[panel] = one
+        whole = len(spectra) == len(self.panels)
+        return (
+            spectra,
+            motions,
+            self._paper(book, list(spectra.values())) if whole and self._papers else None,
+            agreement.agree(book, spectra, self.request, self.compared)
+            if whole and self.compared
+            else None,
+        )
 
     def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
@@ -247,10 +252,12 @@ class Spectra(Study):
             "Shares of outcomes",
         )
 
-    def _figures(self, found: _Found) -> Iterator[Plot]:
+    def _figures(
+        self, spectra: Mapping[Panel, Spectrum], motions: Mapping[Panel, tiles.Played]
+    ) -> Iterator[Plot]:
         request = self.request
-        for number in dict.fromkeys(panel.figure for panel in found.spectra):
-            mine = [panel for panel in found.spectra if panel.figure == number]
+        for number in dict.fromkeys(panel.figure for panel in spectra):
+            mine = [panel for panel in spectra if panel.figure == number]
             first = mine[0]
             yield Plot(
                 self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
@@ -265,7 +272,7 @@ class Spectra(Study):
                     "amplitudes": request.amplitudes.tolist(),
                     "record": first.scene.excitation.kind == "record",
                     "pulse": _pulse(first, request),
-                    "panels": [self._panel(panel, found.spectra[panel], found) for panel in mine],
+                    "panels": [self._panel(one, spectra[one], motions[one]) for one in mine],
                     "height": 4.0,
                 },
                 played=[
@@ -273,14 +280,14 @@ class Spectra(Study):
                         "block": [panel.scene.block.half_width, panel.scene.block.half_height],
                         "alpha": panel.scene.block.alpha,
                         "walls": [{"side": w.side, "gap": w.gap} for w in panel.scene.walls],
-                        "ends": found.motions[panel].ends,
-                        "rows": found.motions[panel].rows,
+                        "ends": motions[panel].ends,
+                        "rows": motions[panel].rows,
                     }
                     for panel in mine
                 ],
             )
 
-    def _panel(self, panel: Panel, one: Spectrum, found: _Found) -> dict[str, Any]:
+    def _panel(self, panel: Panel, one: Spectrum, motions: tiles.Played) -> dict[str, Any]:
         wall, spread = panel.wall, _spread(self.request.size)
         place = [0, 4, 0] if panel.figure is None else [1, 2, 0]
         if panel.figure is not None and wall:
@@ -293,7 +300,7 @@ class Spectra(Study):
             "place": place,
             "nodes": [
                 [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
-                for n in found.motions[panel].played
+                for n in motions.played
             ],
         }
 

@@ -157,8 +157,11 @@ def _motions(found: Sequence[Motion | None]) -> Played:
     kept, content = ends, b""
     if moved:
         rows = np.concatenate([motion.rows for motion in moved])
-        size = [[one.block.alpha, *[one.block.half_width] * 2] for one in moved]
-        values = rows[:, 1:] / np.repeat(size, np.diff(ends, prepend=0), axis=0)
+        values = rows[:, 1:] / np.repeat(
+            [[one.block.alpha, *[one.block.half_width] * 2] for one in moved],
+            np.diff(ends, prepend=0),
+            axis=0,
+        )
         chosen = enough(rows[:, 0], values, ends, COARSE)
         kept, content = np.cumsum(chosen)[ends - 1], rows[chosen].astype("<f4").tobytes()
     return Played(

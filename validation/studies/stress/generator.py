@@ -142,8 +142,11 @@ def _scene(
         start.pop("initial_height", None)
     if kind == "no-slip":
         start.pop("initial_velocity", None)
-    static = None if mu_s == mu or kind == "bouc-wen" else mu_s
-    settings["floor"] = Floor(friction=mu, static_friction=static, restitution=bounce)
+    settings["floor"] = Floor(
+        friction=mu,
+        static_friction=None if mu_s == mu or kind == "bouc-wen" else mu_s,
+        restitution=bounce,
+    )
     settings["output_step"] = settings["duration"] / ROWS
     for key in doubtful:
         try:
@@ -321,8 +324,7 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         else Rest()
     )
     walls = _exact_walls(r, block)
-    unit = math.sqrt(block.radius / gravity)
-    duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * unit, 2)
+    duration = round(_pick(r, (1.0, 2.0, 5.0, 10.0)) * math.sqrt(block.radius / gravity), 2)
     still = excitation.kind == "rest" and vertical.kind == "rest"
     if still and all(wall.restitution <= 0.5 for wall in walls) and r.random() < LONG:
         duration = LASTS

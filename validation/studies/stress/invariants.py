@@ -166,8 +166,11 @@ def check_run(
             figures["clearance"] = float(_wrong_clearance(model, played, seed))
     bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
-        counts = cost.energy_gains and (model.energy_cap or not bounces)
-        figures["impacts"] = cost.largest_energy_gain if counts else 0.0
+        figures["impacts"] = (
+            cost.largest_energy_gain
+            if cost.energy_gains and (model.energy_cap or not bounces)
+            else 0.0
+        )
     horizon = _Horizon(model, motion, seed)
     later = {
         "mirror": lambda: _mirror(model, motion),
@@ -417,8 +420,9 @@ def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
 def _friction_power(motion: Motion) -> Floats:
     """Power of the floor's friction, natural units."""
     along, mu = motion.sign * motion.slip, motion.scene.floor.friction
-    flat = -mu * np.abs(1.0 + motion.vertical) * np.abs(along)
-    power = np.where(motion.within("slide"), flat, 0.0)
+    power = np.where(
+        motion.within("slide"), -mu * np.abs(1.0 + motion.vertical) * np.abs(along), 0.0
+    )
     tilted = motion.within("slide-rock", "ladder")
     forces, _ = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
     power[tilted] = forces[1] * along[tilted]

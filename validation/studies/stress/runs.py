@@ -84,15 +84,16 @@ class EventBased(Player):
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
         """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
-        settings: dict[str, Any] = {
-            "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
-            "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
-            "most_steps": MOST_STEPS,
-            "most_events": MOST_EVENTS,
-            **self.settings(scene, number),
-        }
         return check_run(
-            EventBasedModel(**settings),
+            EventBasedModel(
+                **{
+                    "pivot": "unilateral" if self.kind == "unilateral" else "bilateral",
+                    "friction": "bouc-wen" if self.kind == "bouc-wen" else "coulomb",
+                    "most_steps": MOST_STEPS,
+                    "most_events": MOST_EVENTS,
+                    **self.settings(scene, number),
+                }
+            ),
             scene,
             seed=seed,
             audit=only in ("energy", "clearance") or (not only and number % AUDIT == 0),
@@ -178,8 +179,7 @@ class Approximate(Player):
         )
         level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
         way = math.sqrt(DEPTH) if self.label == "cm" else self.step
-        stated = speed * way + level * way**2
-        return motion.deepest / (2.0 * stated + 1e-5)
+        return motion.deepest / (2.0 * (speed * way + level * way**2) + 1e-5)
 
 
 ROUNDING = "scenes at which rounding decides"
@@ -481,8 +481,13 @@ class Chunk(Task):
         """The totals of the runs."""
         began, totals = time.process_time(), RunTotals(model=self.model)
         for number in range(self.first, self.first + self.count):
-            scene = PLAYERS[self.model].scene(self.seed, number)
-            totals.see(checked(self.model, scene, self.seed, number), self.seed, number)
+            totals.see(
+                checked(
+                    self.model, PLAYERS[self.model].scene(self.seed, number), self.seed, number
+                ),
+                self.seed,
+                number,
+            )
         totals.cpu_seconds = time.process_time() - began
         return totals
 
@@ -514,12 +519,14 @@ class Shrinking(Task):
 
         def shows(scene: Scene) -> bool:
             played = checked(broken.model, scene, broken.seed, broken.number, name)
-            if name not in played.broken or not played.figures[name] >= min(broken.figure, most):
-                return False
-            # A fault of the program: the same one.
             return (
-                broken.figure < math.inf
-                or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+                name in played.broken
+                and played.figures[name] >= min(broken.figure, most)
+                # A fault of the program: the same one.
+                and (
+                    broken.figure < math.inf
+                    or played.failure.partition(":")[0] == broken.words.partition(":")[0]
+                )
             )
 
         if not shows(broken.scene):

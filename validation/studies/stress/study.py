@@ -115,30 +115,18 @@ SETUPS = {
 
 
 @dataclass(frozen=True)
-class Stable:
-    """The largest step (sqrt(R/g)) up to which a model is stable, 0 where none is.
+class Found:
+    """What is found at a `Place`: its `line`, `at` and `value`, a step, and a fault.
 
-    `fault` is how the next coarser step breaks.
+    On an axis `step` is the largest (sqrt(R/g)) up to which the model is stable, 0 where none is,
+    and `fault` is how the next coarser one breaks. Of a block that should stand still for `value` s
+    `step` is the model's (s), `moves` are its largest movements of each kind, in R, alpha or
+    sqrt(g R), and `fault` says why the run did not end.
     """
 
     line: str
-    axis: str
+    at: str
     value: float
-    step: float
-    fault: str = ""
-
-
-@dataclass(frozen=True)
-class Still:
-    """How a block moves that should stand still.
-
-    `moves` are the largest of each kind, in R, alpha or sqrt(g R); `fault` says why the run did not
-    end.
-    """
-
-    line: str
-    case: str
-    simulated: float
     step: float
     moves: dict[str, float] = field(default_factory=dict)
     fault: str = ""
@@ -193,7 +181,7 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
 CASES = {"left alone": 0.0, "pushed": 0.5, "shaken": 0.8}
 
 
-def stand_still(label: str, case: str, duration: float) -> Still:
+def stand_still(label: str, case: str, duration: float) -> Found:
     """Plays the paper's block in a case in which it should not move."""
     block, mu, step = PAPER_BLOCK, 0.3, REST_STEP
     push = CASES[case] * 9.81 * min(SLOPE, mu)
@@ -218,7 +206,7 @@ def stand_still(label: str, case: str, duration: float) -> Still:
     try:
         history = build(line.family, dict(line.settings) | steps).simulate(scene)
     except (ModelFailure, InputError) as error:
-        return Still(label, case, duration, step, fault=printable(error, 120))
+        return Found(label, case, duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius
     late = channels["t"] > 0.5 * channels["t"][-1]
     height = kinematics.pivot_height(block, channels["y"], channels["theta"])
@@ -226,7 +214,7 @@ def stand_still(label: str, case: str, duration: float) -> Still:
     speed = np.sqrt(
         channels["x_dot"] ** 2 + channels["y_dot"] ** 2 + (radius * channels["theta_dot"]) ** 2
     )
-    return Still(
+    return Found(
         label,
         case,
         float(channels["t"][-1]),
@@ -256,7 +244,7 @@ class Place(Task):
     value: float
     quick: bool = False
 
-    def play(self) -> Still | Stable:
+    def play(self) -> Found:
         """The largest stable step, from the finest up to the first that breaks; or movements."""
         if self.at in CASES:
             return stand_still(self.line, self.at, self.value)
@@ -267,7 +255,7 @@ class Place(Task):
             if fault := fault_of(setup, scene, step):
                 break
             best = step
-        return Stable(self.line, self.at, self.value, best, fault)
+        return Found(self.line, self.at, self.value, best, fault=fault)
 
 
 def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
@@ -322,7 +310,7 @@ class Stress(Study):
     runs: int | None = None
     models: Sequence[str] = ()
     name = "stress"
-    record = RunTotals | Still | Stable | str
+    record = RunTotals | Found | str
     memory_mb = 4096.0
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
@@ -531,8 +519,10 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
 
 
 def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
-    stable = [one for one in found if isinstance(one, Stable)]
-    still = [one for one in found if isinstance(one, Still)]
+    stable, still = (
+        [one for one in found if isinstance(one, Found) and (one.at in CASES) == stands]
+        for stands in (False, True)
+    )
     if stable:
         steps = QUICK_STEPS if quick else STEPS
         lines = list(dict.fromkeys(one.line for one in stable))
@@ -551,7 +541,12 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
             f" {min(one for one in steps if one >= ADAPTIVE_FINEST):g}).",
         )
         yield from (table for _, table in drawn)
-        yield table_of("stable-steps", Stable, stable)
+        yield Table(
+            "stable-steps",
+            list(map(Column, ("line", "axis", "value", "step", "fault"))),
+            [[one.line, one.at, one.value, one.step, one.fault] for one in stable],
+            on="file",
+        )
     if still:
         yield Table(
             "stand-still",
@@ -564,7 +559,7 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
                 text("fault", " ", brief=False),
             ],
             [
-                [one.case, one.line, one.simulated, one.step, *map(one.moves.get, MOVES), one.fault]
+                [one.at, one.line, one.value, one.step, *map(one.moves.get, MOVES), one.fault]
                 for one in still
             ],
             "What should stand still",
@@ -574,8 +569,8 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
         )
 
 
-def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Stable]) -> tuple[list[Any], Table]:
-    of = {(one.line, one.value): one for one in found if one.axis == axis}
+def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Found]) -> tuple[list[Any], Table]:
+    of = {(one.line, one.value): one for one in found if one.at == axis}
     values = list(dict.fromkeys(value for _, value in of))
     rows = [[of.get((line, value)) for value in values] for line in lines]
     words, _, _ = AXES[axis]

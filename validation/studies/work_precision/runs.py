@@ -453,8 +453,9 @@ def points_of(frame: pd.DataFrame) -> pd.DataFrame:
         medians = good.drop(columns=[*RATES]).join(rates)[[*MEDIANS]].median()
         errors, failed = samples[REFERENCES[0]].tolist(), len(samples) - len(good)
         shares = np.quantile(errors, sides, method="inverted_cdf").mean(axis=0).tolist()
-        worst = math.inf if failed else good.rms.max()
-        rows.append((*at, len(samples), failed, *shares, *medians, worst))
+        rows.append(
+            (*at, len(samples), failed, *shares, *medians, math.inf if failed else good.rms.max())
+        )
     return pd.DataFrame(rows, columns=[*names, "runs", "failed", *SHARES, *MEDIANS, "rms_worst"])
 
 
@@ -516,8 +517,8 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     for (label,), mine in grouped(found[found.family == next(iter(KINDS))], "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
             best = good.loc[good.rms.idxmin()]
-            reached = cost_at(mine)[0], error_at(mine, EQUAL_COST)
-            rows.append((label, *reached, float(best.rms), float(best.cpu)))
+            at_equal = error_at(mine, EQUAL_COST)
+            rows.append((label, cost_at(mine)[0], at_equal, float(best.rms), float(best.cpu)))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 

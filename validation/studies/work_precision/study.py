@@ -170,9 +170,10 @@ class WorkPrecision(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
-        played = (one for one in done.values() if not isinstance(one, Failure))
         rows = [
-            *itertools.chain.from_iterable(played),
+            *itertools.chain.from_iterable(
+                one for one in done.values() if not isinstance(one, Failure)
+            ),
             *(
                 task.record(failure=one.reason)
                 for task, one in done.items()
@@ -193,12 +194,13 @@ class WorkPrecision(Study):
             (_sizes, sizes),
             (_saved, saved),
         )
+        blocks = [*itertools.chain.from_iterable(part(some) for part, some in parts if some)]
         return Finding(
             self.name,
             f"Benchmark{'' if self.what == 'all' else f': {self.what}'}"
             f"{', quick' if self.quick else ''}",
-            _answer(plain, walls, times),
-            list(itertools.chain.from_iterable(part(some) for part, some in parts if some)),
+            _answer({block.name: block.records() for block in blocks if isinstance(block, Table)}),
+            blocks,
         )
 
 
@@ -207,24 +209,21 @@ def _usual(line: DiagramLine, value: float, seconds: float) -> float:
     return A_STEP * seconds / value if line.knob == "time_step" else A_RUN
 
 
-def _answer(
-    plain: Sequence[BenchmarkRun], walls: Sequence[BenchmarkRun], times: Sequence[timings.BatchTime]
-) -> str:
-    standings = runs.league(runs.pooled(runs.frame_of(plain))) if plain else []
+def _answer(tables: Mapping[str, list[dict[str, Any]]]) -> str:
+    """What the tables say first: the cheapest engine, the batches, the finest steps."""
     said = [
-        f"The cheapest engine at an error of {LEVEL:g} alpha is {line}:"
-        f" {1e3 * cost:.2g} ms of CPU a simulated second."
-        for line, cost, *_ in standings[:1]
-        if math.isfinite(cost)
+        f"The cheapest engine at an error of {LEVEL:g} alpha is {row['line']}:"
+        f" {row['cost']:.2g} ms of CPU a simulated second."
+        for row in tables.get("league", [])[:1]
+        if math.isfinite(row["cost"])
     ]
-    best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
-    if best:
-        costs = ", ".join(f"{row.case} {row.evaluations:.0f}" for row in best)
+    if best := tables.get("batches-at-level"):
+        costs = ", ".join(f"{row['case']} {row['evaluations']:.0f}" for row in best)
         said.append(f"A run of the event-based model costs, in right-hand sides: {costs}.")
-    if walls:
-        levels = runs.levels_of(runs.frame_of(walls))
-        finest = levels[levels.reference == REFERENCES[0]].groupby("model", sort=False).last()
-        errors = ", ".join(f"{model} {error:.1e}" for model, error in finest["median"].items())
+    if levels := tables.get("levels"):
+        # of each model the last row, the finest
+        finest = {row["model"]: row[f"median_{REFERENCES[0]}"] for row in levels}
+        errors = ", ".join(f"{model} {error:.1e}" for model, error in finest.items())
         said.append(
             f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha:"
             f" {errors}."
@@ -442,8 +441,11 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
                 Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
                 for one in (good.get((model, name), frame[:0]) for name in WALLS)
             ]
-            medians = mine["median"].clip(upper=3.0).tolist()
-            series.append(Series(model, mine.step.tolist(), medians, look=model))
+            series.append(
+                Series(
+                    model, mine.step.tolist(), mine["median"].clip(upper=3.0).tolist(), look=model
+                )
+            )
         if reference == "ebm":
             series.append(_form_of(form))
         panels.append(Panel(f"against {reference}", series))

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -106,8 +106,11 @@ class BatchSize:
 
 def at_level(rows: Sequence[BatchTime], case: str) -> BatchTime | None:
     """The cheapest tolerance whose p95 error is at most `LEVEL`, None where there is none."""
-    good = [row for row in rows if row.case == case and row.error_95 <= LEVEL]
-    return min(good, key=lambda row: row.cpu, default=None)
+    return min(
+        [row for row in rows if row.case == case and row.error_95 <= LEVEL],
+        key=lambda row: row.cpu,
+        default=None,
+    )
 
 
 #: The scene of the batches, whose pulse is another in each run.
@@ -349,8 +352,15 @@ def _batches(nodes: int) -> Iterator[Pair]:
     ):
         one, other = dear[1](), cheap[1]()
         apart = np.abs(one.peak - other.peak)[(one.side == 0) & (other.side == 0)]
-        change = float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha
-        yield "ebm", thing, "μs a trajectory", dear[0], cheap[0], change, remark
+        yield (
+            "ebm",
+            thing,
+            "μs a trajectory",
+            dear[0],
+            cheap[0],
+            float(np.max(apart, initial=0.0)) / PAPER_BLOCK.alpha,
+            remark,
+        )
 
 
 def _timed(
@@ -459,7 +469,7 @@ _TILTED = Scene(
 )
 
 
-def _mujoco_steps() -> Iterator[Pair]:
+def _mujoco_steps() -> list[Pair]:
     import mujoco
     from mujoco import rollout
 
@@ -487,34 +497,36 @@ def _mujoco_steps() -> Iterator[Pair]:
         for thing, model in models.items()
     }
     whole, lean = played[""], played["contact pairs"]
-    for thing, dear, cheap, remark in (
-        ("contact pairs", whole, lean, "wall pairs out of reach against none"),
-        (
-            "collision search",
-            played["collision search"],
-            whole,
-            "search among all geoms against listed pairs",
-        ),
-        (
-            "out-of-plane motion",
-            played["out-of-plane motion"],
-            whole,
-            "a free joint against two slides and a hinge",
-        ),
-        (
-            "unused features",
-            played["unused features"],
-            whole,
-            "energies, accelerometer and gyro that nobody reads",
-        ),
-        (
-            "Python between steps",
-            lean,
-            _timed(native, _STEPS, partial(_started, bare)),
-            "against mujoco.rollout",
-        ),
-    ):
-        yield "mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark
+    return [
+        ("mujoco, bare steps", thing, "μs a step", dear, cheap, math.nan, remark)
+        for thing, dear, cheap, remark in (
+            ("contact pairs", whole, lean, "wall pairs out of reach against none"),
+            (
+                "collision search",
+                played["collision search"],
+                whole,
+                "search among all geoms against listed pairs",
+            ),
+            (
+                "out-of-plane motion",
+                played["out-of-plane motion"],
+                whole,
+                "a free joint against two slides and a hinge",
+            ),
+            (
+                "unused features",
+                played["unused features"],
+                whole,
+                "energies, accelerometer and gyro that nobody reads",
+            ),
+            (
+                "Python between steps",
+                lean,
+                _timed(native, _STEPS, partial(_started, bare)),
+                "against mujoco.rollout",
+            ),
+        )
+    ]
 
 
 #: Changes of MuJoCo's description of the scene, by what is not needed: patterns and what takes
@@ -570,9 +582,9 @@ def _started(model: Any) -> Any:
     return data
 
 
-def _pybullet_steps() -> Iterator[Pair]:
+def _pybullet_steps() -> list[Pair]:
     if not_installed("pybullet"):
-        return
+        return []
     from rockcheck.engines import PyBullet
 
     def steps(each: str = "", walls: tuple[Wall, ...] = (), count: int = _STEPS) -> Play:
@@ -603,17 +615,19 @@ def _pybullet_steps() -> Iterator[Pair]:
 
         return play
 
-    for thing, dear, remark in (
-        ("contact pairs", steps(walls=(FAR,)), "a wall out of reach against none"),
-        ("dense output", steps("read"), "pose and velocity read after each step, as is needed"),
-        ("saved states", steps("kept", count=300), "saveState, as save-and-redo would need"),
-        ("rendering", steps("drawn", count=300), "64 × 64 pixels in software each step"),
-    ):
-        yield "pybullet, bare steps", thing, "μs a step", dear, steps(), math.nan, remark
+    return [
+        ("pybullet, bare steps", thing, "μs a step", dear, steps(), math.nan, remark)
+        for thing, dear, remark in (
+            ("contact pairs", steps(walls=(FAR,)), "a wall out of reach against none"),
+            ("dense output", steps("read"), "pose and velocity read after each step, as is needed"),
+            ("saved states", steps("kept", count=300), "saveState, as save-and-redo would need"),
+            ("rendering", steps("drawn", count=300), "64 × 64 pixels in software each step"),
+        )
+    ]
 
 
 #: The savings, measured kind by kind.
-KINDS: dict[str, Callable[[], Iterator[Pair]]] = {
+KINDS: dict[str, Callable[[], Iterable[Pair]]] = {
     "batches": lambda: _batches(40),
     "batches, quick": lambda: _batches(10),
     "histories": _histories,
