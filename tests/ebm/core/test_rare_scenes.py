@@ -206,8 +206,9 @@ PAIRS = [
 @pytest.mark.parametrize(("settings", "name"), PAIRS, ids=str)
 def test_it_runs_and_contacts_hold(settings, name):
     scene = (SCENES | SQUATS)[name]
-    history = EventBasedModel(**settings).simulate(scene)
-    assert_contacts_hold(scene, history, 1e-9 * scene.block.radius)
+    assert_contacts_hold(
+        scene, EventBasedModel(**settings).simulate(scene), 1e-9 * scene.block.radius
+    )
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
@@ -231,9 +232,8 @@ def test_a_landing_at_the_slip_limit_takes_its_energy():
 )
 def test_random_pulses_between_walls(settings):
     """Between walls that are touched or nearly so: every one is played to its end."""
-    random = np.random.default_rng(7)
+    random, gaps = np.random.default_rng(7), (0.0, 0.003, 0.053)
     model = EventBasedModel(tolerance=1e-8, **settings)
-    gaps = (0.0, 0.003, 0.053)
     scenes = [
         scene_of(
             PAPER_BLOCK,

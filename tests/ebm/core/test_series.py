@@ -115,30 +115,18 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
     with np.errstate(invalid="ignore"):
-        root = series.first_root(
-            row_of([1.0, rate, np.inf, 0.0]),
-            0,
-            3,
-            1.0,
-            1.0,
-            1e-13,
-            series.AHEAD,
-            np.zeros((48, series.WIDTH)),
-        )
-    assert math.isnan(root)
+        assert math.isnan(first_root([1.0, rate, np.inf, 0.0], 1.0, 1e-13))
 
 
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
 def test_touching_is_no_root_and_dipping_is_one(place):
     """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of
     that. A triple one crosses."""
-    touch = np.array([place * place, -2.0 * place, 1.0])
-    lift = np.array([1e-12, 0.0, 0.0])
+    touch, lift = polyfromroots([place] * 2), np.array([1e-12, 0.0, 0.0])
     assert first_root(touch + lift, 1.0) is None
     assert first_root(touch - lift, 1.0) == pytest.approx(place - 1e-6, abs=1e-9)
-    falls = np.array([place**3, -3.0 * place**2, 3.0 * place, -1.0])
-    assert first_root(falls, 1.0) == pytest.approx(place, abs=1e-4)
-    two = np.polynomial.polynomial.polymul(touch, [0.9, -1.0])  # touches, then crosses
+    assert first_root(-polyfromroots([place] * 3), 1.0) == pytest.approx(place, abs=1e-4)
+    two = -polyfromroots([place, place, 0.9])  # touches, then crosses
     assert first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
 
 
@@ -221,9 +209,8 @@ def test_what_is_noise_at_first_may_grow(noise):
 @pytest.mark.parametrize("ahead", [0.1, 10.0])
 def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead, share, leads):
     rate, bend = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
-    assert series.leads_up(1.0, rate, 0.0, 0.0, ahead) == leads
-    assert series.leads_up(1.0, 0.0, -bend, 0.0, ahead) == leads
-    assert series.leads_up(1.0, 0.0, 0.0, share, ahead) == leads
+    terms = ((rate, 0.0, 0.0), (0.0, -bend, 0.0), (0.0, 0.0, share))
+    assert [series.leads_up(1.0, *one, ahead) for one in terms] == [leads] * 3
 
 
 @pytest.mark.parametrize("seed", range(40))
