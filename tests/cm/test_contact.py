@@ -27,15 +27,14 @@ def integrated_restitution(xi: float) -> float:
         return q[0] + 2.0 * xi * q[1]
 
     force_gone.terminal, force_gone.direction = True, -1
-    run = solve_ivp(
+    return -solve_ivp(
         lambda _t, q: [q[1], -q[0] - 2.0 * xi * q[1]],
         (0.0, 50.0),
         [0.0, 1.0],
         events=force_gone,
         rtol=1e-11,
         atol=1e-13,
-    )
-    return -run.y_events[0][0][1]
+    ).y_events[0][0][1]
 
 
 @pytest.mark.parametrize(

@@ -50,8 +50,7 @@ scene_of = Scene(
     ],
 )
 def test_physics_that_is_refused(fault_of, settings, change, said):
-    model = EventBasedModel(**settings)
-    assert str(fault_of(model.simulate, scene_of(**change))).startswith(said)
+    assert str(fault_of(EventBasedModel(**settings).simulate, scene_of(**change))).startswith(said)
 
 
 @pytest.mark.parametrize(

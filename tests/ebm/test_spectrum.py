@@ -184,8 +184,7 @@ def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
 def test_what_is_decided_early_of_loaded_blocks():
     rng = np.random.default_rng(13)
     scenes = [random_scene(rng).replace(walls=(), duration=25.0) for _ in range(60)]
-    sides = decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11).side.tolist()
-    assert {-1, 0, 1} == set(sides)
+    assert {-1, 0, 1} == set(decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11).side.tolist())
 
 
 def test_a_record_is_scaled_and_the_block_resized():

@@ -91,8 +91,7 @@ def test_sliding_distance(model, speed, friction):
         return
     assert [event.kind for event in history.event_list] == ["stick", "settled"]
     # The event is told at 1 mm/s.
-    stops = abs(speed) / (friction * 9.81)
-    assert history.event_list[0].t == pytest.approx(stops, abs=0.003)
+    assert history.event_list[0].t == pytest.approx(abs(speed) / (friction * 9.81), abs=0.003)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
@@ -159,8 +158,7 @@ def test_both_walls(bouncing_model):
         )
     )
     x, speed = history.channels["x"], abs(history.channels["x_dot"][-1])
-    reaches = (np.min(x), np.max(x), speed)
-    assert reaches == pytest.approx((-0.030037, 0.050537, 1.0), abs=1e-3)
+    assert (np.min(x), np.max(x), speed) == pytest.approx((-0.030037, 0.050537, 1.0), abs=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -91,8 +91,7 @@ def test_a_record_is_looked_up_beside_the_file_then_in_the_package(written, faul
     written("elcentro_1940_ns.csv", "time_s,acceleration_g\n0,0.1\n0.1,0.2\n")
     assert len(load_scene(path).excitation.unscaled) == 2
     outside = text.replace("elcentro_1940_ns.csv", "../elcentro_1940_ns.csv")
-    fault = fault_of(load_scene, written("outside.toml", outside))
-    assert "cannot be read" in str(fault)
+    assert "cannot be read" in str(fault_of(load_scene, written("outside.toml", outside)))
 
 
 @pytest.mark.parametrize(

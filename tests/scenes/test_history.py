@@ -104,8 +104,7 @@ def test_a_compressed_history_is_the_same(history, tmp_path):
     ids=["cut", "flipped", "no end"],
 )
 def test_a_damaged_compressed_history(history, written, damage, fault_of):
-    path = written("run.csv.gz", damage(history.packed()[".csv.gz"]))
-    said = str(fault_of(History.load, path))
+    said = str(fault_of(History.load, written("run.csv.gz", damage(history.packed()[".csv.gz"]))))
     assert re.search(r"run\.csv\.gz: (a compressed file that is damaged|not a CSV table)", said)
 
 
@@ -215,8 +214,7 @@ HOSTILE_TO_BOTH = [
 )
 def test_hostile_tables(read, text, said, written, fault_of):
     """Words are no numbers, and rows are lines."""
-    fault = fault_of(read, written("hostile.csv", text))
-    assert said in str(fault).split("hostile.csv", 1)[1]
+    assert said in str(fault_of(read, written("hostile.csv", text))).split("hostile.csv", 1)[1]
 
 
 @pytest.mark.filterwarnings("error")

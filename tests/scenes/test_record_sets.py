@@ -99,11 +99,10 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(tmp_p
     plain, up, down, other = (
         table(tmp_path / f"{name}.csv") for name in ("a-ns", "a-up", "a-down", "b-up")
     )
-    twice = channels(tmp_path / "two.v2", East=1.0, Up=0.5, Down=0.5)
     for paths, said in (
         ([plain], "a-ns.csv: 0 vertical"),
         ([plain, up, down], "a-ns.csv: 0 vertical"),
-        ([twice], "two.v2: 2 vertical"),
+        ([channels(tmp_path / "two.v2", East=1.0, Up=0.5, Down=0.5)], "two.v2: 2 vertical"),
         ([plain, up, other], "b-up.csv: a vertical component, and no horizontal"),
         ([up], "a-up.csv: a vertical component, and no horizontal"),
     ):

@@ -259,8 +259,7 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
 def test_a_header_says_enough_and_neither_samples_nor_options_overrule_it(
     written, name, content, option, said, fault_of
 ):
-    fault = fault_of(read_record, written(name, content), Reading(**option))
-    assert re.search(said, str(fault))
+    assert re.search(said, str(fault_of(read_record, written(name, content), Reading(**option))))
 
 
 def test_the_command_shows_and_draws(tmp_path, monkeypatch, typed, refused):

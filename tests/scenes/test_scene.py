@@ -272,11 +272,10 @@ def test_the_centres_of_mass_and_box():
         placed[:, 3:5],
         atol=1e-5,
     )
-    energy = kinematics.energy(LOADED, 9.81, *states[:, 1:].T)
     own = 0.5 * (placed[:, 3] ** 2 + placed[:, 4] ** 2 + 0.3 * placed[:, 5] ** 2) + 9.81 * (
         placed[:, 1] - 0.8
     )
-    np.testing.assert_allclose(energy, own, atol=1e-13)
+    np.testing.assert_allclose(kinematics.energy(LOADED, 9.81, *states[:, 1:].T), own, atol=1e-13)
     assert kinematics.of_mass(PAPER_BLOCK, states) is states
 
 
@@ -308,12 +307,11 @@ def test_initial_state_stands_on_its_pivot(tilt):
     )
     x, y, theta, x_dot, y_dot, theta_dot = made.initial_state
     assert (theta, theta_dot) == (tilt, 0.3)
-    found = (
+    assert (
         kinematics.slip(made.block, x, theta),
         kinematics.slip_rate(made.block, theta, x_dot, theta_dot),
         kinematics.pivot_height(made.block, y, theta),
-    )
-    assert found == pytest.approx((0.0, 0.2, 0.0), abs=1e-15)
+    ) == pytest.approx((0.0, 0.2, 0.0), abs=1e-15)
     step = 1e-7  # the centroid's vertical velocity is that of a turn about the pivot
     height = [
         made.block.radius * math.cos(made.block.alpha - abs(tilt + 0.3 * s)) for s in (0, step)
@@ -323,5 +321,4 @@ def test_initial_state_stands_on_its_pivot(tilt):
 
 def test_a_change_is_a_new_scene_that_is_validated(fault_of):
     assert scene().replace(duration=2.0).duration == 2.0
-    said = str(fault_of(scene().replace, duration=-1.0))
-    assert said.startswith("duration: -1.0 is not allowed")
+    assert str(fault_of(scene().replace, duration=-1.0)).startswith("duration: -1.0 is not allowed")

@@ -125,12 +125,11 @@ def test_files_are_written_and_read_by_the_doors_alone(calls):
         for folder in ("scenes", "ebm", "cm", "engines", "validation", "reports", "commands")
         for path in (home / folder).rglob("*.py")
     }
-    found = {
+    assert {
         name
         for name, text in texts.items()
         if re.search(calls, text.replace("os.open(os.devnull", ""))
-    }
-    assert found == DOORS[calls]
+    } == DOORS[calls]
 
 
 @pytest.mark.parametrize("lead", "=+-@＝")

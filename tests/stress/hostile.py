@@ -195,13 +195,10 @@ def try_case(case: Case) -> str:
         for name, text in FILES.items():
             (folder / name).write_text(text)
         case.prepare(folder)
-        command = (
+        running = subprocess.Popen(
             [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words]
             if case.limit
-            else [*ROCKCHECK, *case.words]
-        )
-        running = subprocess.Popen(
-            command,
+            else [*ROCKCHECK, *case.words],
             cwd=folder,
             env={**os.environ, **case.environment},
             stdout=subprocess.DEVNULL,

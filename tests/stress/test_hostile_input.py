@@ -340,8 +340,7 @@ def test_a_record_names_no_file_but_its_own(tmp_path, name):
     store = Store(tmp_path)
     store.put("a", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
     assert store.get("a") == {}
-    record = tmp_path / "histories" / "a.json"
-    files = json.loads(record.read_text())["content"]["files"]
+    files = json.loads((tmp_path / "histories" / "a.json").read_text())["content"]["files"]
     store.put_record("histories", "a", {"files": {**files, name: "0"}})
     assert store.get("a") is None
 

@@ -42,11 +42,10 @@ from rockcheck.validation.study import run
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     """Of a scene with everything in it, only what shows the "failure" is left, and the file is that
     scene again."""
-    loaded = Block(
-        half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
-    )
     scene = random_scene(1, 0).replace(
-        block=loaded.scaled(30.0),
+        block=Block(
+            half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
+        ).scaled(30.0),
         floor=Floor(friction=0.25),
         walls=(Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.7)),
         vertical=Sine(amplitude=1.234567, period=1.0),
@@ -154,8 +153,7 @@ def test_failures_of_the_program_and_of_engines():
     assert (study.gather(done).exit_code, len(study.gather(done).files)) == (0, MOST_FILES)
     done[lost] = Failure("it hangs")
     found = study.gather(done)
-    words = found.table("failures").records()[0]["words"]
-    assert (found.exit_code, words) == (1, "it hangs")
+    assert (found.exit_code, found.table("failures").records()[0]["words"]) == (1, "it hangs")
     assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
 
 

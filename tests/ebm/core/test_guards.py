@@ -94,9 +94,8 @@ def test_guards_are_what_their_names_say(touch, pivot):
 def gaps(at: Situation, side: int, phi: float, xi: float) -> dict[str, float]:
     """Clear distance of the tip wall and the far wall from the nearest of the block's four corners,
     which are turned one by one."""
-    turned = np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]])
     corners = (
-        turned
+        np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]])
         @ np.array(
             [[sx * math.sin(at.alpha), sy * math.cos(at.alpha)] for sx in (1, -1) for sy in (1, -1)]
         ).T

@@ -162,6 +162,5 @@ def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
     state.tried[:] = 1
     for count, slack in enumerate((1.0, 2.0, 4.0), 1):
         assert modes.select(core.setting, core.base, run)
-        found = (mode.family, mode.pivot, state.slack)
-        assert found == (Family.FLAT, Pivot.STICK, slack)
+        assert (mode.family, mode.pivot, state.slack) == (Family.FLAT, Pivot.STICK, slack)
         assert (state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (count, count)

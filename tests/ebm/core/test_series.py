@@ -154,8 +154,7 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
         return
     assert which == Guard.NONE
     assert tau == pytest.approx(place + math.sqrt(dip), abs=3e-9) or (dip == 0.0 and tau == 1.0)
-    about = [polyval(tau, touch), touch[1] + 2.0 * tau, 1.0]
-    assert first(about, 0.5) == (0.5, Guard.NONE)
+    assert first([polyval(tau, touch), touch[1] + 2.0 * tau, 1.0], 0.5) == (0.5, Guard.NONE)
 
 
 @pytest.mark.parametrize("noise", NOISES)
@@ -167,8 +166,7 @@ def test_noise_is_no_sign(noise):
         ([-0.5 * noise, 1.0], 1),
         ([0.0, -0.5 * noise / series.AHEAD, 1.0], 1),
     ):
-        signs = [leading(side * np.array(terms), noise) for side in (1, -1)]
-        assert signs == [sign, -sign], terms
+        assert [leading(side * np.array(terms), noise) for side in (1, -1)] == [sign, -sign], terms
     for terms, root in (([0.5, 0.0, -1.0 / noise], 0.0), ([-0.5, 0.0, 1.0 / noise], None)):
         assert first_root(noise * np.array(terms), 1.0, noise) == root
     assert first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None

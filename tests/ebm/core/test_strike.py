@@ -105,8 +105,7 @@ def test_the_settling_speed_rises_as_impacts_accumulate():
     """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as
     many; back after a quiet 0.025."""
     times = 2.5e-7 * np.arange(1, 50_101)
-    quiet = times[-1] + [0.024, 0.024 + 0.026]
-    speeds, state = struck_at([*times, *quiet])
+    speeds, state = struck_at([*times, *(times[-1] + [0.024, 0.024 + 0.026])])
     rises = [k + 1 for k in range(1, 50_100) if speeds[k] != speeds[k - 1]]
     assert rises == [100, 200, 300, 400, 500, 50_000]
     np.testing.assert_allclose(
