@@ -11,7 +11,6 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def rms(history, theta):
-    """RMS difference of theta from the array, in alpha."""
     # One may overturn a step before the other.
     rows = min(len(theta), len(history.channels["theta"]))
     apart = history.channels["theta"][:rows] - theta[:rows]

@@ -75,7 +75,6 @@ class Mode(NamedTuple):
 
 
 def run_of(mode: Mode, state) -> Run:
-    """A run of a tilted block in this mode and state."""
     return run_at(
         state,
         **TILTED | {"pull": mode.pull},

@@ -16,7 +16,6 @@ from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
 def nothing() -> Records:
-    """Records without rows."""
     return Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
 
 

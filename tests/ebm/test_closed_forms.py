@@ -65,8 +65,6 @@ def test_quarter_period_of_a_needle_is_housners(tilt):
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("tilt", [0.6, 0.95])
 def test_energy_is_conserved_between_impacts_and_falls_by_housners_ratio(tilt, pivot, block):
-    """Angular velocity after over before an impact, 1 - 1.5 sin^2 alpha, from the energy of the
-    rows around it."""
     history = EventBasedModel(tolerance=1e-14, pivot=pivot).simulate(
         block_scene(block, 1.0, duration=10.0, initial_rotation=tilt * block.alpha)
     )
@@ -123,7 +121,6 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio, factor):
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize(("mu", "speed"), [(0.1, 1.0), (0.2, -3.0), (0.05, 0.01)])
 def test_sliding_distance(mu, speed, pivot, block):
-    """v^2/(2 mu g), in the time v/(mu g)."""
     history = EventBasedModel(pivot=pivot).simulate(
         block_scene(block, mu, duration=4.0, initial_velocity=speed)
     )
@@ -135,8 +132,6 @@ def test_sliding_distance(mu, speed, pivot, block):
 
 @pytest.mark.parametrize("restitution", [0.3, 0.7, 0.9])
 def test_bounce_heights(restitution, block):
-    """A flat drop from h rises to e^(2n) h after its n-th bounce, and hits the floor when a ball
-    would."""
     drop, rises = 0.1, restitution ** np.arange(5)
     history = EventBasedModel(pivot="unilateral").simulate(
         block_scene(
@@ -241,8 +236,6 @@ def rocking_by_lagrange(scene: Scene) -> Callable[[np.ndarray], np.ndarray]:
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("tilt", [0.1, -0.1])
 def test_free_rocking_is_lagranges(tilt, pivot):
-    """1.2 s of free rocking over several landings, to 1e-9 rad, whichever pivot comes first; energy
-    is kept between impacts."""
     scene = block_scene(duration=1.2, initial_rotation=tilt)
     history = EventBasedModel(pivot=pivot, tolerance=1e-13).simulate(scene)
     c = history.channels
@@ -259,7 +252,6 @@ def test_free_rocking_is_lagranges(tilt, pivot):
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_pulse_is_lagranges(sense):
-    """Rocking on both pivots and landings under a pulse, to 1e-8 rad."""
     scene = block_scene(
         duration=1.4,
         excitation=Sine(amplitude=sense * 6.0, period=0.7),
@@ -271,8 +263,6 @@ def test_a_pulse_is_lagranges(sense):
 
 
 def test_pivots_of_a_block():
-    """p, alpha and R of both pivots; the weaker one's are the block's, and those of a homogeneous
-    block Housner's."""
     for side in ("left", "right"):
         body, pivot = Lagrangian(RACK, side), RACK.pivot(side)
         radius = float(np.hypot(*body.arm))

@@ -67,8 +67,6 @@ def grazing_gap(tilt: float) -> float:
 
 @pivots
 def test_grazing_wall_contact(pivot):
-    """A corner that turns back a billionth of the gap before the wall does not touch it; a
-    billionth after, it does, softly."""
     tilt, gap = 0.15, grazing_gap(0.15)
     free, misses, touches = (
         play(scene_of(initial_rotation=-tilt, duration=2.5, walls=walls), pivot, tolerance=1e-13)
@@ -132,8 +130,6 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
 
 @pivots
 def test_balance_point(pivot):
-    """At theta = alpha the block stands on its corner for ever; a little less and it comes back, a
-    little more and it falls."""
     back, on, over = (
         play(scene_of(initial_rotation=PAPER_BLOCK.alpha * factor, duration=20.0), pivot)
         for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
@@ -164,8 +160,6 @@ BESIDE_WALLS = {
 @pytest.mark.parametrize("name", BESIDE_WALLS)
 @pivots
 def test_walls_and_floor_are_not_entered(pivot, name, e):
-    """Every row keeps its distance, to 1e-9 m, whatever the wall returns; between two walls a block
-    hops that may."""
     gaps, more, events = BESIDE_WALLS[name]
     sides = zip(("left", "right"), gaps, strict=False)
     walls = [Wall(side=side, gap=gap, restitution=e) for side, gap in sides]
@@ -184,8 +178,6 @@ def test_walls_and_floor_are_not_entered(pivot, name, e):
 
 
 def test_zeno_sequence_of_a_bouncing_block():
-    """Dropped flat at e = 0.999 it bounces sqrt(2 h/g) (1 + e)/(1 - e) s, thousands of times, and
-    then rests."""
     height, e = 1e-4, 0.999
     end = math.sqrt(2.0 * height / G) * (1.0 + e) / (1.0 - e)
     history = play(
@@ -200,15 +192,12 @@ def test_zeno_sequence_of_a_bouncing_block():
     assert history.outcome == "at rest"
     landings = [event.t for event in history.event_list if event.impulse > 0.0]
     assert len(landings) > 2000
-    assert landings[-1] == pytest.approx(end, rel=0.02)
-    assert landings[-1] < end
+    assert 0.98 * end <= landings[-1] < end
     assert np.max(np.abs(history.channels["theta"])) < 1e-9
 
 
 @pivots
 def test_zeno_sequence_of_a_rocking_block(pivot):
-    """A slender block loses little at an impact; its hundreds of impacts pile up at a time, and it
-    rests after it."""
     block = Block(half_width=0.1, half_height=1.0)
     scene = scene_of(
         block=block,
@@ -280,7 +269,6 @@ def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric, tilt):
 
 @pivots
 def test_duration_that_ends_at_an_impact(pivot):
-    """Whether the run stops just before, at or just after an impact: it ends, with all its rows."""
     scene = scene_of(initial_rotation=0.1, output_step=0.05)
     impact = next(
         event.t for event in play(scene, pivot).event_list if event.kind == "floor impact"

@@ -26,12 +26,10 @@ PULSES = ((3.0, 1.5), (5.0, 3.0), (6.0, 4.0), (4.5, -2.5), (3.8, 2.2))
 
 @functools.cache
 def exact(scene):
-    """theta by the paper's equations."""
     return PaperModel(scene).run().at(scene.output_times)[:, 1]
 
 
 def rotation_error(model, scene) -> float:
-    """RMS of theta, in alpha."""
     apart = model.simulate(scene).channels["theta"] - exact(scene)
     return float(np.sqrt(np.mean(apart**2))) / scene.block.alpha
 
@@ -97,7 +95,6 @@ def test_a_stock_engine_is_far_off(stock):
     ],
 )
 def test_walls_and_slip(varying_engine, every, least, bounds):
-    """Outcomes and peaks beside walls with e = 0, 0.5 and 1, with and without slip."""
     errors, missed = peak_errors(
         varying_engine(time_step="adaptive", largest_step=2e-3),
         UNAMBIGUOUS[::every],

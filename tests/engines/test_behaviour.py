@@ -199,7 +199,6 @@ def test_output_grid_need_not_fit_the_steps(varying_engine, step):
 
 @pytest.mark.parametrize("stock", [MuJoCo, PyBullet])
 def test_small_and_large_blocks_move_alike(stock):
-    """Lengths times 0.01 and times times 0.1: the same motion."""
     large = pulse_scene(4.0, 2.0, 0.3, ("left", 0.053, 0.5), duration=4.0)
     small = large.replace(
         block=large.block.scaled(0.01),
@@ -280,8 +279,6 @@ HARD = [
 @pytest.mark.parametrize("scene", HARD, ids=lambda scene: scene.name)
 @pytest.mark.parametrize("step", [1e-3, 1e-2, "adaptive"])
 def test_hard_scenes_end(varying_engine, scene, step):
-    """Rattling, bouncing and flush contacts: bounded work, finite states, nothing through a
-    wall."""
     history = varying_engine(time_step=step).simulate(scene)
     assert history.cost.steps < 40_000
     channels = [column for name, column in history.channels.items() if name != "mode"]

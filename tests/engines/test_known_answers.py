@@ -173,8 +173,6 @@ def test_both_walls(bouncing_model):
 )
 @pytest.mark.parametrize("share", [0.1, 0.37, 0.5, 0.81, 1.0, 1.3])
 def test_the_base_gains_what_its_acceleration_gives(excitation, share):
-    """The velocity of the base against an integral of its own, to rounding; it stays when the
-    shaking has ended."""
     t = share * excitation.quiet_after
     gained = quad(
         lambda s: float(excitation.acceleration(s)),

@@ -2,9 +2,11 @@
 recorded motion is."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 from rockcheck.scenes import Record, Rest, Ricker, Sine
 from rockcheck.scenes.recordings import intensity
@@ -26,15 +28,14 @@ def test_ricker_is_the_papers():
     )
     np.testing.assert_allclose(pulse.acceleration(t), expected, rtol=1e-12, atol=1e-14)
     peak = np.argmax(expected)
-    assert expected[peak] == pytest.approx(1.00009 * 6.0, rel=1e-5)
-    assert q[peak] == pytest.approx(-0.2045 * T, abs=1e-3)
+    known = (pytest.approx(1.00009 * 6.0, rel=1e-5), pytest.approx(-0.2045 * T, abs=1e-3))
+    assert (expected[peak], q[peak]) == known
     assert pulse.acceleration(0.8 * T) < 0.0
 
 
 def test_symmetric_ricker_peaks_at_its_centre():
-    pulse = Ricker(amplitude=-2.0, period=0.5, symmetric=True)
+    pulse, offset = Ricker(amplitude=-2.0, period=0.5, symmetric=True), np.linspace(0.01, 1.0, 50)
     assert pulse.acceleration(pulse.centre) == pytest.approx(-2.0)
-    offset = np.linspace(0.01, 1.0, 50)
     np.testing.assert_allclose(
         pulse.acceleration(1.0 + offset), pulse.acceleration(1.0 - offset), rtol=1e-12, atol=1e-15
     )
@@ -109,7 +110,6 @@ def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples(
 
 @pytest.mark.parametrize("damping", [0.02, 0.05, 0.5])
 def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping):
-    """A step of acceleration: the peak is 1 + exp(-pi D/sqrt(1 - D^2)), half a period later."""
     step = Recording(samples=np.ones(2000), time_step=1e-3, unit="m/s2", form="CSV")
     peak = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
     assert intensity.spectral_acceleration(step, 0.5, damping) * G == pytest.approx(peak, rel=1e-4)
@@ -117,8 +117,6 @@ def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping)
 
 @pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
 def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
-    from scipy.signal import cont2discrete, lfilter
-
     samples, parts = np.random.default_rng(3).normal(size=40), 2
     step, rate, damping, tail = 0.01, math.tau / period, 0.1, 30
     above, below, _ = cont2discrete(
@@ -131,6 +129,5 @@ def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
 
 
 def test_periods_of_a_spectrum_leave_no_wide_gap():
-    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
-    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert all(one < other <= 2.0 * one for one, other in pairwise(intensity.PERIODS))
     assert intensity.PERIODS[0] <= 0.1 < 4.0 <= intensity.PERIODS[-1]

@@ -110,8 +110,6 @@ def test_a_flat_landing_counts_as_an_impact_on_the_floor(scene):
 
 
 def test_a_loaded_block_says_where_its_mass_is():
-    """Its table names both pivots, its picture marks the mass's centre; a homogeneous block's has
-    neither."""
     block = Block(
         half_width=0.3,
         half_height=1.0,

@@ -198,8 +198,6 @@ def test_a_homogeneous_block_is_written_as_ever():
 
 
 def test_a_loaded_block_scaled_and_mirrored():
-    """Twice the size: the same slendernesses, R twice as long, p smaller by sqrt 2; mirrored: the
-    pivots change places."""
     twice = LOADED.scaled(2.0)
     mirrored = scene(block=LOADED, initial_rotation=-0.02).mirrored()
     for side, other in (("left", "right"), ("right", "left")):
@@ -235,7 +233,6 @@ def test_less_friction_than_painleves_jams_neither_corner(centre, inertia):
 
 
 def test_the_moment_of_inertia_is_at_most_that_of_mass_in_the_corners(fault_of):
-    """0.4^2 + 1^2 - 0.1^2 - 0.2^2 = 1.11 m^2 with the centre at (0.1, -0.2)."""
     bound, centre = 0.4 * 0.4 + 1.0 - 0.1 * 0.1 - 0.2 * 0.2, (0.1, -0.2)
     for mass, inertia in ((2.0, bound - 1e-15), (1.0, bound)):
         given = Block(**BOX, mass=mass, centre_of_mass=centre, moment_of_inertia=mass * inertia)

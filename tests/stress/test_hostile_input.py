@@ -305,8 +305,6 @@ def test_a_stored_path_does_not_leave_the_run(tmp_path, refused):
 
 
 def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
-    """Descriptions, reasons and versions of a run that somebody sent are escaped; no text of theirs
-    is a tag."""
     data = json.loads(stored_files()["run.json"])
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
     data |= {

@@ -166,7 +166,6 @@ def test_tension_in_a_floor_that_only_pushes_is_noticed(monkeypatch):
 
 
 def test_a_coarse_model_breaks_the_comparison_with_a_finer_one():
-    """A tolerance of 1e-3 is not 1e-10: within the horizon the rotations differ."""
     played = check_run(EventBasedModel(tolerance=1e-2), SLIDES_AND_HITS)
     assert played.figures["tolerance"] > INVARIANTS["tolerance"].bound
 

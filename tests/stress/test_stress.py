@@ -40,8 +40,6 @@ from rockcheck.validation.study import run
 
 
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
-    """Of a scene with everything in it, only what shows the "failure" is left, and the file is that
-    scene again."""
     scene = random_scene(1, 0).replace(
         block=Block(
             half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
@@ -76,7 +74,6 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
 
 
 def test_totals_count_what_was_seen():
-    """Two halves are the whole, and the worst figure names its run."""
     whole, halves = Chunk("ebm", 1, 0, 8).play(), RunTotals(model="ebm")
     for half in parts(Chunk("ebm", 1, 0, 8)):
         halves.add(half.play())

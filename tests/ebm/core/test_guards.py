@@ -39,8 +39,6 @@ from rockcheck.scenes.scene import PAPER_BLOCK
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("touch", ["none", "tip", "far"])
 def test_guards_are_what_their_names_say(touch, pivot):
-    """Forces by Newton and Euler, friction cones, and gaps from the corners' places now and along
-    the motion."""
     rng = np.random.default_rng(47)
     seen: set[str] = set()
     for _ in range(40):
@@ -234,8 +232,6 @@ def newton_euler(
 @pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
 @pytest.mark.parametrize("mode", ["rock", "slide-rock", "lean", "ladder"])
 def test_series_begin_with_newton_and_euler(mode, case):
-    """Accelerations and forces of the models' series in every mode at 200 random loaded blocks and
-    states, to 1e-9."""
     rng = np.random.default_rng(11)
     for _ in range(200):
         constant = Record.from_samples(np.full(3, rng.uniform(-3.0, 3.0)), 10.0)

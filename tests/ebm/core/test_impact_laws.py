@@ -75,7 +75,6 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
 @pytest.mark.parametrize(("more", "form"), [(1e-12, Landing.HELD_FAST), (-1e-12, Landing.SLID)])
 @pytest.mark.parametrize("alpha", [0.1, 0.25, 0.5])
 def test_floor_impact_sticks_above_its_friction(alpha, more, form):
-    """Without slip before, the impact sticks from mu = 3 t/(4 + t^2) on, t = tan(alpha)."""
     t, b = math.tan(alpha), setting_of(alpha)
     mu = 3.0 * t / (4.0 + t * t) + more
     assert impacts.floor_impact(b, 1, -0.5, 0.0, mu, mu)[0] == form

@@ -231,7 +231,6 @@ def test_a_landing_at_the_slip_limit_takes_its_energy():
     "settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str
 )
 def test_random_pulses_between_walls(settings):
-    """Between walls that are touched or nearly so: every one is played to its end."""
     random, gaps = np.random.default_rng(7), (0.0, 0.003, 0.053)
     model = EventBasedModel(tolerance=1e-8, **settings)
     scenes = [

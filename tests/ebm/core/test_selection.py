@@ -99,7 +99,6 @@ def test_selection_of_a_tilted_block(touch, pivot):
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_selection_of_a_flat_block_at_a_wall(pivot, side):
-    """Without friction: pressed on the wall it rests on it, pulled away it slides."""
     walls = (Wall(side="left" if side > 0 else "right", gap=0.0),)
     for u, name, slip, tip, far in (
         (0.1, "rest", 0, side > 0, side < 0),

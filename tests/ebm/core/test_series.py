@@ -26,14 +26,11 @@ def first_root(coefficients, h: float, noise: float = NOISES[Kind.POSITION]) -> 
 
 
 def leading(coefficients, noise: float = NOISES[Kind.POSITION]) -> int:
-    """Sign with which the polynomial leaves zero."""
     return series.leading(row_of(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
 
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_first_root_of_random_polynomials(noise):
-    """Against all roots that numpy finds, of 3,000 polynomials of degree 1 to 14, positive at 0;
-    the first one to 1e-12, wherever the others lie."""
     rng = np.random.default_rng(41)
     judged = Counter()
     for _ in range(1000):
@@ -66,8 +63,6 @@ def test_first_root_of_random_polynomials(noise):
 
 
 def test_signs_of_all_short_patterns():
-    """`leading` is the sign of the first coefficient that is not zero: all patterns of -1, 0, 1 up
-    to degree 5."""
     for pattern in itertools.product((-1.0, 0.0, 1.0), repeat=6):
         first = next((c for c in pattern if c), 0.0)
         for size in (1.0, 1e-3, 40.0):
@@ -159,7 +154,6 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_noise_is_no_sign(noise):
-    """A value below the noise tells nothing: what follows it does."""
     for terms, sign in (
         ([0.5 * noise], 0),
         ([2.0 * noise], 1),

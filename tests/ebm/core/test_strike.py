@@ -82,8 +82,6 @@ def test_a_block_is_put_onto_the_contact_that_closes(side, tilt, which, pivot, t
 )
 @pytest.mark.parametrize(("bounce", "left"), [(0.1, 0.1), (4e-8, 0.0)])
 def test_a_block_that_lands_with_less_spin_than_counts_slides_on(slip, kept, bounce, left):
-    """Its spin, and a bounce and a slip below the settling speed, are gone; a slip above it, and a
-    faster bounce, are not."""
     b, place = setting_of(0.4), [0.2, math.cos(0.4), 0.0]
     state = run_at([*place, slip, bounce, 3e-8]).state
     v = contacts.slip_velocity(b, state.motion) if kept else 0.0
@@ -102,8 +100,6 @@ def struck_at(times) -> tuple[list[float], np.void]:
 
 
 def test_the_settling_speed_rises_as_impacts_accumulate():
-    """Tenfold with every hundred impacts up to 2.5e-3, without a bound after five hundred times as
-    many; back after a quiet 0.025."""
     times = 2.5e-7 * np.arange(1, 50_101)
     speeds, state = struck_at([*times, *(times[-1] + [0.024, 0.024 + 0.026])])
     rises = [k + 1 for k in range(1, 50_100) if speeds[k] != speeds[k - 1]]
