@@ -91,8 +91,9 @@ def test_normal_forces_feel_each_other():
 @pytest.mark.parametrize("x", [0.01, 0.3, 2.0, 100.0])
 def test_damper_stops_a_corner_without_overshoot(x):
     c, mobility, step, speed = x / 2e-3, 2.0, 1e-3, -0.4
-    d = felt_share(x) * c * step
-    force, _ = normal_forces(-c * speed, 0.0, d, 0.0, mobility, 0.0, 0.0, mobility)
+    force, _ = normal_forces(
+        -c * speed, 0.0, felt_share(x) * c * step, 0.0, mobility, 0.0, 0.0, mobility
+    )
     assert speed + step * mobility * force == pytest.approx(speed / (1.0 + x + 0.5 * x * x))
 
 

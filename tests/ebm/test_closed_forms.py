@@ -48,8 +48,9 @@ def first_impact(scene: Scene, **settings: object) -> float:
 def test_quarter_period(alpha, tilt, pivot):
     block, friction = block_of(alpha, 1.6), "no-slip" if pivot == "bilateral" else "coulomb"
     scene = block_scene(block, 1.3, duration=8.0, initial_rotation=tilt * alpha)
-    known = pytest.approx(quarter_period(block, abs(tilt) * alpha), abs=1e-9)
-    assert first_impact(scene, pivot=pivot, friction=friction) == known
+    assert first_impact(scene, pivot=pivot, friction=friction) == pytest.approx(
+        quarter_period(block, abs(tilt) * alpha), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("tilt", [0.1, 0.5, 0.9])
@@ -126,8 +127,9 @@ def test_sliding_distance(mu, speed, pivot, block):
     )
     assert (history.outcome, history.channels["theta"].any()) == ("at rest", False)
     stops = [history.channels["x"][-1], *(e.t for e in history.event_list if e.kind == "stick")]
-    known = [math.copysign(speed**2 / (2.0 * mu * G), speed), abs(speed) / (mu * G)]
-    assert stops == pytest.approx(known, rel=1e-12)
+    assert stops == pytest.approx(
+        [math.copysign(speed**2 / (2.0 * mu * G), speed), abs(speed) / (mu * G)], rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("restitution", [0.3, 0.7, 0.9])
@@ -148,8 +150,9 @@ def test_bounce_heights(restitution, block):
     landings = [e.t for e in history.event_list if e.kind in ("landing", "floor impact")]
     assert landings[:5] == pytest.approx(t, abs=1e-12)
     for n, (start, end) in enumerate(pairwise(t), 1):
-        arc = height[(motion["t"] > start) & (motion["t"] < end)]
-        np.testing.assert_allclose(arc, rises[n] ** 2 * drop, rtol=1e-11)
+        np.testing.assert_allclose(
+            height[(motion["t"] > start) & (motion["t"] < end)], rises[n] ** 2 * drop, rtol=1e-11
+        )
     assert not motion["theta"].any()
 
 
@@ -246,8 +249,9 @@ def test_free_rocking_is_lagranges(tilt, pivot):
     first, second, *_ = (event.t for event in history.event_list if event.kind == "floor impact")
     for arc in (c["t"] < first, (c["t"] > first) & (c["t"] < second)):
         assert np.ptp(energy[arc]) < 1e-11
-    body = Lagrangian(RACK, "left" if tilt > 0 else "right")
-    assert energy[0] == pytest.approx(body.energy(tilt, 0.0), abs=1e-12)
+    assert energy[0] == pytest.approx(
+        Lagrangian(RACK, "left" if tilt > 0 else "right").energy(tilt, 0.0), abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
@@ -266,10 +270,12 @@ def test_pivots_of_a_block():
     for side in ("left", "right"):
         body, pivot = Lagrangian(RACK, side), RACK.pivot(side)
         radius = float(np.hypot(*body.arm))
-        known = (math.atan2(abs(body.arm[0]), body.arm[1]), radius)
-        assert (pivot.alpha, pivot.radius) == pytest.approx(known, rel=1e-15)
-        p = math.sqrt(G * radius / (body.inertia + radius**2))
-        assert pivot.frequency_parameter(G) == pytest.approx(p, rel=1e-14)
+        assert (pivot.alpha, pivot.radius) == pytest.approx(
+            (math.atan2(abs(body.arm[0]), body.arm[1]), radius), rel=1e-15
+        )
+        assert pivot.frequency_parameter(G) == pytest.approx(
+            math.sqrt(G * radius / (body.inertia + radius**2)), rel=1e-14
+        )
     assert RACK.alpha == RACK.pivot("right").alpha < RACK.pivot("left").alpha
     plain = Block(half_width=0.3, half_height=1.0)
     assert plain.pivot("left") == plain.pivot("right")

@@ -162,8 +162,9 @@ BESIDE_WALLS = {
 def test_walls_and_floor_are_not_entered(pivot, name, e):
     gaps, more, events = BESIDE_WALLS[name]
     sides = zip(("left", "right"), gaps, strict=False)
-    walls = [Wall(side=side, gap=gap, restitution=e) for side, gap in sides]
-    scene = scene_of(walls=walls, duration=6.0, **more)
+    scene = scene_of(
+        walls=[Wall(side=side, gap=gap, restitution=e) for side, gap in sides], duration=6.0, **more
+    )
     history = play(scene, pivot)
     assert_contacts_hold(scene, history)
     assert events <= set(kinds(history))

@@ -51,9 +51,10 @@ def test_unstable_balance_amplifies_as_the_hyperbolic_cosine(
 ) -> None:
     """A tilt of alpha (1 + d) turns away as alpha (1 + d cosh(p t)) while that is small, so that t
     = acosh(allowed/d)/p."""
-    expected = math.acosh(allowed / perturbation) / BALANCED.frequency_parameter
     found = predictability_horizon(BALANCED, perturbation=perturbation, allowed=allowed)
-    assert found == pytest.approx(expected, abs=BALANCED.output_step)
+    assert found == pytest.approx(
+        math.acosh(allowed / perturbation) / BALANCED.frequency_parameter, abs=BALANCED.output_step
+    )
 
 
 @pytest.mark.parametrize(
@@ -144,8 +145,9 @@ def test_it_ends_where_the_laws_of_impacts_part(side: str, sign: float, restitut
         for event in EventBasedModel(pivot="unilateral").simulate(scene).event_list
         if event.kind == "floor impact"
     )
-    parts = first - scene.output_step, first + 0.02
-    least, most = parts if restitution else (first + 0.1, scene.duration)
+    least, most = (
+        (first - scene.output_step, first + 0.02) if restitution else (first + 0.1, scene.duration)
+    )
     assert least <= predictability_horizon(scene) <= most
 
 

@@ -164,8 +164,9 @@ def test_rows_of_a_shaken_block_at_rest(pivot):
     model.simulate(scene_of(duration=1.5, initial_velocity=1.0))
     motion = model.simulate(scene).channels
     assert set(motion["mode"]) == {"rest"}
-    still = [motion[name] for name in ("x", "theta", "x_dot", "y_dot", "theta_dot", "slip")]
-    np.testing.assert_array_equal(still, 0.0)
+    np.testing.assert_array_equal(
+        [motion[name] for name in ("x", "theta", "x_dot", "y_dot", "theta_dot", "slip")], 0.0
+    )
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
@@ -235,15 +236,16 @@ def test_needles_and_slabs_from_a_millimetre_to_a_kilometre(pivot, radius, alpha
     than it had, and it rests."""
     block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     unit = math.sqrt(radius / 9.81)
-    scene = scene_of(
-        block=block,
-        floor=Floor(friction=0.9, static_friction=1.1),
-        excitation=Rest(),
-        initial_rotation=0.5 * alpha,
-        duration=400.0 * unit,
-        output_step=0.5 * unit,
+    history = EventBasedModel(pivot=pivot).simulate(
+        scene_of(
+            block=block,
+            floor=Floor(friction=0.9, static_friction=1.1),
+            excitation=Rest(),
+            initial_rotation=0.5 * alpha,
+            duration=400.0 * unit,
+            output_step=0.5 * unit,
+        )
     )
-    history = EventBasedModel(pivot=pivot).simulate(scene)
     motion = history.channels
     energy = kinematics.energy(
         block, 9.81, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
@@ -277,12 +279,13 @@ def test_initial_state_is_where_it_was_put(start):
 
 
 def test_static_friction_only_decides_when_slip_begins():
-    scene = scene_of(
-        floor=Floor(friction=0.1, static_friction=0.2),
-        excitation=Record.from_samples([0.0, 9.81], time_step=1.0),
-        duration=1.0,
+    history = EventBasedModel().simulate(
+        scene_of(
+            floor=Floor(friction=0.1, static_friction=0.2),
+            excitation=Record.from_samples([0.0, 9.81], time_step=1.0),
+            duration=1.0,
+        )
     )
-    history = EventBasedModel().simulate(scene)
     (begin,) = [e for e in history.event_list if e.kind == "slip"]
     assert begin.t == pytest.approx(0.2, abs=1e-12)
     t = history.channels["t"]

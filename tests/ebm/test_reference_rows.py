@@ -77,8 +77,9 @@ def test_bilateral_row(line, row):
     run = run_to_end(scene)
     assert run.outcome == row["outcome"]
     if row in ALIKE:
-        peak = float(FLIGHTS[key_of(row)]["peak_theta_over_alpha"])
-        assert run.peak == pytest.approx(peak, abs=1e-6)
+        assert run.peak == pytest.approx(
+            float(FLIGHTS[key_of(row)]["peak_theta_over_alpha"]), abs=1e-6
+        )
     rattles = row["e_w"] == "1" and int(row["n_wall"]) > 20
     if line == GRAZING_ROW:
         assert (run.wall_impacts, row["n_wall"]) == (5, "4")

@@ -137,8 +137,9 @@ def test_a_shorter_step_comes_nearer(single_engine, tilt):
 
 @pytest.mark.parametrize("settings", ["best", "default"])
 def test_what_lies_on_its_side_ends_the_run(single_engine, settings):
-    scene = free_rocking(0.5, initial_angular_velocity=2.0, duration=9.0)
-    history = single_engine(time_step=1e-3, settings=settings).simulate(scene)
+    history = single_engine(time_step=1e-3, settings=settings).simulate(
+        free_rocking(0.5, initial_angular_velocity=2.0, duration=9.0)
+    )
     assert history.event_list[-1].kind == history.outcome == "overturned left"
     assert history.channels["t"][-1] < 5.0
 

@@ -246,8 +246,9 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     )
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
-        apart = np.max(np.abs(history.channels[channel] + mirrored.channels[channel]))
-        assert apart < (1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)), channel
+        assert np.max(np.abs(history.channels[channel] + mirrored.channels[channel])) < (
+            1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)
+        ), channel
     assert history.peak_rotation > 0.2 * block.alpha
     kinds, others = ([event.kind for event in one.event_list] for one in (history, mirrored))
     assert "wall impact" in kinds

@@ -223,8 +223,9 @@ def test_correlations_that_contradict_each_other_are_refused(fault_of):
 
 def test_correlated_inputs_have_the_correlation_and_their_own_distributions():
     scene, spreads = made()
-    given = uncertain_scene(scene, spreads, {"duration, walls.right.gap": -0.8})
-    values = given.values(np.random.default_rng(1).random((50_000, 3)))
+    values = uncertain_scene(scene, spreads, {"duration, walls.right.gap": -0.8}).values(
+        np.random.default_rng(1).random((50_000, 3))
+    )
     assert np.corrcoef(values.T)[0] == pytest.approx([1.0, 0.0, -0.8], abs=0.02)
     assert values.mean(axis=0) == pytest.approx([2.0, 0.4, 0.05], rel=5e-3)
     assert values.std(axis=0) == pytest.approx([0.1, 0.2 / math.sqrt(12.0), 0.01], rel=2e-2)

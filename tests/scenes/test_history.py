@@ -235,8 +235,9 @@ def test_pandas_reads_the_table_without_an_option(tmp_path):
 
 def test_hostile_events(written, fault_of):
     written("run.events.csv", "t,kind,mode_before,mode_after,impulse\nsoon,uplift,,,0\n")
-    fault = fault_of(History.load, written("run.csv", "t,theta\n0,0\n1,0.1\n"))
-    assert "run.events.csv: not an events table" in str(fault)
+    assert "run.events.csv: not an events table" in str(
+        fault_of(History.load, written("run.csv", "t,theta\n0,0\n1,0.1\n"))
+    )
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])

@@ -188,8 +188,9 @@ G = 9.80665
     ("encoding", "end"), [("utf-8", "\n"), ("utf-8-sig", "\n"), ("utf-16", "\n"), ("utf-8", "\r\n")]
 )
 def test_tables(text, options, samples, step, encoding, end, written):
-    path = written("motion.txt", text.replace("\n", end).encode(encoding))
-    record = read_record(path, Reading(**options))
+    record = read_record(
+        written("motion.txt", text.replace("\n", end).encode(encoding)), Reading(**options)
+    )
     np.testing.assert_allclose(record.samples, samples, rtol=1e-14)
     assert record.time_step == pytest.approx(step, rel=1e-12)
 

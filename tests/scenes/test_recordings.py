@@ -173,8 +173,9 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path, written, 
         np.testing.assert_allclose(
             record.samples, expected, rtol=0, atol=digit * G * 1.01, err_msg=one["file"]
         )
-        peak = pytest.approx(abs(PEAKS[component]), abs=3e-4 if write is knet else digit)
-        assert intensity.peak_acceleration(record) == peak, one["file"]
+        assert intensity.peak_acceleration(record) == pytest.approx(
+            abs(PEAKS[component]), abs=3e-4 if write is knet else digit
+        ), one["file"]
         assert one["pga_g"] == pytest.approx(abs(PEAKS[component]), abs=3e-4)
         assert (one["step_s"], one["samples"]) == (STEP, len(expected)), one["file"]
         assert record.time_step == STEP
@@ -199,8 +200,9 @@ def test_several_components_in_one_file(write, names, written, told, fault_of):
     said = told("record", str(path), "--read", f"component={names[1]}")
     assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
     assert said["duration_s"] == pytest.approx(4.0)
-    wrong = fault_of(Record.from_file, path, component=4)
-    assert "no single component 4; there are 1 " in str(wrong)
+    assert "no single component 4; there are 1 " in str(
+        fault_of(Record.from_file, path, component=4)
+    )
 
 
 #: Time steps in a V2 file's header: that of the raw record, that of these samples, none.

@@ -281,8 +281,9 @@ def test_derived_quantities():
     assert block.alpha == pytest.approx(0.25, abs=1e-4)
     assert block.radius == pytest.approx(math.hypot(0.397, 1.555))
     assert block.frequency_parameter == pytest.approx(2.14, abs=5e-3)
-    rate = math.sqrt(0.75 * 1.62 / block.radius)
-    assert scene(gravity=1.62).frequency_parameter == pytest.approx(rate)
+    assert scene(gravity=1.62).frequency_parameter == pytest.approx(
+        math.sqrt(0.75 * 1.62 / block.radius)
+    )
     assert (Floor(friction=0.3).mu_s, Floor(friction=0.3, static_friction=0.4).mu_s) == (0.3, 0.4)
     assert (scene().wall("left"), scene().wall("right")) == (scene().walls[0], None)
 

@@ -311,8 +311,9 @@ def test_a_byte_order_mark_is_no_part_of_the_text(written, read, name, text, abo
     ],
 )
 def test_a_key_of_many_parts_is_refused(written, key, fault_of):
-    path = written("a.toml", key if key.startswith("[") else f"{key} = 1")
-    assert "a key of more than 50 parts" in str(fault_of(read_toml, path))
+    assert "a key of more than 50 parts" in str(
+        fault_of(read_toml, written("a.toml", key if key.startswith("[") else f"{key} = 1"))
+    )
 
 
 @pytest.mark.parametrize(

@@ -145,8 +145,9 @@ def test_each_invariant_notices_its_fault(name, monkeypatch):
     monkeypatch.setattr(
         EventBasedModel, "simulate", lambda *given: spoilt(plain(*given), **FAULTS[name])
     )
-    audit = name in ("energy", "clearance")
-    played = check_run(EventBasedModel(pivot="unilateral"), SLIDES_AND_HITS, audit=audit)
+    played = check_run(
+        EventBasedModel(pivot="unilateral"), SLIDES_AND_HITS, audit=name in ("energy", "clearance")
+    )
     assert name in played.broken
 
 
@@ -189,8 +190,9 @@ def test_the_spring_of_bouc_wens_friction_gives_energy_only_where_the_floors_pus
             motion = Motion(fine, model.simulate(fine))
             assert energy_error(model, motion) < 1e-9
             # as if it could hold nothing
-            without = model.model_copy(update={"yield_displacement": 1e-30})
-            gains[name, yields] = energy_error(without, motion)
+            gains[name, yields] = energy_error(
+                model.model_copy(update={"yield_displacement": 1e-30}), motion
+            )
     assert max(gains["steady", 1e-2], gains["steady", 1e-3]) < 1e-9
     assert 1e-6 < gains["shaken", 1e-3] < 0.5 * gains["shaken", 1e-2]
 

@@ -234,8 +234,9 @@ def newton_euler(
 def test_series_begin_with_newton_and_euler(mode, case):
     rng = np.random.default_rng(11)
     for _ in range(200):
-        constant = Record.from_samples(np.full(3, rng.uniform(-3.0, 3.0)), 10.0)
-        scene = random_scene(rng).replace(walls=WALLS, excitation=constant)
+        scene = random_scene(rng).replace(
+            walls=WALLS, excitation=Record.from_samples(np.full(3, rng.uniform(-3.0, 3.0)), 10.0)
+        )
         b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
         unit, R = natural.time_unit(scene), scene.block.radius
         S, w = int(rng.choice([-1, 1])), 0.0 if mode == "lean" else rng.uniform(-1.0, 1.0)

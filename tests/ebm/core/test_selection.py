@@ -120,8 +120,9 @@ def test_a_block_whose_floor_falls_away():
         ("bilateral", 0.0, 0.1, "slide-rock", True, -1),
         ("bilateral", 0.0, -0.1, "slide-rock", True, 1),
     ):
-        core = Core(upright(u, -0.2, 0.3, 0.5, 0.5), pivot)
-        mode = core.select((0.0, math.cos(0.3), 0.0, slip, 0.0, 0.0))
+        mode = Core(upright(u, -0.2, 0.3, 0.5, 0.5), pivot).select(
+            (0.0, math.cos(0.3), 0.0, slip, 0.0, 0.0)
+        )
         assert (mode.name, mode.tilted, mode.side) == (name, tilted, side)
     flat = {"family": Family.FLAT, "pivot": Pivot.STICK, "pull": -1}
     for wall in ("tip", "far"):

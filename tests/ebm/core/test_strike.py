@@ -141,10 +141,12 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
         z, before = state.motion, vx - w * corner[1]
         energy = vx**2 + start[4] ** 2 + w * w / b.spin
         strike._wall_impact(b, state, case > 0, 1e-9)
-        leaves = (z.vx - z.w * corner[1], z.vy + z.w * pivot[0])
-        assert leaves == pytest.approx((-bounces[wall] * before, 0.0), abs=1e-12)
-        gain = (z.vx**2 + z.vy**2 + z.w**2 / b.spin) / energy - 1.0
-        assert state.largest_gain == pytest.approx(max(gain, 0.0), abs=1e-11)
+        assert (z.vx - z.w * corner[1], z.vy + z.w * pivot[0]) == pytest.approx(
+            (-bounces[wall] * before, 0.0), abs=1e-12
+        )
+        assert state.largest_gain == pytest.approx(
+            max((z.vx**2 + z.vy**2 + z.w**2 / b.spin) / energy - 1.0, 0.0), abs=1e-11
+        )
         gains += state.gains
     assert 0 < gains < 60
 
