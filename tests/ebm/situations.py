@@ -19,8 +19,6 @@ from rockcheck.ebm.core.state import Run
 from rockcheck.scenes import Floor, Record, Scene, Wall
 
 PIVOTS = ["bilateral", "unilateral"]
-#: Order of the series that guards are taken from.
-ORDER = 8
 
 
 def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
@@ -148,7 +146,7 @@ class Core:
         """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
         follow."""
         run = run_of(mode, state)
-        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
+        order = motion.tilt_series(self.setting, self.base, run, 8, 0.0, 0.0)
         a = run.a
         run.state.place = mode.side * state[0] - a[Row.SIN, 0]
         guards.fill_guards(self.setting, run.state, a)

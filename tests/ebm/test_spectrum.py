@@ -12,11 +12,10 @@ from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
-from rockcheck.scenes import Floor, Record, Ricker, Scene, Wall
+from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
-SIDES = {"safe": 0, "ccw": -1, "cw": 1}
 
 
 def scene(*walls, friction=0.3, excitation=None):
@@ -49,7 +48,7 @@ def test_outcomes_agree_with_reference_runs(setting, rows):
     spectrum = overturning_spectrum(scene(*walls, friction=float(mu)), frequencies, amplitudes)
     for row in rows:
         i, j = amplitudes.index(float(row["ap_ratio"])), frequencies.index(float(row["wp_over_p"]))
-        assert spectrum.outcomes[i, j] == SIDES[row["outcome"]], row
+        assert spectrum.outcomes[i, j] == {"safe": 0, "ccw": -1, "cw": 1}[row["outcome"]], row
 
 
 @pytest.mark.parametrize("walls", [(), (Wall(side="right", gap=0.103),)], ids=["free", "right"])
@@ -236,9 +235,6 @@ def test_least_overturning_amplitude_and_area():
     np.testing.assert_array_equal(spectrum.least_overturning_amplitude(), [3.0, np.nan])
 
 
-STILL = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), duration=1.0)
-
-
 @pytest.mark.parametrize(
     ("start", "frequencies", "amplitudes", "said"),
     [
@@ -249,7 +245,7 @@ STILL = Scene(name="still", block=PAPER_BLOCK, floor=Floor(friction=0.3), durati
         (scene(), [1.0], ["a"], "numbers are asked for"),
         (scene(), [[1.0]], [1.0], "dimensions"),
         (scene(), np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
-        (STILL, [1.0], [1.0], "ricker or sine pulse, or a record"),
+        (scene(excitation=Rest()), [1.0], [1.0], "ricker or sine pulse, or a record"),
     ],
 )
 def test_what_has_no_spectrum(fault_of, start, frequencies, amplitudes, said):

@@ -167,8 +167,7 @@ def test_a_damaged_file_is_compiled_again_and_not_run(tmp_path, replay, monkeypa
         content = path.read_bytes()
         path.unlink()
         DAMAGES[damage](path, content)
-    assert replay(COMPILED) == ""
-    assert replay(READ) == ""
+    assert [replay(said) for said in (COMPILED, READ)] == ["", ""]
     assert not (tmp_path / "ran").exists()
 
 
@@ -202,9 +201,8 @@ def test_no_folder_that_could_be_foreseen(tmp_path, replay):
     """Where the package's folder cannot be written, the user's own cache is taken, never a common
     one."""
     (tmp_path / "tiny" / "__pycache__").write_text("not a folder")
-    assert replay(COMPILED, cache_dir="") == ""
+    assert [replay(said, cache_dir="") for said in (COMPILED, READ)] == ["", ""]
     assert len(list((tmp_path / ".cache" / "rockcheck").glob("tiny-kernels-*/*.nbc"))) == 2
-    assert replay(READ, cache_dir="") == ""
     assert "no private folder" in replay(COMPILED, cache_dir="", user_wide="/dev/null")
 
 
@@ -269,13 +267,12 @@ except KeyboardInterrupt:
 
 def test_a_long_compilation_is_announced_once_a_package(tmp_path, replay, monkeypatch):
     """Whoever waits knows for what; of one that is quick nothing is said."""
-    heard, counts = [], []
+    heard: list[str] = []
     with announcing(heard.append):
-        for patience in (60.0, 0.0, 0.0):
+        for number, (patience, said) in enumerate([(60.0, 0), (0.0, 1), (0.0, 1)]):
             monkeypatch.setattr(compiled, "_SILENT", patience)
-            replay(COMPILED, cache_dir=f"cache{len(counts)}")
-            counts.append(len(heard))
-    assert counts == [0, 1, 1]
+            replay(COMPILED, cache_dir=f"cache{number}")
+            assert len(heard) == said
     assert heard[0].startswith("compiling __main__ for this machine")
     assert gc.isenabled()
 

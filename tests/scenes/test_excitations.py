@@ -125,8 +125,7 @@ def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
         ([rate**2], [1.0, 2.0 * damping * rate, rate**2]), step, method="foh"
     )
     ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
-    found = largest_response(samples, parts, tail, step, rate, damping)
-    assert found == pytest.approx(
+    assert largest_response(samples, parts, tail, step, rate, damping) == pytest.approx(
         np.max(np.abs(lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)]))), rel=1e-9
     )
 

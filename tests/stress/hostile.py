@@ -86,7 +86,6 @@ VALUES = (
     "1979-05-27",
     "9" * 400,
 )
-KEYS = ("duration", "half_width", "friction", "amplitude")
 #: Names of models that a suite or a command line may name, and that run nothing.
 CODE = (
     "os:system",
@@ -153,7 +152,7 @@ def cases() -> Iterator[Case]:
                 words,
                 lambda folder, f=file, v=valid, s=spoil: _replaced(folder / f, v, s),
             )
-    for key in KEYS:
+    for key in ("duration", "half_width", "friction", "amplitude"):
         for value in VALUES:
             text = re.sub(rf"\b{key} = [^,}}\n]+", lambda _, k=key, v=value: f"{k} = {v}", SCENE)
             yield Case(f"scene: {key} = {value[:12]}", SIMULATE, _writes("a.toml", text))

@@ -16,11 +16,12 @@ from rockcheck.ebm.core import march, names
 
 ROOT = Path(__file__).parents[3]
 FOLDER = Path(rockcheck.ebm.__file__).parent
-SOURCES = {
-    path.relative_to(FOLDER).as_posix(): ast.parse(path.read_text(encoding="utf-8"))
+#: Each node of the sources' syntax, with its file.
+NODES = [
+    (path, node)
     for path in sorted(FOLDER.rglob("*.py"))
-}
-NODES = [(name, node) for name, tree in SOURCES.items() for node in ast.walk(tree)]
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+]
 #: The zeros of position, velocity and time: where each is defined.
 ZEROS = {"CLOSED": "core/contacts.py", "SLOW": "core/contacts.py", "INSTANT": "core/series.py"}
 

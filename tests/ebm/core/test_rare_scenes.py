@@ -30,7 +30,6 @@ from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.progress import one_run
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-SQUARE = Block(half_width=7.069, half_height=7.069)
 CHOICES = Path(__file__).parents[2] / "data" / "modelling_choices"
 PINNED = read_toml(CHOICES / "index.toml")["choices"]
 SQUAT = Block(half_width=0.1, half_height=0.05)
@@ -65,7 +64,6 @@ def scene_of(
     )
 
 
-TOUCHES = Wall(side="left", gap=0.0, restitution=0.5)
 SCENES = {
     # The corner lets go of the wall at the instant at which the floor's force turns.
     "release on the ladder": scene_of(
@@ -76,7 +74,11 @@ SCENES = {
         excitation=Ricker(amplitude=27.828295819935693, period=1.030200737875156),
     ),
     "no room between walls": scene_of(
-        SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33
+        Block(half_width=7.069, half_height=7.069),
+        0.3,
+        1.0,
+        walls=both(0.0, 0.0, 0.9),
+        initial_velocity=1.33,
     ),
     "no room, elastic walls": scene_of(
         PAPER_BLOCK,
@@ -147,7 +149,11 @@ SCENES = {
     },
     **{
         f"slides by {v:g} m/s at a wall": scene_of(
-            PAPER_BLOCK, 0.3, 2.0, walls=[TOUCHES], initial_velocity=-v
+            PAPER_BLOCK,
+            0.3,
+            2.0,
+            walls=[Wall(side="left", gap=0.0, restitution=0.5)],
+            initial_velocity=-v,
         )
         for v in (1e-9, 1e-8)
     },
