@@ -55,8 +55,9 @@ def test_impact_obeys_housner(model, block):
 
 def test_quarter_period(model):
     scene = free_rocking(0.4)
-    events = model.simulate(scene).event_list
-    impact = next(event for event in events if event.kind == "floor impact")
+    impact = next(
+        event for event in model.simulate(scene).event_list if event.kind == "floor impact"
+    )
     alpha, tilt = scene.block.alpha, scene.initial_rotation
     # Energy integral of theta'' = -p^2 sin(alpha - theta), with theta = tilt - v^2 to take out the
     # end's singularity.
