@@ -79,8 +79,9 @@ def test_floor_and_wall_have_the_restitution_asked_for(struck, case, e):
     strike = scene(**{struck: e} | (FLOOR | WALL)[case])
     assert measured_restitution(ContinuousModel(), strike) == pytest.approx(e, abs=1e-3)
     if case in ("rocking block", "top corner"):
-        soft = measured_restitution(ContinuousModel(penetration=1e-6), strike)
-        assert soft == pytest.approx(e, abs=0.01)
+        assert measured_restitution(ContinuousModel(penetration=1e-6), strike) == pytest.approx(
+            e, abs=0.01
+        )
 
 
 @pytest.mark.parametrize("e", RESTITUTIONS)

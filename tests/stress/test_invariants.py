@@ -1,8 +1,6 @@
 """What a stress run holds runs against: scenes that can be made again, invariants that notice
 faults."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

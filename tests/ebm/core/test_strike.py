@@ -107,16 +107,15 @@ def test_the_settling_speed_rises_as_impacts_accumulate():
     np.testing.assert_allclose(
         [speeds[0], *(speeds[k - 1] for k in rises)], [5e-8, 5e-7, 5e-6, 5e-5, 5e-4, 2.5e-3, np.inf]
     )
-    assert state.rules[Rule.RATTLES] == 501
-    assert speeds[-2:] == [np.inf, 5e-8]
+    assert (state.rules[Rule.RATTLES], speeds[-2:]) == (501, [np.inf, 5e-8])
     # As many in a longer time are no rattle.
     assert set(struck_at(3e-4 * np.arange(300))[0]) == {5e-8}
 
 
 def test_impacts_at_one_instant_end_plastic():
     speeds, state = struck_at([1.0] * 21 + [1.001])
-    assert speeds == [5e-8] * 20 + [np.inf, 5e-8]  # the first, and twenty more at its instant
-    assert state.rules[Rule.ENDLESS_STAGES] == 1
+    # The first, and twenty more at its instant.
+    assert (speeds, state.rules[Rule.ENDLESS_STAGES]) == ([5e-8] * 20 + [np.inf, 5e-8], 1)
 
 
 @pytest.mark.parametrize("case", [1, -1], ids=["tip wall", "far wall"])
