@@ -134,7 +134,8 @@ def test_each_branch_of_the_wall_cascade(parting, lopsided):
         leaves = Sw * (-c * alone - C * alone)
         if branch == Branch.C_STICK:
             assert leaves < 0.0
-            assert (w2, xdot2, v2, p) == (0.0, 0.0, 0.0, approx(-S * s * w1, abs=1e-12))
+            wall, floor = (approx(one, abs=1e-12) for one in (max(0.0, -Sw * xdot1), -S * s * w1))
+            assert (w2, xdot2, v2, n, p) == (0.0, 0.0, 0.0, wall, floor)
             continue
         q, leaving = xdot2 - xdot1 - Sw * n, xdot2 - C * w2
         size = max(1.0, abs(w2))  # a pivot that is held may be thrown about
