@@ -110,6 +110,7 @@ def test_the_papers_scenes(name, friction, gap, restitution):
     assert (scene.block, record.time_step) == (PAPER_BLOCK, 0.02)
     assert record.peak == pytest.approx(1.6 * 0.31882, abs=1e-9)
     assert [(wall.side, wall.gap, wall.restitution) for wall in scene.walls] == walls
+    assert scene.description
 
 
 def test_a_message_lists_no_more_names_than_fit_a_line():

@@ -74,13 +74,13 @@ def test_vertical_components_are_left_out_unless_they_are_asked_for(tmp_path, fa
     both, alone = channels(tmp_path / "two.v2", East=1.0, Up=0.5), table(tmp_path / "up.csv", 0.25)
     every = [both, table(tmp_path / "ns.csv", 2.0), alone]
     for paths, reading, found, other in (
-        (every, Reading(), {"two.v2 East": 1.0, "ns.csv": 2.0}, ["two.v2 Up", "up.csv"]),
-        ([both], Reading(component="Up"), {"two.v2": 0.5}, []),
-        ([alone], Reading(column=2), {"up.csv": 0.25}, []),
-        ([], Reading(), {}, []),
+        (every, Reading(), [("two.v2 East", 1.0), ("ns.csv", 2.0)], ["two.v2 Up", "up.csv"]),
+        ([both], Reading(component="Up"), [("two.v2", 0.5)], []),
+        ([alone], Reading(column=2), [("up.csv", 0.25)], []),
+        ([], Reading(), [], []),
     ):
         motions, left_out = motions_of(paths, reading)
-        assert ({name: peak(one) for name, one in motions}, left_out) == (found, other)
+        assert ([(name, peak(one)) for name, one in motions], left_out) == (found, other)
     assert "up.csv: a vertical component" in str(fault_of(motions_of, [alone], Reading()))
 
 
