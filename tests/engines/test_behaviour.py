@@ -232,6 +232,7 @@ def test_record_with_kinks(model):
             duration=0.76,
         )
     )
+    assert history.channels["x_dot"][::4] == pytest.approx(velocity[:39], abs=1e-5)
 
 
 HARD = [
