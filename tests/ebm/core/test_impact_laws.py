@@ -160,11 +160,10 @@ def test_each_branch_of_the_wall_cascade(parting, lopsided):
             assert branch in (Branch.D_SLIP, Branch.E_SLIP)
             assert not no_slip
             assert abs(q) == approx(mu * abs(p), abs=1e-12)
-        if branch == Branch.D_SLIP:
-            assert q * v2 <= 1e-13
+        assert branch != Branch.D_SLIP or q * v2 <= 1e-13
         if branch == Branch.E_SLIP:
-            assert n == 0.0
-            assert xdot2 == approx(C * w2, abs=1e-10)  # (32): the corner stays on the wall
+            # (32): the corner stays on the wall.
+            assert (n, xdot2) == (0.0, approx(C * w2, abs=1e-10))
             # The friction is that of the slip which (30) would have, were it not for its pull of
             # the wall.
             slips = (

@@ -45,10 +45,9 @@ def test_selection_at_rest_is_shentons_map(friction, pivot):
         felt = (math.inf, math.inf) if friction == "no-slip" else (mu_s, mu_k)
         expected = shentons(*felt, math.tan(alpha), a)
         assert mode.name == expected, (at, mode)
-        if mode.tilted:
-            assert mode.side == side
-        if mode.floor == "slip":  # it stays behind the base
-            assert mode.slip * (mode.side if mode.tilted else 1) == -side
+        assert not mode.tilted or mode.side == side
+        # What slips stays behind the base.
+        assert mode.floor != "slip" or mode.slip * (mode.side if mode.tilted else 1) == -side
         seen.add(expected)
     assert seen == {"rest", "rock"} | ({"slide", "slide-rock"} if friction != "no-slip" else set())
 

@@ -209,8 +209,7 @@ def test_what_stays_below_a_level_is_below_it(seed):
     a = row_of(r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0)))
     highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
     for level in highest + np.array([-0.5, -1e-3, -1e-9, 0.1, 2.0]):
-        if series.stays_below(a, 0, n, tau, level):
-            assert highest < level
+        assert highest < level or not series.stays_below(a, 0, n, tau, level)
     assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
 
 
