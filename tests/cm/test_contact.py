@@ -27,15 +27,14 @@ def integrated_restitution(xi: float) -> float:
         return q[0] + 2.0 * xi * q[1]
 
     force_gone.terminal, force_gone.direction = True, -1
-    run = solve_ivp(
+    return -solve_ivp(
         lambda _t, q: [q[1], -q[0] - 2.0 * xi * q[1]],
         (0.0, 50.0),
         [0.0, 1.0],
         events=force_gone,
         rtol=1e-11,
         atol=1e-13,
-    )
-    return -run.y_events[0][0][1]
+    ).y_events[0][0][1]
 
 
 @pytest.mark.parametrize(
@@ -43,10 +42,6 @@ def integrated_restitution(xi: float) -> float:
 )
 def test_restitution_of_clamped_contact_is_the_integrated_one(xi):
     assert restitution_of(xi) == pytest.approx(integrated_restitution(xi), rel=1e-8)
-
-
-def test_restitution_at_critical_damping():
-    assert restitution_of(1.0) == pytest.approx(math.exp(-2.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("e", [0.005, 0.05, 0.25, 0.5, 0.75, 0.99, 1.0])
@@ -57,10 +52,9 @@ def test_damping_ratio_inverts_restitution(e):
 
 def test_the_least_restitution_vanishes_with_the_length_of_a_contact():
     """Four times as stiff, half as long: so a study of the step finds it."""
-    assert least_restitution(4e8, 2.0) == pytest.approx(1e-4)
-    assert least_restitution(1e8, 2.0) == pytest.approx(2.0 * least_restitution(4e8, 2.0))
+    assert [least_restitution(k, 2.0) for k in (4e8, 1e8)] == pytest.approx([1e-4, 2e-4])
     assert damping_ratio(0.0, least_restitution(1e-3, 2.0)) == 0.0
-    assert damping_ratio_of_paper(0.0) == 1.0  # critical
+    assert restitution_of(damping_ratio_of_paper(0.0)) == pytest.approx(math.exp(-2.0), rel=1e-12)
 
 
 @pytest.mark.parametrize("e", [0.25, 0.5, 0.75, 1.0])
@@ -92,8 +86,9 @@ def test_normal_forces_feel_each_other():
 @pytest.mark.parametrize("x", [0.01, 0.3, 2.0, 100.0])
 def test_damper_stops_a_corner_without_overshoot(x):
     c, mobility, step, speed = x / 2e-3, 2.0, 1e-3, -0.4
-    d = felt_share(x) * c * step
-    force, _ = normal_forces(-c * speed, 0.0, d, 0.0, mobility, 0.0, 0.0, mobility)
+    force, _ = normal_forces(
+        -c * speed, 0.0, felt_share(x) * c * step, 0.0, mobility, 0.0, 0.0, mobility
+    )
     assert speed + step * mobility * force == pytest.approx(speed / (1.0 + x + 0.5 * x * x))
 
 
@@ -130,5 +125,4 @@ def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c, sliding):
     impact = (k_n, k_t, k_c, -1.0, sliding, mu, e)
     mass = effective_mass(*impact)
     assert mass == pytest.approx(push_of_impact(*impact) / (1.0 + e), rel=1e-9)
-    if sliding:
-        assert mass == pytest.approx(1.0 / (k_n - math.copysign(mu, sliding) * k_c))
+    assert not sliding or mass == pytest.approx(1.0 / (k_n - math.copysign(mu, sliding) * k_c))

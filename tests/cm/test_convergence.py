@@ -3,15 +3,14 @@ contact says."""
 
 import numpy as np
 import pytest
-from cases import UNAMBIGUOUS, peak_errors, pulse_scene, ricker
+from cases import UNAMBIGUOUS, free_rocking, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
-from rockcheck import ContinuousModel, EventBasedModel, Floor, Scene, Sine, load_scene
+from rockcheck import ContinuousModel, EventBasedModel, Floor, Sine, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 
 def rms(history, theta):
-    """RMS difference of theta from the array, in alpha."""
     # One may overturn a step before the other.
     rows = min(len(theta), len(history.channels["theta"]))
     apart = history.channels["theta"][:rows] - theta[:rows]
@@ -22,28 +21,28 @@ def rigid(scene):
     return EventBasedModel(pivot="unilateral").simulate(scene).channels["theta"]
 
 
-ROCKING = Scene(
-    name="rocking",
-    block=PAPER_BLOCK,
-    floor=Floor(friction=0.9),
-    excitation=Sine(amplitude=1.0, period=0.7, cycles=4),
-    initial_rotation=0.4 * PAPER_BLOCK.alpha,
-    duration=3.0,
-)
-BESIDE_A_WALL = pulse_scene(6.0, 3.0, 0.6, ("left", 0.003, 0.5), duration=4.0)
-
-
 @pytest.mark.parametrize(
     ("scene", "play", "depths", "order", "least"),
     [
         (
-            ROCKING,
+            free_rocking(
+                0.4,
+                floor=Floor(friction=0.9),
+                excitation=Sine(amplitude=1.0, period=0.7, cycles=4),
+                duration=3.0,
+            ),
             lambda scene: PaperModel(scene).run().at(scene.output_times)[:, 1],
             (1e-6, 1e-7, 1e-8, 1e-9),
             0.8,
             1e-7,
         ),
-        (BESIDE_A_WALL, rigid, (1e-5, 1e-7, 1e-9), 0.35, 2e-4),
+        (
+            pulse_scene(6.0, 3.0, 0.6, ("left", 0.003, 0.5), duration=4.0),
+            rigid,
+            (1e-5, 1e-7, 1e-9),
+            0.35,
+            2e-4,
+        ),
     ],
     ids=["with the penetration in rocking", "with the duration of a wall contact"],
 )

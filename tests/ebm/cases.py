@@ -74,8 +74,11 @@ def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
     """The scene of a run, up to a time after its pulse."""
     frequency, amplitude, mu = (float(row[name]) for name in ("wp_over_p", "ap_ratio", "mu"))
     wall = (row["side"], float(row["gap"]), float(row["e_w"])) if row["gap"] else None
-    ends = 4.0 * ricker(frequency, amplitude).period + rest
-    return pulse_scene(frequency, amplitude, mu, wall, duration=ends, **more)
+    return pulse_scene(
+        *(frequency, amplitude, mu, wall),
+        duration=4.0 * ricker(frequency, amplitude).period + rest,
+        **more,
+    )
 
 
 def peak_errors(
@@ -90,8 +93,9 @@ def peak_errors(
         if names.get(history.outcome, "safe") != row["outcome"]:
             missed.append(row)
         elif row["outcome"] == "safe":
-            peak = history.peak_rotation / PAPER_BLOCK.alpha
-            errors.append(abs(peak - float(row["peak_theta_over_alpha"])))
+            errors.append(
+                abs(history.peak_rotation / PAPER_BLOCK.alpha - float(row["peak_theta_over_alpha"]))
+            )
     return np.array(errors), missed
 
 
@@ -123,8 +127,8 @@ def places(block: Block, theta: float, sense: int, case: int) -> tuple[np.ndarra
     """The pivot of a block that tips to `sense` (+1 left), and its corner toward the tip wall (case
     1) or the far wall (-1): from the mass's centre, in the world."""
     turn = np.array([[math.cos(theta), -math.sin(theta)], [math.sin(theta), math.cos(theta)]])
-    size = np.array([block.half_width, block.half_height])
-    pivot, corner = np.array([(-sense, -1), (-sense * case, case)]) * size - block.offset
+    signs = np.array([(-sense, -1), (-sense * case, case)])
+    pivot, corner = signs * [block.half_width, block.half_height] - block.offset
     return turn @ pivot, turn @ corner
 
 
@@ -136,17 +140,21 @@ def random_scene(rng: np.random.Generator) -> Scene:
         centre_of_mass=(rng.uniform(-0.6, 0.6) * b, rng.uniform(-0.6, 0.6) * h),
         moment_of_inertia=rng.uniform(0.2, 0.5) * (b * b + h * h),
     )
-    mu = rng.uniform(0.1, 0.9) * block.least_painleve_friction
-    walls = [
-        Wall(
-            side=side,
-            gap=float(rng.choice([0.0, rng.uniform(0.0, 0.1)])),
-            restitution=float(rng.choice([0.0, 0.5])),
-        )
-        for side in ("left", "right")
-        if rng.uniform() < 0.6
-    ]
-    pulse = Ricker(amplitude=G * block.slope * rng.uniform(1.0, 4.0), period=rng.uniform(0.4, 1.5))
     return block_scene(
-        block, min(mu, 1.0), walls=walls, excitation=pulse, duration=3.0, output_step=0.01
+        block,
+        min(rng.uniform(0.1, 0.9) * block.least_painleve_friction, 1.0),
+        walls=[
+            Wall(
+                side=side,
+                gap=float(rng.choice([0.0, rng.uniform(0.0, 0.1)])),
+                restitution=float(rng.choice([0.0, 0.5])),
+            )
+            for side in ("left", "right")
+            if rng.uniform() < 0.6
+        ],
+        excitation=Ricker(
+            amplitude=G * block.slope * rng.uniform(1.0, 4.0), period=rng.uniform(0.4, 1.5)
+        ),
+        duration=3.0,
+        output_step=0.01,
     )

@@ -44,7 +44,8 @@ class PaperModel:
     scene: Scene
     max_step: float = 5e-3
     events: list[tuple[float, str]] = field(default_factory=list)
-    pieces: list[tuple[float, float, Callable[[float], State]]] = field(default_factory=list)
+    #: When each piece of the motion ends, and the state by the time.
+    pieces: list[tuple[float, Callable[[float], State]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.alpha, self.R, self.g = (
@@ -159,23 +160,21 @@ class PaperModel:
 
     def guards(self, m: Mode) -> dict[str, Callable[[float, State], float]]:
         """Functions that fall through zero where the mode ends."""
-        out: dict[str, Callable[[float, State], float]] = {
-            "floor impact": lambda t, y: m.S * y[1],
-            "overturned": lambda t, y: math.pi / 2 - m.S * y[1],
+        every: dict[str, tuple[object, Callable[[float, State], float]]] = {
+            "floor impact": (True, lambda t, y: m.S * y[1]),
+            "overturned": (True, lambda t, y: math.pi / 2 - m.S * y[1]),
+            "release": (m.Sw, lambda t, y: self.motion(m, t, y)[4]),
+            "wall impact": (self.wall and not m.Sw, lambda t, y: self.gap(y)),
+            "stick": (m.d, lambda t, y: m.d * self.slip(y)),
+            "slip": (
+                not m.d,
+                lambda t, y: (
+                    self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
+                ),
+            ),
+            "sense": (m.d and not m.Sw, lambda t, y: m.sense * self.motion(m, t, y)[2]),
         }
-        if m.Sw:
-            out["release"] = lambda t, y: self.motion(m, t, y)[4]
-        elif self.wall:
-            out["wall impact"] = lambda t, y: self.gap(y)
-        if m.d:
-            out["stick"] = lambda t, y: m.d * self.slip(y)
-        else:
-            out["slip"] = lambda t, y: (
-                self.mu_s * abs(self.motion(m, t, y)[2]) - abs(self.motion(m, t, y)[3])
-            )
-        if m.d and not m.Sw:
-            out["sense"] = lambda t, y: m.sense * self.motion(m, t, y)[2]
-        return out
+        return {name: guard for name, (asked, guard) in every.items() if asked}
 
     def impact(
         self,
@@ -196,20 +195,18 @@ class PaperModel:
         s, c, _, _ = self.geometry(y[1])
         R, C, Sw = self.R, self.C(S, y) if self.wall else 0.0, self.side
         v1, w1 = y[2], y[3]
-        a, b = np.zeros((5, 5)), np.zeros(5)  # unknowns: dx/dt, w, P, Q, N
-        a[0], b[0] = [1.0, 0.0, 0.0, -1.0, -Sw], v1
-        a[1], b[1] = [0.0, S * R * s, -1.0, 0.0, 0.0], vertical
-        a[2], b[2] = [0.0, R * R / 3.0, S * R * s, -R * c, R * C * Sw], R * R / 3.0 * w1
-        a[3] = (
-            [0.0, 0.0, self.mu_k * slips * sense, 1.0, 0.0]
+        rows = [  # unknowns: dx/dt, w, P, Q, N
+            ([1.0, 0.0, 0.0, -1.0, -Sw], v1),
+            ([0.0, S * R * s, -1.0, 0.0, 0.0], vertical),
+            ([0.0, R * R / 3.0, S * R * s, -R * c, R * C * Sw], R * R / 3.0 * w1),
+            ([0.0, 0.0, self.mu_k * slips * sense, 1.0, 0.0], 0.0)
             if slips
-            else [1.0, R * c, 0.0, 0.0, 0.0]
-        )
-        if e is None:
-            a[4] = [0.0, 0.0, 0.0, 0.0, 1.0]
-        else:
-            a[4], b[4] = [1.0, -R * C, 0.0, 0.0, 0.0], -e * (v1 - R * C * w1)
-        return np.linalg.solve(a, b).tolist()
+            else ([1.0, R * c, 0.0, 0.0, 0.0], 0.0),
+            ([0.0, 0.0, 0.0, 0.0, 1.0], 0.0)
+            if e is None
+            else ([1.0, -R * C, 0.0, 0.0, 0.0], -e * (v1 - R * C * w1)),
+        ]
+        return np.linalg.solve([row for row, _ in rows], [right for _, right in rows]).tolist()
 
     def hit_floor(self, m: Mode, y: State) -> State:
         s, c, _, _ = self.geometry(0.0)
@@ -282,31 +279,25 @@ class PaperModel:
         mode = self.tilted(t, y, closed=False) if theta != 0.0 or w != 0.0 else None
         while t < scene.duration:
             if mode is None:
-                start = t
                 t, mode, y = self.uplift(t, y[0])
-                self.pieces.append((start, t, lambda _, y=y: y))
-                if mode is None:
-                    return self
-                self.events.append((t, "uplift"))
+                self.pieces.append((t, lambda _, y=y: y))
+                if mode:
+                    self.events.append((t, "uplift"))
                 continue
             t, y, kind = self.step(mode, t, y)
-            if kind == "end":
-                return self
-            if kind != "sense":
+            if kind not in ("end", "sense"):
                 self.events.append((t, kind))
-            if kind == "overturned":
+            if kind in ("end", "overturned"):
                 return self
             mode, y = self.after(mode, kind, t, y)
         return self
 
     def after(self, mode: Mode, kind: str, t: float, y: State) -> tuple[Mode | None, State]:
         if kind == "floor impact":
-            if mode.Sw:  # every contact plastic: flush rest
+            y = self.on_pivot(self.hit_floor(mode, y))
+            if mode.Sw or abs(y[3]) < 1e-7:  # on a wall every contact is plastic: flush rest
                 return None, np.array([y[0], 0.0, 0.0, 0.0])
-            y = self.hit_floor(mode, y)
-            if abs(y[3]) < 1e-7:
-                return None, np.array([y[0], 0.0, 0.0, 0.0])
-            return self.tilted(t, self.on_pivot(y), closed=False), self.on_pivot(y)
+            return self.tilted(t, y, closed=False), y
         if kind == "wall impact":
             y, stays = self.hit_wall(mode, y)
             return self.tilted(t, y, closed=stays), y
@@ -345,7 +336,7 @@ class PaperModel:
                 events=list(named.values()),
                 dense_output=True,
             )
-            self.pieces.append((t, run.t[-1], run.sol))
+            self.pieces.append((run.t[-1], run.sol))
             t, y = run.t[-1], run.y[:, -1]
             if run.status == 1:
                 (kind,) = (
@@ -356,7 +347,7 @@ class PaperModel:
 
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """x, theta, dx/dt, dtheta/dt at the times, up to where the run ended."""
-        ends = [end for _, end, _ in self.pieces]
+        ends = [end for end, _ in self.pieces]
         times = times[times <= ends[-1] + 1e-9]
         pieces = np.minimum(np.searchsorted(ends, times), len(ends) - 1)
-        return np.array([self.pieces[k][2](t) for k, t in zip(pieces, times, strict=True)])
+        return np.array([self.pieces[k][1](t) for k, t in zip(pieces, times, strict=True)])

@@ -19,8 +19,6 @@ from rockcheck.ebm.core.state import Run
 from rockcheck.scenes import Floor, Record, Scene, Wall
 
 PIVOTS = ["bilateral", "unilateral"]
-#: Order of the series that guards are taken from.
-ORDER = 8
 
 
 def shentons(mu_s: float, mu_k: float, slope: float, a: float) -> str:
@@ -75,7 +73,6 @@ class Mode(NamedTuple):
 
 
 def run_of(mode: Mode, state) -> Run:
-    """A run of a tilted block in this mode and state."""
     return run_at(
         state,
         **TILTED | {"pull": mode.pull},
@@ -102,16 +99,13 @@ class Situation:
 
     @property
     def scene(self) -> Scene:
-        horizontal, vertical = (
-            Record.from_samples([a, a, a], time_step=1.0) for a in (self.u, self.g - 1.0)
-        )
         return Scene(
             name="part",
             block=block_of(self.alpha),
             floor=Floor(friction=self.mu_k, static_friction=self.mu_s),
             walls=self.walls,
-            excitation=horizontal,
-            vertical=vertical,
+            excitation=Record.from_samples([self.u] * 3, time_step=1.0),
+            vertical=Record.from_samples([self.g - 1.0] * 3, time_step=1.0),
             duration=1.0,
             gravity=1.0,
         )
@@ -132,8 +126,10 @@ class Core:
     def select(self, state) -> Mode | None:
         """The mode in which the state (x, y, theta and their rates) goes on."""
         run = run_at(state)
-        selected = modes.select(self.setting, self.base, run)
-        if not selected or run.state.rules[Rule.LEAST_CONTRADICTION]:
+        if (
+            not modes.select(self.setting, self.base, run)
+            or run.state.rules[Rule.LEAST_CONTRADICTION]
+        ):
             return None
         mode = run.state.mode
         return Mode(
@@ -150,19 +146,21 @@ class Core:
         """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
         follow."""
         run = run_of(mode, state)
-        order = motion.tilt_series(self.setting, self.base, run, ORDER, 0.0, 0.0)
+        order = motion.tilt_series(self.setting, self.base, run, 8, 0.0, 0.0)
         a = run.a
         run.state.place = mode.side * state[0] - a[Row.SIN, 0]
         guards.fill_guards(self.setting, run.state, a)
-        found = {}
-        for name, which in GUARDS.items():
-            degree = guards.guard(which, order, a)
-            if degree >= 0:
-                found[name] = Polynomial(a[Row.GUARD, : degree + 1].copy())
+        found = {
+            name: Polynomial(a[Row.GUARD, : degree + 1].copy())
+            for name, which in GUARDS.items()
+            if (degree := guards.guard(which, order, a)) >= 0
+        }
         rock = mode.floor == "stick" and not mode.tip and not mode.far
-        rows = {"phi": Row.PHI, "xi": Row.SIN, "y": Row.COS}
-        rows |= {} if rock else {"xi": Row.XI, "y": Row.Y}
-        follows = {name: Polynomial(a[row, : order + 1].copy()) for name, row in rows.items()}
+        places = {"xi": Row.SIN, "y": Row.COS} if rock else {"xi": Row.XI, "y": Row.Y}
+        follows = {
+            name: Polynomial(a[row, : order + 1].copy())
+            for name, row in ({"phi": Row.PHI} | places).items()
+        }
         follows["xi"] += run.state.place if rock else 0.0
         return found, follows
 
@@ -187,14 +185,12 @@ def answer(at: Situation, mode: Mode) -> Found:
     frame."""
     phi, w = mode.side * at.state[2], mode.side * at.state[5]
     rows, bias = contacts(at.alpha, phi, w)
-    unknowns = 7  # three accelerations; P, Q, N, M
-    matrix, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    matrix, right = np.zeros((7, 7)), np.zeros(7)  # three accelerations; P, Q, N, M
     matrix[:3, :3] = np.diag([1.0, 1.0, 1.0 / 3.0])
     matrix[:3, 3:] = -rows.T
     right[:3] = [-mode.side * at.u, -at.g, 0.0]
-    closed = [mode.floor != "off", mode.floor == "stick", mode.tip, mode.far]
-    for k in range(4):
-        if closed[k]:
+    for k, closed in enumerate([mode.floor != "off", mode.floor == "stick", mode.tip, mode.far]):
+        if closed:
             matrix[3 + k, :3], right[3 + k] = rows[k], -bias[k]
         else:
             matrix[3 + k, 3 + k] = 1.0
@@ -213,8 +209,10 @@ def contacts(alpha: float, phi: float, w: float) -> tuple[np.ndarray, np.ndarray
         math.sin(alpha + phi),
         math.cos(alpha + phi),
     )
-    rows = np.array([[0.0, 1.0, -s], [1.0, 0.0, c], [1.0, 0.0, -cp], [-1.0, 0.0, -cp]])
-    return rows, np.array([c, s, sp, sp]) * w * w
+    return (
+        np.array([[0.0, 1.0, -s], [1.0, 0.0, c], [1.0, 0.0, -cp], [-1.0, 0.0, -cp]]),
+        np.array([c, s, sp, sp]) * w * w,
+    )
 
 
 def margin(at: Situation, mode: Mode, touched: tuple[bool, bool], pivot: str) -> float:
@@ -304,15 +302,8 @@ def random_tilt(rng: np.random.Generator, touch: str) -> tuple[Situation, int, t
 def standing(at: Situation) -> tuple[float, ...]:
     """The state with the slip of its pivot taken away."""
     x, y, theta, _, _, w = at.state
-    side = math.copysign(1.0, theta)
-    return (
-        x,
-        y,
-        theta,
-        -math.cos(at.alpha - abs(theta)) * w,
-        side * math.sin(at.alpha - abs(theta)) * w,
-        w,
-    )
+    s, c = math.sin(at.alpha - abs(theta)), math.cos(at.alpha - abs(theta))
+    return (x, y, theta, -c * w, math.copysign(1.0, theta) * s * w, w)
 
 
 def at_wall(at: Situation, side: int) -> float | None:

@@ -16,7 +16,6 @@ from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
 def nothing() -> Records:
-    """Records without rows."""
     return Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
 
 
@@ -40,10 +39,9 @@ def six(motion: Any) -> np.ndarray:
 
 def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     """The state after the compiled loop has played the scene, without rows."""
-    packed = pack([scene], model)
     states = state_for(model, model.most_steps)
     march.play(
-        packed.rows,
+        pack([scene], model).rows,
         states,
         work or workspace(),
         Records(*(part[None] for part in nothing())),
@@ -84,12 +82,13 @@ def setting_of(
     **how: Any,
 ) -> Any:
     """A block, or one of R = 1 m and this alpha, as the compiled code has it: free to hop."""
-    scene = Scene(
-        name="block",
-        block=block if isinstance(block, Block) else block_of(block),
-        floor=Floor(friction=friction, restitution=restitution),
-        walls=walls,
-        duration=1.0,
+    return natural.setting_of(
+        Scene(
+            name="block",
+            block=block if isinstance(block, Block) else block_of(block),
+            floor=Floor(friction=friction, restitution=restitution),
+            walls=walls,
+            duration=1.0,
+        ),
+        **{"unilateral": True, "no_slip": False, "energy_cap": False} | how,
     )
-    free = {"unilateral": True, "no_slip": False, "energy_cap": False}
-    return natural.setting_of(scene, **free | how)

@@ -40,14 +40,6 @@ def kinds(history: History) -> list[str]:
     return [event.kind for event in history.event_list]
 
 
-def energy_of(history: History) -> np.ndarray:
-    return kinematics.energy(
-        PAPER_BLOCK,
-        G,
-        *(history.channels[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot")),
-    )
-
-
 def constant(acceleration: float, duration: float = 10.0) -> Record:
     return Record.from_samples([acceleration, acceleration], time_step=duration)
 
@@ -58,19 +50,15 @@ def grazing_gap(tilt: float) -> float:
 
     Its next rotation follows from Housner's impact, r = 1 - 3/2 sin^2 alpha, and energy.
     """
-    r = 1.0 - 1.5 * math.sin(PAPER_BLOCK.alpha) ** 2
+    alpha = PAPER_BLOCK.alpha
     # Height of the centroid, R cos(alpha - phi), is all the energy there is at a turning point.
-    depth = r**2 * (math.cos(PAPER_BLOCK.alpha - tilt) - math.cos(PAPER_BLOCK.alpha))
-    peak = PAPER_BLOCK.alpha - math.acos(math.cos(PAPER_BLOCK.alpha) + depth)
-    return PAPER_BLOCK.radius * (
-        math.sin(PAPER_BLOCK.alpha + peak) - math.sin(PAPER_BLOCK.alpha - peak)
-    )
+    depth = (1.0 - 1.5 * math.sin(alpha) ** 2) ** 2 * (math.cos(alpha - tilt) - math.cos(alpha))
+    peak = alpha - math.acos(math.cos(alpha) + depth)
+    return PAPER_BLOCK.radius * (math.sin(alpha + peak) - math.sin(alpha - peak))
 
 
 @pivots
 def test_grazing_wall_contact(pivot):
-    """A corner that turns back a billionth of the gap before the wall does not touch it; a
-    billionth after, it does, softly."""
     tilt, gap = 0.15, grazing_gap(0.15)
     free, misses, touches = (
         play(scene_of(initial_rotation=-tilt, duration=2.5, walls=walls), pivot, tolerance=1e-13)
@@ -82,8 +70,8 @@ def test_grazing_wall_contact(pivot):
     )
     assert "wall impact" not in kinds(misses)
     np.testing.assert_array_equal(misses.channels["theta"], free.channels["theta"])
-    (impact,) = [event for event in touches.event_list if event.kind == "wall impact"]
-    assert 0.0 < impact.impulse < 1e-3
+    (impulse,) = [one.impulse for one in touches.event_list if one.kind == "wall impact"]
+    assert 0.0 < impulse < 1e-3
     assert np.max(np.abs(touches.channels["theta"] - free.channels["theta"])) < 1e-3
 
 
@@ -92,12 +80,15 @@ def test_grazing_wall_contact(pivot):
 @pivots
 def test_impact_on_floor_and_wall_at_once(pivot, e, side, sign):
     """A block beside a wall, tilted away and let go, lands flush against it."""
-    walls = [Wall(side=one, gap=5.0, restitution=0.9) for one in ("left", "right") if one != side]
-    walls.append(Wall(side=side, gap=0.0, restitution=e))
+    other = {"left": "right", "right": "left"}[side]
+    walls = [Wall(side=other, gap=5.0, restitution=0.9), Wall(side=side, gap=0.0, restitution=e)]
     scene = scene_of(walls=walls, initial_rotation=-0.1 * sign)
     history = play(scene, pivot, tolerance=1e-12)
     assert_contacts_hold(scene, history)
-    motion, energy = history.channels, energy_of(history)
+    motion = history.channels
+    energy = kinematics.energy(
+        PAPER_BLOCK, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+    )
     assert np.max(sign * motion["theta"]) < 1e-9
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
@@ -126,9 +117,7 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
         play(scene_of(floor=Floor(friction=friction), excitation=constant(u * G * limit)), pivot)
         for u in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
     )
-    assert not kinds(below)
-    assert not below.channels[column].any()
-    assert kinds(above)[0] == kind
+    assert (kinds(below), below.channels[column].any(), kinds(above)[0]) == ([], False, kind)
     assert np.max(np.abs([at.channels[column], barely.channels[column]])) < 1e-9
     if kind == "slip":
         assert above.channels["x"][-1] == pytest.approx(-0.5 * 1e-7 * G * limit * 9.0, rel=1e-5)
@@ -136,20 +125,16 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
 
 @pivots
 def test_balance_point(pivot):
-    """At theta = alpha the block stands on its corner for ever; a little less and it comes back, a
-    little more and it falls."""
     back, on, over = (
         play(scene_of(initial_rotation=PAPER_BLOCK.alpha * factor, duration=20.0), pivot)
         for factor in (1.0 - 1e-6, 1.0, 1.0 + 1e-6)
     )
-    assert on.outcome == "moving"  # it stands, but not on its base
+    # On its corner it stands, but not on its base.
+    assert [one.outcome for one in (back, on, over)] == ["at rest", "moving", "overturned left"]
     assert not kinds(on)
     np.testing.assert_allclose(on.channels["theta"], PAPER_BLOCK.alpha, rtol=0.0, atol=1e-9)
-    assert back.outcome == "at rest"
-    assert (
-        np.min(back.channels["theta"]) < -0.1 * PAPER_BLOCK.alpha
-    )  # it came back through the upright
-    assert over.outcome == "overturned left"
+    # It came back through the upright.
+    assert np.min(back.channels["theta"]) < -0.1 * PAPER_BLOCK.alpha
     assert np.all(np.diff(over.channels["theta"]) > 0.0)
 
 
@@ -170,12 +155,11 @@ BESIDE_WALLS = {
 @pytest.mark.parametrize("name", BESIDE_WALLS)
 @pivots
 def test_walls_and_floor_are_not_entered(pivot, name, e):
-    """Every row keeps its distance, to 1e-9 m, whatever the wall returns; between two walls a block
-    hops that may."""
     gaps, more, events = BESIDE_WALLS[name]
     sides = zip(("left", "right"), gaps, strict=False)
-    walls = [Wall(side=side, gap=gap, restitution=e) for side, gap in sides]
-    scene = scene_of(walls=walls, duration=6.0, **more)
+    scene = scene_of(
+        walls=[Wall(side=side, gap=gap, restitution=e) for side, gap in sides], duration=6.0, **more
+    )
     history = play(scene, pivot)
     assert_contacts_hold(scene, history)
     assert events <= set(kinds(history))
@@ -190,8 +174,6 @@ def test_walls_and_floor_are_not_entered(pivot, name, e):
 
 
 def test_zeno_sequence_of_a_bouncing_block():
-    """Dropped flat at e = 0.999 it bounces sqrt(2 h/g) (1 + e)/(1 - e) s, thousands of times, and
-    then rests."""
     height, e = 1e-4, 0.999
     end = math.sqrt(2.0 * height / G) * (1.0 + e) / (1.0 - e)
     history = play(
@@ -206,18 +188,20 @@ def test_zeno_sequence_of_a_bouncing_block():
     assert history.outcome == "at rest"
     landings = [event.t for event in history.event_list if event.impulse > 0.0]
     assert len(landings) > 2000
-    assert landings[-1] == pytest.approx(end, rel=0.02)
-    assert landings[-1] < end
+    assert 0.98 * end <= landings[-1] < end
     assert np.max(np.abs(history.channels["theta"])) < 1e-9
 
 
 @pivots
 def test_zeno_sequence_of_a_rocking_block(pivot):
-    """A slender block loses little at an impact; its hundreds of impacts pile up at a time, and it
-    rests after it."""
     block = Block(half_width=0.1, half_height=1.0)
-    start = {"block": block, "initial_rotation": 0.5 * block.alpha, "duration": 200.0}
-    history = play(scene_of(floor=Floor(friction=0.5), **start), pivot)
+    scene = scene_of(
+        block=block,
+        floor=Floor(friction=0.5),
+        initial_rotation=0.5 * block.alpha,
+        duration=200.0,
+    )
+    history = play(scene, pivot)
     impacts = [event.t for event in history.event_list if event.kind == "floor impact"]
     assert history.outcome == "at rest"
     assert len(impacts) > 500
@@ -235,8 +219,7 @@ def test_record_of_one_sample(pivot, strength):
     """One sample lasts no time: nothing happens. Found by `rockcheck stress`: no mode was
     consistent at t = 0."""
     shaken = play(scene_of(excitation=Record.from_samples([strength], time_step=0.01)), pivot)
-    assert shaken.outcome == "at rest"
-    assert not shaken.channels["theta"].any()
+    assert (shaken.outcome, shaken.channels["theta"].any()) == ("at rest", False)
 
 
 @pivots
@@ -282,7 +265,6 @@ def test_pulse_that_is_shorter_than_a_step(pivot, vertical, symmetric, tilt):
 
 @pivots
 def test_duration_that_ends_at_an_impact(pivot):
-    """Whether the run stops just before, at or just after an impact: it ends, with all its rows."""
     scene = scene_of(initial_rotation=0.1, output_step=0.05)
     impact = next(
         event.t for event in play(scene, pivot).event_list if event.kind == "floor impact"
@@ -295,6 +277,6 @@ def test_duration_that_ends_at_an_impact(pivot):
         impact * (1.0 + 1e-13),
     ):
         history = play(scene.replace(duration=end, output_step=end / 8.0), pivot)
-        assert (len(history.channels["t"]), history.outcome) == (9, "moving")
-        assert abs(history.channels["theta"][-1]) < 1e-9
-        assert len(history.event_list) <= 1
+        theta = history.channels["theta"]
+        ends = (len(theta), history.outcome, theta[-1], len(history.event_list) <= 1)
+        assert ends == (9, "moving", pytest.approx(0.0, abs=1e-9), True)

@@ -51,9 +51,10 @@ def test_unstable_balance_amplifies_as_the_hyperbolic_cosine(
 ) -> None:
     """A tilt of alpha (1 + d) turns away as alpha (1 + d cosh(p t)) while that is small, so that t
     = acosh(allowed/d)/p."""
-    expected = math.acosh(allowed / perturbation) / BALANCED.frequency_parameter
     found = predictability_horizon(BALANCED, perturbation=perturbation, allowed=allowed)
-    assert found == pytest.approx(expected, abs=BALANCED.output_step)
+    assert found == pytest.approx(
+        math.acosh(allowed / perturbation) / BALANCED.frequency_parameter, abs=BALANCED.output_step
+    )
 
 
 @pytest.mark.parametrize(
@@ -78,11 +79,11 @@ RECORD = load_scene("fig4a")
 
 
 def test_the_ratio_alone_decides() -> None:
-    horizon = predictability_horizon(RECORD)
-    assert horizon == predictability_horizon(RECORD)
-    assert horizon == pytest.approx(
-        predictability_horizon(RECORD, perturbation=1e-7, allowed=1e-4), abs=2 * RECORD.output_step
+    horizon, again, tenth = (
+        predictability_horizon(RECORD, **ratio)
+        for ratio in ({}, {}, {"perturbation": 1e-7, "allowed": 1e-4})
     )
+    assert (again, tenth) == (horizon, pytest.approx(horizon, abs=2 * RECORD.output_step))
 
 
 @pytest.mark.parametrize(
@@ -104,8 +105,6 @@ def test_the_ratio_alone_decides() -> None:
 def test_a_motion_parts_from_its_disturbed_self_just_after_the_horizon(
     scene: Scene, model: EventBasedModel, least: float, most: float
 ) -> None:
-    """By the definition: base motions a millionth stronger and weaker turn the block by 1e-3 alpha
-    otherwise just after the horizon, and not before."""
     horizon = predictability_horizon(scene, model)
     assert least < horizon < most
     plain = model.simulate(scene).channels
@@ -146,8 +145,9 @@ def test_it_ends_where_the_laws_of_impacts_part(side: str, sign: float, restitut
         for event in EventBasedModel(pivot="unilateral").simulate(scene).event_list
         if event.kind == "floor impact"
     )
-    parts = first - scene.output_step, first + 0.02
-    least, most = parts if restitution else (first + 0.1, scene.duration)
+    least, most = (
+        (first - scene.output_step, first + 0.02) if restitution else (first + 0.1, scene.duration)
+    )
     assert least <= predictability_horizon(scene) <= most
 
 

@@ -31,7 +31,6 @@ def key_of(row: Row) -> tuple[str, ...]:
 
 
 def numbered(rows: list[Row]) -> list[object]:
-    """The rows as test parameters; their names are the lines of the file."""
     return [pytest.param(line, row, id=f"line {line}") for line, row in enumerate(rows, 2)]
 
 
@@ -60,11 +59,9 @@ ALIKE = [
 
 
 def test_the_tables_are_whole():
-    assert len(BILATERAL) == 390
-    assert len(UNILATERAL) == 570
-    assert sum(row["depends_on_rule"] == "1" for row in UNILATERAL) == 4
+    dependent = [row for row in UNILATERAL if row["depends_on_rule"] == "1"]
+    assert [len(one) for one in (BILATERAL, UNILATERAL, dependent, ALIKE)] == [390, 570, 4, 103]
     assert {key_of(row) for row in BILATERAL} <= FLIGHTS.keys()
-    assert len(ALIKE) == 103
 
 
 @pytest.mark.parametrize(("line", "row"), numbered(BILATERAL))
@@ -80,8 +77,9 @@ def test_bilateral_row(line, row):
     run = run_to_end(scene)
     assert run.outcome == row["outcome"]
     if row in ALIKE:
-        peak = float(FLIGHTS[key_of(row)]["peak_theta_over_alpha"])
-        assert run.peak == pytest.approx(peak, abs=1e-6)
+        assert run.peak == pytest.approx(
+            float(FLIGHTS[key_of(row)]["peak_theta_over_alpha"]), abs=1e-6
+        )
     rattles = row["e_w"] == "1" and int(row["n_wall"]) > 20
     if line == GRAZING_ROW:
         assert (run.wall_impacts, row["n_wall"]) == (5, "4")

@@ -1,7 +1,5 @@
 """The engines that are installed, and the continuous model, as tests ask for them."""
 
-from typing import Any
-
 import pytest
 
 from rockcheck import ContinuousModel, engines
@@ -22,9 +20,6 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     vary, or as a model in double precision with its steps; some take their time. The continuous
     model is one of the models."""
 
-    def parameters(models: list[Any]) -> list:
-        return [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
-
     fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (DOUBLE, BOUNCING))
     adaptive = [one(time_step="adaptive") for one in VARYING]
     for name, models in {
@@ -40,4 +35,5 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             words = [
                 f"{one.name} {one.time_step}" if "model" in name else one.name for one in models
             ]
-            metafunc.parametrize(name, parameters(models), ids=words)
+            marked = [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
+            metafunc.parametrize(name, marked, ids=words)

@@ -35,9 +35,8 @@ def test_rest_stays_at_rest(model, block):
         Scene(name="rest", block=block, floor=Floor(friction=0.3), duration=1.0)
     )
     assert (history.outcome, history.event_list) == ("at rest", ())
-    assert history.peak_rotation < 2e-8
-    assert np.max(np.abs(history.channels["x"])) < 1e-7
-    assert np.max(np.abs(history.channels["y"] - block.half_height)) < 1e-6
+    for name, place, most in (("theta", 0, 2e-8), ("x", 0, 1e-7), ("y", block.half_height, 1e-6)):
+        assert np.max(np.abs(history.channels[name] - place)) < most, name
 
 
 def test_impact_obeys_housner(model, block):
@@ -56,19 +55,21 @@ def test_impact_obeys_housner(model, block):
 
 def test_quarter_period(model):
     scene = free_rocking(0.4)
-    events = model.simulate(scene).event_list
-    impact = next(event for event in events if event.kind == "floor impact")
+    impact = next(
+        event for event in model.simulate(scene).event_list if event.kind == "floor impact"
+    )
     alpha, tilt = scene.block.alpha, scene.initial_rotation
     # Energy integral of theta'' = -p^2 sin(alpha - theta), with theta = tilt - v^2 to take out the
     # end's singularity.
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    v = 0.5 * math.sqrt(tilt) * (nodes + 1.0)
-    speed = (
-        np.sqrt(2.0 * (np.cos(alpha - tilt) - np.cos(alpha - tilt + v**2)))
-        * scene.frequency_parameter
-    )
-    quarter = 0.5 * math.sqrt(tilt) * float(np.sum(weights * 2.0 * v / speed))
-    assert impact.t == pytest.approx(quarter, abs=within(model, 2e-4, 1e-6))
+    quarter = quad(
+        lambda v: (
+            2.0 * v / math.sqrt(2.0 * (math.cos(alpha - tilt) - math.cos(alpha - tilt + v * v)))
+        ),
+        0.0,
+        math.sqrt(tilt),
+    )[0]
+    known = quarter / scene.frequency_parameter
+    assert impact.t == pytest.approx(known, abs=within(model, 2e-4, 1e-6))
 
 
 @pytest.mark.parametrize(("speed", "friction"), [(1.0, 0.2), (-1.5, 0.5)])
@@ -82,17 +83,13 @@ def test_sliding_distance(model, speed, friction):
             duration=1.0,
         )
     )
-    assert history.channels["x"][-1] == pytest.approx(
-        math.copysign(speed**2 / (2 * friction * 9.81), speed), rel=within(model, 5e-4, 1e-5)
-    )
+    slid = pytest.approx(speed * abs(speed) / (2 * friction * 9.81), rel=within(model, 5e-4, 1e-5))
+    assert (history.outcome, history.channels["x"][-1]) == ("at rest", slid)
     assert history.peak_rotation < 1e-5
-    assert history.outcome == "at rest"
-    if model.name == "cm":  # tells impacts alone
-        return
-    assert [event.kind for event in history.event_list] == ["stick", "settled"]
-    # The event is told at 1 mm/s.
-    stops = abs(speed) / (friction * 9.81)
-    assert history.event_list[0].t == pytest.approx(stops, abs=0.003)
+    if model.name != "cm":  # which tells impacts alone
+        assert [event.kind for event in history.event_list] == ["stick", "settled"]
+        # The event is told at 1 mm/s.
+        assert history.event_list[0].t == pytest.approx(abs(speed) / (friction * 9.81), abs=0.003)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 0.8])
@@ -138,8 +135,8 @@ def test_flush_impact_on_a_wall(bouncing_model, side, restitution):
     assert history.channels["x_dot"][-1] == pytest.approx(-restitution * outward, abs=1e-3)
     assert history.peak_rotation < 1e-6
     impacts = [event for event in history.event_list if event.kind == "wall impact"]
-    assert len(impacts) == 2  # both corners
     times, impulse = [event.t for event in impacts], sum(event.impulse for event in impacts)
+    # Of both corners.
     assert times == pytest.approx([0.050737] * 2, abs=within(bouncing_model, 1e-4, 1e-6))
     assert impulse == pytest.approx(1.0 + restitution, rel=within(bouncing_model, 2e-3, 1e-3))
 
@@ -159,8 +156,7 @@ def test_both_walls(bouncing_model):
         )
     )
     x, speed = history.channels["x"], abs(history.channels["x_dot"][-1])
-    reaches = (np.min(x), np.max(x), speed)
-    assert reaches == pytest.approx((-0.030037, 0.050537, 1.0), abs=1e-3)
+    assert (np.min(x), np.max(x), speed) == pytest.approx((-0.030037, 0.050537, 1.0), abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -175,8 +171,6 @@ def test_both_walls(bouncing_model):
 )
 @pytest.mark.parametrize("share", [0.1, 0.37, 0.5, 0.81, 1.0, 1.3])
 def test_the_base_gains_what_its_acceleration_gives(excitation, share):
-    """The velocity of the base against an integral of its own, to rounding; it stays when the
-    shaking has ended."""
     t = share * excitation.quiet_after
     gained = quad(
         lambda s: float(excitation.acceleration(s)),
@@ -219,7 +213,7 @@ LOOSE = {
 def test_a_loose_block(model, name):
     scene, channel, exact, allowed = LOOSE[name]
     found = model.simulate(scene).channels
-    assert np.max(np.abs(found[channel] - exact(found["t"]))) < allowed
+    assert np.max(np.abs(found[channel] - exact(found["t"]))) < within(model, allowed, 3e-8)
 
 
 @pytest.mark.parametrize(("amplitude", "side"), [(6.0, "left"), (-6.0, "right")])
@@ -250,8 +244,9 @@ def test_mirrored_scene_gives_mirrored_motion(model, block):
     )
     history, mirrored = model.simulate(scene), model.simulate(scene.mirrored())
     for channel in ("x", "theta", "x_dot", "theta_dot", "slip"):
-        apart = np.max(np.abs(history.channels[channel] + mirrored.channels[channel]))
-        assert apart < (1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)), channel
+        assert np.max(np.abs(history.channels[channel] + mirrored.channels[channel])) < (
+            1e-6 if "adaptive" in str(model) else within(model, 2e-3, 1e-7)
+        ), channel
     assert history.peak_rotation > 0.2 * block.alpha
     kinds, others = ([event.kind for event in one.event_list] for one in (history, mirrored))
     assert "wall impact" in kinds
@@ -274,18 +269,18 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine):
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
     apart = np.max(np.abs(history.channels["theta"] - reference.channels["theta"]))
     assert apart < 1e-4 * scene.block.alpha
-    hit = history.event_list[1]
-    assert (hit.mode_before, hit.mode_after) == ("rock", "flight")
-    assert hit.impulse == pytest.approx(0.407101, abs=1e-4)
+    hit, impulse = history.event_list[1], pytest.approx(0.407101, abs=1e-4)
+    assert (hit.mode_before, hit.mode_after, hit.impulse) == ("rock", "flight", impulse)
 
 
 def test_slip_and_stick_events(varying_engine):
     """Times of the unilateral model; that of the slip is known to one step."""
     scene = pulse_scene(4.5, 4.0, 0.3, duration=1.6)
     events = varying_engine(time_step="adaptive").simulate(scene).event_list
-    found = {event.kind: event.t for event in events}
-    assert found["slip"] == pytest.approx(1.057406, abs=1.1e-3)
-    assert found["stick"] == pytest.approx(1.366917, abs=1e-4)
+    assert {event.kind: event.t for event in events if event.kind in ("slip", "stick")} == {
+        "slip": pytest.approx(1.057406, abs=1.1e-3),
+        "stick": pytest.approx(1.366917, abs=1e-4),
+    }
 
 
 def test_a_rocking_block_comes_to_rest_once(varying_engine):
@@ -311,17 +306,18 @@ ALL = [
 ]
 #: Models at their best, and engines as they come; how far from the unilateral model they may be,
 #: RMS in alpha.
-BEST = [(engine(time_step="adaptive"), 1e-5) for engine in ALL] + [(ContinuousModel(), 3e-4)]
-STOCK = [(engine(time_step=1e-4, settings="default"), 5e-2) for engine in ALL]
+PLAYERS = [
+    *((engine(time_step="adaptive"), 1e-5) for engine in ALL),
+    (ContinuousModel(), 3e-4),
+    *((engine(time_step=1e-4, settings="default"), 5e-2) for engine in ALL),
+]
 
 
 STANDS = Scene(name="stands", block=RACK, floor=Floor(friction=0.5), duration=2.5)
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize(
-    ("player", "allowed"), [*BEST, *STOCK], ids=lambda one: getattr(one, "name", None)
-)
+@pytest.mark.parametrize(("player", "allowed"), PLAYERS, ids=lambda one: getattr(one, "name", None))
 def test_each_model_knows_where_the_mass_is(player, allowed, name):
     scene = STANDS.replace(**SCENES[name])
     found, exact = (

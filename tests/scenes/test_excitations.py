@@ -2,9 +2,11 @@
 recorded motion is."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete, lfilter
 
 from rockcheck.scenes import Record, Rest, Ricker, Sine
 from rockcheck.scenes.recordings import intensity
@@ -26,15 +28,14 @@ def test_ricker_is_the_papers():
     )
     np.testing.assert_allclose(pulse.acceleration(t), expected, rtol=1e-12, atol=1e-14)
     peak = np.argmax(expected)
-    assert expected[peak] == pytest.approx(1.00009 * 6.0, rel=1e-5)
-    assert q[peak] == pytest.approx(-0.2045 * T, abs=1e-3)
+    known = (pytest.approx(1.00009 * 6.0, rel=1e-5), pytest.approx(-0.2045 * T, abs=1e-3))
+    assert (expected[peak], q[peak]) == known
     assert pulse.acceleration(0.8 * T) < 0.0
 
 
 def test_symmetric_ricker_peaks_at_its_centre():
-    pulse = Ricker(amplitude=-2.0, period=0.5, symmetric=True)
+    pulse, offset = Ricker(amplitude=-2.0, period=0.5, symmetric=True), np.linspace(0.01, 1.0, 50)
     assert pulse.acceleration(pulse.centre) == pytest.approx(-2.0)
-    offset = np.linspace(0.01, 1.0, 50)
     np.testing.assert_allclose(
         pulse.acceleration(1.0 + offset), pulse.acceleration(1.0 - offset), rtol=1e-12, atol=1e-15
     )
@@ -81,8 +82,9 @@ def test_intensities_of_a_sine_are_its_closed_forms():
     assert intensity.arias(record) == pytest.approx(
         math.pi / (2 * G) * amplitude**2 * 5.0, rel=1e-5
     )
-    built_up = amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0))
-    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(built_up, rel=0.01)
+    assert intensity.spectral_acceleration(record, 1.0) == pytest.approx(
+        amplitude / G / (2 * 0.05) * (1 - math.exp(-0.05 * rate * 10.0)), rel=0.01
+    )
     assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
 
 
@@ -109,28 +111,25 @@ def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples(
 
 @pytest.mark.parametrize("damping", [0.02, 0.05, 0.5])
 def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping):
-    """A step of acceleration: the peak is 1 + exp(-pi D/sqrt(1 - D^2)), half a period later."""
     step = Recording(samples=np.ones(2000), time_step=1e-3, unit="m/s2", form="CSV")
-    peak = 1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
-    assert intensity.spectral_acceleration(step, 0.5, damping) * G == pytest.approx(peak, rel=1e-4)
+    assert intensity.spectral_acceleration(step, 0.5, damping) * G == pytest.approx(
+        1.0 + math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2)), rel=1e-4
+    )
 
 
 @pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
 def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
-    from scipy.signal import cont2discrete, lfilter
-
     samples, parts = np.random.default_rng(3).normal(size=40), 2
     step, rate, damping, tail = 0.01, math.tau / period, 0.1, 30
     above, below, _ = cont2discrete(
         ([rate**2], [1.0, 2.0 * damping * rate, rate**2]), step, method="foh"
     )
     ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
-    response = lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)])
-    found = largest_response(samples, parts, tail, step, rate, damping)
-    assert found == pytest.approx(np.max(np.abs(response)), rel=1e-9)
+    assert largest_response(samples, parts, tail, step, rate, damping) == pytest.approx(
+        np.max(np.abs(lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)]))), rel=1e-9
+    )
 
 
 def test_periods_of_a_spectrum_leave_no_wide_gap():
-    steps = np.divide(intensity.PERIODS[1:], intensity.PERIODS[:-1])
-    assert np.all((steps > 1.0) & (steps <= 2.0))
+    assert all(one < other <= 2.0 * one for one, other in pairwise(intensity.PERIODS))
     assert intensity.PERIODS[0] <= 0.1 < 4.0 <= intensity.PERIODS[-1]

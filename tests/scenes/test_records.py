@@ -47,25 +47,12 @@ def peer_record(component: str) -> Path:
     [("180-hor1", 5372, 0.2808), ("-UP", 5378, 0.1781), ("270-hor2", 5346, 0.2107)],
 )
 def test_genuine_peer_files(component, count, peak):
-    record = Record.from_file(peer_record(component))
-    assert (record.time_step, len(record.samples)) == (0.01, count)
+    record, known = Record.from_file(peer_record(component)), pytest.approx(peak, abs=5e-5)
+    assert (record.time_step, len(record.samples), record.peak) == (0.01, count, known)
     assert np.isfinite(record.samples).all()
-    assert record.peak == pytest.approx(peak, abs=5e-5)
 
 
 # --- CSV
-
-
-@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["LF", "CRLF"])
-@pytest.mark.parametrize(("column", "factor"), [("acceleration_g", G), ("acceleration_m_s2", 1.0)])
-def test_csv(column, factor, end, written):
-    text = (
-        f"# a remark\nstation,time_s , {column}\n"
-        "A,0.00,0.0\n\nA,0.02,1.0e-1\n# another\nA,0.04,-.2\n"
-    )
-    record = Record.from_file(written("motion.csv", text.replace("\n", end)))
-    np.testing.assert_allclose(record.samples, np.array([0.0, 0.1, -0.2]) * factor, rtol=1e-15)
-    assert record.time_step == 0.02
 
 
 def run_together(
@@ -206,8 +193,7 @@ UNKNOWN = [
 )
 def test_faults_are_named(name, text, options, said, written, fault_of):
     fault = str(fault_of(Record.from_file, written(name, text), **options))
-    assert name in fault
-    assert said in fault
+    assert [part for part in (name, said) if part not in fault] == []
 
 
 @pytest.mark.parametrize("count", [1, 4, 5, 6, 23, 25])

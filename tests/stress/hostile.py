@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from nasty import AT2, CSV, HISTORY
+
 SECONDS = 60.0
 SCENE = """name = "a"
 duration = 0.5
@@ -25,9 +27,6 @@ floor = { friction = 0.4 }
 excitation = { kind = "ricker", amplitude = 4.0, period = 0.7 }
 """
 SUITE = 'reference = "ebm"\nscenes = ["a.toml"]\n[models.ebm]\n'
-HISTORY = "t,theta,x\n0.0,0.1,0.0\n0.1,0.05,0.0\n0.2,-0.01,0.001\n"
-AT2 = "ACCELERATION IN UNITS OF G\nNPTS= 4, DT= .01 SEC\n.1 .2 .3 .4\n"
-RECORD = "time_s,acceleration_g\n0.0,0.1\n0.01,0.2\n0.02,0.1\n"
 
 #: What a file of any kind may be instead of what it says that it is.
 WHOLE: dict[str, Callable[[Path, bytes], object]] = {
@@ -68,7 +67,7 @@ READERS: dict[str, tuple[str, str, tuple[str, ...]]] = {
     ),
     "history": ("h.csv", HISTORY, ("compare", "h.csv", "good.csv")),
     "AT2": ("r.AT2", AT2, ("simulate", "at2.toml", "--model", "ebm", "-o", "o.csv")),
-    "record": ("r.csv", RECORD, ("simulate", "record.toml", "--model", "ebm", "-o", "o.csv")),
+    "record": ("r.csv", CSV, ("simulate", "record.toml", "--model", "ebm", "-o", "o.csv")),
     "run": ("run/run.json", "{}", ("report", "run")),
 }
 #: Numbers and words in place of a scene's.
@@ -86,7 +85,6 @@ VALUES = (
     "1979-05-27",
     "9" * 400,
 )
-KEYS = ("duration", "half_width", "friction", "amplitude")
 #: Names of models that a suite or a command line may name, and that run nothing.
 CODE = (
     "os:system",
@@ -153,7 +151,7 @@ def cases() -> Iterator[Case]:
                 words,
                 lambda folder, f=file, v=valid, s=spoil: _replaced(folder / f, v, s),
             )
-    for key in KEYS:
+    for key in ("duration", "half_width", "friction", "amplitude"):
         for value in VALUES:
             text = re.sub(rf"\b{key} = [^,}}\n]+", lambda _, k=key, v=value: f"{k} = {v}", SCENE)
             yield Case(f"scene: {key} = {value[:12]}", SIMULATE, _writes("a.toml", text))
@@ -195,13 +193,10 @@ def try_case(case: Case) -> str:
         for name, text in FILES.items():
             (folder / name).write_text(text)
         case.prepare(folder)
-        command = (
+        running = subprocess.Popen(
             [sys.executable, "-B", "-c", LIMITED, *case.limit, *case.words]
             if case.limit
-            else [*ROCKCHECK, *case.words]
-        )
-        running = subprocess.Popen(
-            command,
+            else [*ROCKCHECK, *case.words],
             cwd=folder,
             env={**os.environ, **case.environment},
             stdout=subprocess.DEVNULL,

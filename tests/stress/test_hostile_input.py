@@ -12,6 +12,7 @@ import gzip
 import io
 import json
 import math
+import re
 import subprocess
 import sys
 import tempfile
@@ -53,9 +54,8 @@ BETWEEN = "\x1f"
 
 
 def assert_one_clear_line(message: str) -> None:
-    assert message.strip()
     assert message.isprintable(), f"not one printable line: {message!r}"
-    assert len(message) < 1500
+    assert 0 < len(message.strip()) < 1500
 
 
 def result_or_line(read: Callable[[], Any]) -> Any:
@@ -101,7 +101,7 @@ def check_history(history: History) -> None:
 @functools.cache
 def stored_files() -> dict[str, bytes]:
     """A small finished run as its files: run.json, a history, its events and its record."""
-    from rockcheck.ebm import EventBasedModel
+    from rockcheck.ebm import EventBasedModel  # which the fuzzer must not instrument
 
     scene = load_scene("fig4a").replace(duration=0.5, name="short")
     history = EventBasedModel().simulate(scene)
@@ -154,9 +154,8 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         for model in ("ebm", "ebm-unilateral", "cm"):  # compiled before an input has its time
             build(model, {}).simulate(load_scene(inside / "a.toml"))
     given = content.decode("utf-8", "replace").split(BETWEEN)
-    words = [word for word in given if word not in LONG]
-    if "accept" in given:
-        words = ["accept", "no-such-suite", *words]
+    words = ["accept", "no-such-suite"] if "accept" in given else []
+    words += [word for word in given if word not in LONG]
     out, err = io.StringIO(), io.StringIO()
     with contextlib.chdir(inside), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = main(words)
@@ -274,8 +273,7 @@ def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
         (tmp_path / "in" / name).write_text(text)
     script = [sys.executable, "-c", _PLAY_BOMBS, str(tmp_path / "in"), str(tmp_path / "out")]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    assert "Traceback" not in done.stderr
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr[-2000:]
     assert all(len(line) < 600 for line in done.stderr.splitlines())
 
 
@@ -305,8 +303,6 @@ def test_a_stored_path_does_not_leave_the_run(tmp_path, refused):
 
 
 def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
-    """Descriptions, reasons and versions of a run that somebody sent are escaped; no text of theirs
-    is a tag."""
     data = json.loads(stored_files()["run.json"])
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(1)>"
     data |= {
@@ -324,8 +320,7 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
     assert main(["report", str(tmp_path)]) == 0
     pages = [*tmp_path.glob("**/*.html"), *tmp_path.glob("**/data/*.js")]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
-    assert "<script>alert" not in text
-    assert "<img src=x" not in text
+    assert re.findall("<script>alert|<img src=x", text) == []
     assert "&lt;script&gt;alert" in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
@@ -340,8 +335,7 @@ def test_a_record_names_no_file_but_its_own(tmp_path, name):
     store = Store(tmp_path)
     store.put("a", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
     assert store.get("a") == {}
-    record = tmp_path / "histories" / "a.json"
-    files = json.loads(record.read_text())["content"]["files"]
+    files = json.loads((tmp_path / "histories" / "a.json").read_text())["content"]["files"]
     store.put_record("histories", "a", {"files": {**files, name: "0"}})
     assert store.get("a") is None
 

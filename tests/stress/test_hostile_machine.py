@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from hostile import LIMITED, ROCKCHECK
@@ -24,7 +25,7 @@ from rockcheck.validation.study import run
 
 #: They wait for processes that hang or are killed.
 pytestmark = pytest.mark.long
-SMALL_RUN = ["stress", "runs", "--model", "ebm no-slip", "--runs", "30", "--jobs", "1"]
+STUDY = ("stress", "runs", "--model", "ebm no-slip", "--jobs", "1", "--runs")
 
 
 def one_line(stderr: str) -> str:
@@ -36,16 +37,18 @@ def one_line(stderr: str) -> str:
     return line
 
 
-def limited(size: int, *words: str) -> subprocess.CompletedProcess[str]:
-    """rockcheck where no file can be larger than `size` bytes; without coverage.py and
-    Python's own caches (-B), which would be cut off at that size."""
+def limited(size: int, *words: str) -> str:
+    """What rockcheck says as it ends with 2 where no file can be larger than `size` bytes; without
+    coverage.py and Python's own caches (-B), which would be cut off at that size."""
     command = [sys.executable, "-B", "-c", LIMITED, "RLIMIT_FSIZE", str(size), *words]
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS")
     }
-    return subprocess.run(
+    done = subprocess.run(
         command, capture_output=True, text=True, timeout=300, check=False, env=environment
     )
+    assert done.returncode == 2
+    return one_line(done.stderr)
 
 
 @pytest.mark.needs("POSIX")
@@ -58,9 +61,8 @@ def test_disk_full(tmp_path, old):
         assert main(["simulate", "fig5a", "--model", "ebm", "-o", str(out), "--quiet"]) == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     assert before.keys() == ({out, tmp_path / "out.events.csv"} if old else set())
-    done = limited(4096, "simulate", "fig4a", "--model", "ebm", "-o", str(out))
-    assert done.returncode == 2
-    assert f"{out}: cannot be written: File too large" in one_line(done.stderr)
+    said = limited(4096, "simulate", "fig4a", "--model", "ebm", "-o", str(out))
+    assert f"{out}: cannot be written: File too large" in said
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
@@ -71,7 +73,7 @@ def test_disk_full(tmp_path, old):
         (100, ["new"]),
         (100, ["validate", "smoke", "--out"]),
         (2000, ["validate", "smoke", "--out"]),
-        (7000, [*SMALL_RUN, "--out"]),
+        (7000, [*STUDY, "30", "--out"]),
         (30_000, ["validate", "smoke", "--out"]),
     ],
 )
@@ -79,9 +81,7 @@ def test_disk_full_whatever_is_written(tmp_path, size, words):
     """A scene file, figures and pages: what was written is whole, the file that does not fit is
     named and leaves nothing, and the next run writes all."""
     out = tmp_path / "out.toml"
-    done = limited(size, *words, str(out))
-    assert done.returncode == 2
-    assert re.search(f"{re.escape(str(out))}.*File too large", one_line(done.stderr))
+    assert re.search(f"{re.escape(str(out))}.*File too large", limited(size, *words, str(out)))
     written = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert all(path.name.startswith(".lock") or path.stat().st_size for path in written), written
     assert not any(path.suffix == ".part" or path.name == "index.html" for path in written)
@@ -92,18 +92,15 @@ def test_disk_full_whatever_is_written(tmp_path, size, words):
 
 @pytest.mark.needs("POSIX")
 def test_what_is_no_file_is_written_as_it_is(tmp_path):
-    (tmp_path / "link").symlink_to(tmp_path / "out.csv")
-    assert (
-        main(["simulate", "fig4a", "--model", "ebm", "-o", str(tmp_path / "link"), "--quiet"]) == 0
-    )
-    assert (tmp_path / "link").is_symlink()
-    assert (tmp_path / "out.csv").read_text().startswith("t,x,y,theta,")
-    command = [*ROCKCHECK, "simulate", "fig4a", "--model", "ebm", "-q", "-o", "/dev/stdout"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
+    link, words = tmp_path / "link", ["simulate", "fig4a", "--model", "ebm", "--quiet", "-o"]
+    link.symlink_to(tmp_path / "out.csv")
+    assert main([*words, str(link)]) == 0
+    said = subprocess.check_output([*ROCKCHECK, *words, "/dev/stdout"], text=True, timeout=300)
     heading, _, *rows = (tmp_path / "out.csv").read_text().splitlines()
+    assert heading.startswith("t,x,y,theta,")
     # The first row also says how long the run took.
-    assert done.stdout.splitlines()[:1] + done.stdout.splitlines()[2:] == [heading, *rows]
-    assert Path("/dev/stdout").is_symlink()
+    assert said.splitlines()[:1] + said.splitlines()[2:] == [heading, *rows]
+    assert [path.is_symlink() for path in (link, Path("/dev/stdout"))] == [True, True]
 
 
 def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
@@ -123,12 +120,11 @@ def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
 def test_interrupted(tmp_path, later):
     """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all.
     It reaches a worker, too, before that can say that it is not meant."""
-    words = ("stress", "runs", "--model", "ebm no-slip", "--runs", "60000", "--jobs", "1", "--out")
     # What is started hears SIGINT, also where these tests run in the background of a shell, which
     # makes it ignore that.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     running = subprocess.Popen(
-        [*ROCKCHECK, *words, str(tmp_path)],
+        [*ROCKCHECK, *STUDY, "60000", "--out", str(tmp_path)],
         start_new_session=True,
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
@@ -153,26 +149,26 @@ def test_interrupted(tmp_path, later):
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     """A crash between writing and naming leaves the old content."""
     path = write_whole(tmp_path / "a.json", "old")
-
-    def crash(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "replace", crash)
+    monkeypatch.setattr(os, "replace", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OSError, match="No space"):
         write_whole(path, "new")
-    assert path.read_text() == "old"
-    assert [one.name for one in tmp_path.iterdir()] == ["a.json"]
+    assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("a.json", "old")]
 
 
 def test_of_runs_whose_process_dies_or_hangs_only_that_one_fails(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "runs"))
-    for module, name, value in ((pool, "COMPILING", 0.0), (runs, "A_RUN", 0.0)):
+    for module, name, value in (
+        (pool, "COMPILING", 0.0),
+        (runs, "A_RUN", 0.0),
+        (runs, "PATIENCE", 4.0),
+    ):
         monkeypatch.setattr(module, name, value)
-    monkeypatch.setattr(runs, "PATIENCE", 4.0)
     from deadly import Deadly
 
     found = run(Deadly("runs", models=("ebm",), runs=16), tmp_path, jobs=2)
     assert found.data["batches"]["ebm"]["counts"]["runs"] == 16
-    words = {one["number"]: one["words"] for one in found.table("failures").records()}
-    assert words == {3: "the process ended with code 9", 13: "did not end within 4 s"}
+    assert {one["number"]: one["words"] for one in found.table("failures").records()} == {
+        3: "the process ended with code 9",
+        13: "did not end within 4 s",
+    }
     assert all("not shrunk" in text for text in found.files.values())

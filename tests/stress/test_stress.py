@@ -9,6 +9,7 @@ import numpy as np
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
 from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.stress.generator import random_scene
@@ -39,13 +40,10 @@ from rockcheck.validation.study import run
 
 
 def test_shrinking_drops_all_that_does_not_matter(tmp_path):
-    """Of a scene with everything in it, only what shows the "failure" is left, and the file is that
-    scene again."""
-    loaded = Block(
-        half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
-    )
     scene = random_scene(1, 0).replace(
-        block=loaded.scaled(30.0),
+        block=Block(
+            half_width=0.4, half_height=1.2, centre_of_mass=(0.1, -0.3), moment_of_inertia=0.4
+        ).scaled(30.0),
         floor=Floor(friction=0.25),
         walls=(Wall(side="left", gap=0.5, restitution=0.3), Wall(side="right", gap=0.7)),
         vertical=Sine(amplitude=1.234567, period=1.0),
@@ -60,23 +58,20 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
             and one.wall("right") is not None
         )
 
-    early, complete = shrink(scene, shows, trials=3)
-    assert (shows(early), complete) == (True, False)
     assert shrink(scene, shows, seconds=-1.0) == (scene, False)
-    small, complete = shrink(scene, shows, trials=2000)
-    assert (shows(small), complete) == (True, True)
+    for trials, whole in ((3, False), (2000, True)):
+        small, complete = shrink(scene, shows, trials=trials)
+        assert (shows(small), complete) == (True, whole)
     assert 0.5 < small.block.radius < 2.0
     assert len(small.excitation.unscaled) < 20
     left = (small.block.homogeneous, small.walls, small.vertical)
     assert left == (True, (Wall(side="right", gap=0.0, restitution=0.0),), Rest())
     assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
-    file = tmp_path / "small.toml"
-    file.write_text(scene_text(small, "a remark\nanother"))
+    file = write_whole(tmp_path / "small.toml", scene_text(small, "a remark\nanother"))
     assert load_scene(file).replace(name=small.name) == small
 
 
 def test_totals_count_what_was_seen():
-    """Two halves are the whole, and the worst figure names its run."""
     whole, halves = Chunk("ebm", 1, 0, 8).play(), RunTotals(model="ebm")
     for half in parts(Chunk("ebm", 1, 0, 8)):
         halves.add(half.play())
@@ -88,11 +83,9 @@ def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     for runs, quick in ((1003, False), (None, True)):
         work = Stress("runs", quick=quick, runs=runs).tasks({})
         here = {label for label in PLAYERS if not not_installed(label.split()[0])}
-        assert {chunk.model for chunk in work} == here
-        for label in here:
-            chunks = [chunk for chunk in work if chunk.model == label]
-            numbers = [n for one in chunks for n in range(one.first, one.first + one.count)]
-            assert sorted(numbers) == list(range(runs or PLAYERS[label].quick))
+        numbers = [(one.model, n) for one in work for n in range(one.first, one.first + one.count)]
+        every = [(label, n) for label in here for n in range(runs or PLAYERS[label].quick)]
+        assert sorted(numbers) == sorted(every)
     study = Stress("runs", runs=5, models=("ebm",))
     (whole,) = study.tasks({})
     done: dict = {whole: Failure("lost")}
@@ -118,9 +111,7 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
             rules={"settles": 2},
         ),
     )
-    stale = tmp_path / "failures" / "old.toml"
-    stale.parent.mkdir()
-    stale.touch()
+    stale = write_whole(made(tmp_path, "failures") / "old.toml", "")
     study = Stress("runs", models=("ebm",), runs=12)
     found = run(study, tmp_path, jobs=0)
     page = publish(found, tmp_path).read_text()
@@ -153,8 +144,7 @@ def test_failures_of_the_program_and_of_engines():
     assert (study.gather(done).exit_code, len(study.gather(done).files)) == (0, MOST_FILES)
     done[lost] = Failure("it hangs")
     found = study.gather(done)
-    words = found.table("failures").records()[0]["words"]
-    assert (found.exit_code, words) == (1, "it hangs")
+    assert (found.exit_code, found.table("failures").records()[0]["words"]) == (1, "it hangs")
     assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
 
 

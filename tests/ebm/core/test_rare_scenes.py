@@ -30,7 +30,6 @@ from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.progress import one_run
 from rockcheck.scenes.scene import PAPER_BLOCK
 
-SQUARE = Block(half_width=7.069, half_height=7.069)
 CHOICES = Path(__file__).parents[2] / "data" / "modelling_choices"
 PINNED = read_toml(CHOICES / "index.toml")["choices"]
 SQUAT = Block(half_width=0.1, half_height=0.05)
@@ -65,7 +64,6 @@ def scene_of(
     )
 
 
-TOUCHES = Wall(side="left", gap=0.0, restitution=0.5)
 SCENES = {
     # The corner lets go of the wall at the instant at which the floor's force turns.
     "release on the ladder": scene_of(
@@ -76,7 +74,11 @@ SCENES = {
         excitation=Ricker(amplitude=27.828295819935693, period=1.030200737875156),
     ),
     "no room between walls": scene_of(
-        SQUARE, 0.3, 1.0, walls=both(0.0, 0.0, 0.9), initial_velocity=1.33
+        Block(half_width=7.069, half_height=7.069),
+        0.3,
+        1.0,
+        walls=both(0.0, 0.0, 0.9),
+        initial_velocity=1.33,
     ),
     "no room, elastic walls": scene_of(
         PAPER_BLOCK,
@@ -147,7 +149,11 @@ SCENES = {
     },
     **{
         f"slides by {v:g} m/s at a wall": scene_of(
-            PAPER_BLOCK, 0.3, 2.0, walls=[TOUCHES], initial_velocity=-v
+            PAPER_BLOCK,
+            0.3,
+            2.0,
+            walls=[Wall(side="left", gap=0.0, restitution=0.5)],
+            initial_velocity=-v,
         )
         for v in (1e-9, 1e-8)
     },
@@ -206,8 +212,9 @@ PAIRS = [
 @pytest.mark.parametrize(("settings", "name"), PAIRS, ids=str)
 def test_it_runs_and_contacts_hold(settings, name):
     scene = (SCENES | SQUATS)[name]
-    history = EventBasedModel(**settings).simulate(scene)
-    assert_contacts_hold(scene, history, 1e-9 * scene.block.radius)
+    assert_contacts_hold(
+        scene, EventBasedModel(**settings).simulate(scene), 1e-9 * scene.block.radius
+    )
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
@@ -222,18 +229,15 @@ def test_a_landing_at_the_slip_limit_takes_its_energy():
     """Housner's ratio for 45 degrees is 1/4: the tilt falls with each landing, and the block comes
     to rest."""
     history = EventBasedModel().simulate(SCENES["square block that lands at its slip limit"])
-    assert history.outcome == "at rest"
-    assert len(history.event_list) < 60
+    assert (history.outcome, len(history.event_list) < 60) == ("at rest", True)
 
 
 @pytest.mark.parametrize(
     "settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str
 )
 def test_random_pulses_between_walls(settings):
-    """Between walls that are touched or nearly so: every one is played to its end."""
-    random = np.random.default_rng(7)
+    random, gaps = np.random.default_rng(7), (0.0, 0.003, 0.053)
     model = EventBasedModel(tolerance=1e-8, **settings)
-    gaps = (0.0, 0.003, 0.053)
     scenes = [
         scene_of(
             PAPER_BLOCK,

@@ -45,10 +45,9 @@ def test_selection_at_rest_is_shentons_map(friction, pivot):
         felt = (math.inf, math.inf) if friction == "no-slip" else (mu_s, mu_k)
         expected = shentons(*felt, math.tan(alpha), a)
         assert mode.name == expected, (at, mode)
-        if mode.tilted:
-            assert mode.side == side
-        if mode.floor == "slip":  # it stays behind the base
-            assert mode.slip * (mode.side if mode.tilted else 1) == -side
+        assert not mode.tilted or mode.side == side
+        # What slips stays behind the base.
+        assert mode.floor != "slip" or mode.slip * (mode.side if mode.tilted else 1) == -side
         seen.add(expected)
     assert seen == {"rest", "rock"} | ({"slide", "slide-rock"} if friction != "no-slip" else set())
 
@@ -81,58 +80,52 @@ def test_selection_of_a_tilted_block(touch, pivot):
         judged += 1
         seen.add((mode.floor, mode.tip, mode.far))
         assert mode.contacts == max(one.contacts for one in fitting), (at, mode, fitting)
-        alike = [one for one in fitting if (one.tip, one.far) == (mode.tip, mode.far)]
-        assert mode.floor == "stick" or all(one.floor != "stick" for one in alike), (
-            at,
-            mode,
-            fitting,
-        )
-        choices += len({one.floor for one in alike}) > 1
+        alike = {one.floor for one in fitting if (one.tip, one.far) == (mode.tip, mode.far)}
+        assert mode.floor == "stick" or "stick" not in alike, (at, mode, fitting)
+        choices += len(alike) > 1
     assert judged > 200
     assert (
         choices > 2
     )  # static friction above kinetic lets both a standing and a slipping pivot be consistent
-    expected = {("stick", False, False), ("slip", False, False)}
-    if touch != "none":
-        expected |= {("stick", *touched), ("slip", *touched)}  # lean, ladder
-    if pivot == "unilateral":
-        expected.add(("off", False, False))
-    assert seen >= expected
+    lean_and_ladder = {("stick", *touched), ("slip", *touched)}
+    assert seen >= (
+        {("stick", False, False), ("slip", False, False)}
+        | (lean_and_ladder if touch != "none" else set())
+        | ({("off", False, False)} if pivot == "unilateral" else set())
+    )
 
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("pivot", PIVOTS)
 def test_selection_of_a_flat_block_at_a_wall(pivot, side):
-    """Without friction: pressed on the wall it rests on it, pulled away it slides."""
-    wall = Wall(side="left" if side > 0 else "right", gap=0.0)
-    pressed, away = (
-        dataclasses.replace(upright(side * u, 1.0, 0.4, 0.0, 0.0), walls=(wall,))
-        for u in (0.1, -0.1)
-    )
-    rests, slides = (Core(at, pivot).select(at.state) for at in (pressed, away))
-    assert (rests.name, rests.tip, rests.far) == ("rest", side > 0, side < 0)
-    assert (slides.name, slides.slip, slides.tip, slides.far) == ("slide", side, False, False)
+    walls = (Wall(side="left" if side > 0 else "right", gap=0.0),)
+    for u, name, slip, tip, far in (
+        (0.1, "rest", 0, side > 0, side < 0),
+        (-0.1, "slide", side, False, False),
+    ):
+        at = dataclasses.replace(upright(side * u, 1.0, 0.4, 0.0, 0.0), walls=walls)
+        found = Core(at, pivot).select(at.state)
+        assert (found.name, found.slip, found.tip, found.far) == (name, slip, tip, far)
 
 
 def test_a_block_whose_floor_falls_away():
     """Only a floor that cannot hold lets go: upright the block flies flat. Else it hangs by the
     corner that a push or a slip tells, or by both; a wall that holds it tells."""
-    alpha = 0.3
-    at = {u: upright(u, -0.2, alpha, 0.5, 0.5) for u in (0.0, 1e-6, -1e-6)}
-    mode = Core(at[0.0], "unilateral").select(at[0.0].state)
-    assert (mode.name, mode.tilted) == ("flight", False)
-    for u, slip, tilted, side in (
-        (0.0, 0.0, False, 1),
-        (1e-6, 0.0, True, 1),
-        (-1e-6, 0.0, True, -1),
-        (0.0, 0.1, True, -1),
-        (0.0, -0.1, True, 1),
+    for pivot, u, slip, name, tilted, side in (
+        ("unilateral", 0.0, 0.0, "flight", False, 1),
+        ("bilateral", 0.0, 0.0, "rest", False, 1),
+        ("bilateral", 1e-6, 0.0, "rock", True, 1),
+        ("bilateral", -1e-6, 0.0, "rock", True, -1),
+        ("bilateral", 0.0, 0.1, "slide-rock", True, -1),
+        ("bilateral", 0.0, -0.1, "slide-rock", True, 1),
     ):
-        mode = Core(at[u], "bilateral").select((0.0, math.cos(alpha), 0.0, slip, 0.0, 0.0))
-        assert (mode.tilted, mode.side) == (tilted, side)
+        mode = Core(upright(u, -0.2, 0.3, 0.5, 0.5), pivot).select(
+            (0.0, math.cos(0.3), 0.0, slip, 0.0, 0.0)
+        )
+        assert (mode.name, mode.tilted, mode.side) == (name, tilted, side)
     flat = {"family": Family.FLAT, "pivot": Pivot.STICK, "pull": -1}
-    held = [run_at(**flat, **{wall: 1}).state.mode for wall in ("tip", "far")]
-    assert not any(map(modes.hangs_flat, held))
+    for wall in ("tip", "far"):
+        assert not modes.hangs_flat(run_at(**flat, **{wall: 1}).state.mode)
 
 
 def test_what_was_tried_at_an_instant():
@@ -141,12 +134,10 @@ def test_what_was_tried_at_an_instant():
     state = run_at(t=3.0, **TILTED, sense=1).state
     state.tried[:], state.slack, state.least_slack = 1, 7.0, 7.0
     modes.forget(state)
-    assert not state.tried.any()
-    assert state.slack == 1.0
-    modes.slacken(state)
-    assert state.slack == 1.0, "the least slack is one noise"
-    modes.slacken(state)
-    assert state.slack == 2.0
+    assert (state.tried.any(), state.slack) == (False, 1.0)
+    for slack in (1.0, 2.0):  # the least one is one noise
+        modes.slacken(state)
+        assert state.slack == slack
     for kind, began, may in (
         (Kind.FORCE, 2.0, True),
         (Kind.FORCE, 3.0, False),
@@ -164,15 +155,11 @@ def test_what_was_tried_at_an_instant():
 def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
     """Where all modes were tried at an instant the one that fits goes on, counted each time, with a
     slack of 1, 2, 4 noises."""
-    core = Core(upright(0.1, 1.0, 0.3, 0.5, 0.5), "unilateral")
-    run = run_at(upright(0.1, 1.0, 0.3, 0.5, 0.5).state)
+    at = upright(0.1, 1.0, 0.3, 0.5, 0.5)
+    core, run = Core(at, "unilateral"), run_at(at.state)
     state, mode = run.state, run.state.mode
     state.tried[:] = 1
     for count, slack in enumerate((1.0, 2.0, 4.0), 1):
         assert modes.select(core.setting, core.base, run)
-        assert (mode.family, mode.pivot) == (Family.FLAT, Pivot.STICK)
-        assert (state.slack, state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (
-            slack,
-            count,
-            count,
-        )
+        assert (mode.family, mode.pivot, state.slack) == (Family.FLAT, Pivot.STICK, slack)
+        assert (state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (count, count)

@@ -26,14 +26,11 @@ def first_root(coefficients, h: float, noise: float = NOISES[Kind.POSITION]) -> 
 
 
 def leading(coefficients, noise: float = NOISES[Kind.POSITION]) -> int:
-    """Sign with which the polynomial leaves zero."""
     return series.leading(row_of(coefficients), 0, len(coefficients) - 1, noise, series.AHEAD)
 
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_first_root_of_random_polynomials(noise):
-    """Against all roots that numpy finds, of 3,000 polynomials of degree 1 to 14, positive at 0;
-    the first one to 1e-12, wherever the others lie."""
     rng = np.random.default_rng(41)
     judged = Counter()
     for _ in range(1000):
@@ -66,8 +63,6 @@ def test_first_root_of_random_polynomials(noise):
 
 
 def test_signs_of_all_short_patterns():
-    """`leading` is the sign of the first coefficient that is not zero: all patterns of -1, 0, 1 up
-    to degree 5."""
     for pattern in itertools.product((-1.0, 0.0, 1.0), repeat=6):
         first = next((c for c in pattern if c), 0.0)
         for size in (1.0, 1e-3, 40.0):
@@ -83,11 +78,9 @@ def test_a_zero_at_the_start_is_divided_out(k):
     for root in rng.uniform(0.05, 0.9, 100):
         # What rounding leaves of the zeros.
         c = np.array([*rng.normal(0.0, 1e-15, k), root, -1.0, 0.0, 0.0, 0.0, 0.0])
-        assert leading(c) == 1
-        assert first_root(c, 1.0) == pytest.approx(root, abs=1e-9)
+        assert (leading(c), first_root(c, 1.0)) == (1, pytest.approx(root, abs=1e-9))
         assert first_root(c, 0.9 * root) is None
-        assert leading(-c) == -1
-        assert first_root(-c, 1.0) == 0.0
+        assert (leading(-c), first_root(-c, 1.0)) == (-1, 0.0)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.7])
@@ -115,30 +108,18 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
     with np.errstate(invalid="ignore"):
-        root = series.first_root(
-            row_of([1.0, rate, np.inf, 0.0]),
-            0,
-            3,
-            1.0,
-            1.0,
-            1e-13,
-            series.AHEAD,
-            np.zeros((48, series.WIDTH)),
-        )
-    assert math.isnan(root)
+        assert math.isnan(first_root([1.0, rate, np.inf, 0.0], 1.0, 1e-13))
 
 
 @pytest.mark.parametrize("place", [0.3, 0.5, 0.7310585])
 def test_touching_is_no_root_and_dipping_is_one(place):
     """A double root lifted by 1e-12 is none; lowered by as much it is one, to the square root of
     that. A triple one crosses."""
-    touch = np.array([place * place, -2.0 * place, 1.0])
-    lift = np.array([1e-12, 0.0, 0.0])
+    touch, lift = polyfromroots([place] * 2), np.array([1e-12, 0.0, 0.0])
     assert first_root(touch + lift, 1.0) is None
     assert first_root(touch - lift, 1.0) == pytest.approx(place - 1e-6, abs=1e-9)
-    falls = np.array([place**3, -3.0 * place**2, 3.0 * place, -1.0])
-    assert first_root(falls, 1.0) == pytest.approx(place, abs=1e-4)
-    two = np.polynomial.polynomial.polymul(touch, [0.9, -1.0])  # touches, then crosses
+    assert first_root(-polyfromroots([place] * 3), 1.0) == pytest.approx(place, abs=1e-4)
+    two = -polyfromroots([place, place, 0.9])  # touches, then crosses
     assert first_root([two[0] + 1e-12, *two[1:]], 1.0) == pytest.approx(0.9, abs=1e-9)
 
 
@@ -166,21 +147,18 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
         return
     assert which == Guard.NONE
     assert tau == pytest.approx(place + math.sqrt(dip), abs=3e-9) or (dip == 0.0 and tau == 1.0)
-    about = [polyval(tau, touch), touch[1] + 2.0 * tau, 1.0]
-    assert first(about, 0.5) == (0.5, Guard.NONE)
+    assert first([polyval(tau, touch), touch[1] + 2.0 * tau, 1.0], 0.5) == (0.5, Guard.NONE)
 
 
 @pytest.mark.parametrize("noise", NOISES)
 def test_noise_is_no_sign(noise):
-    """A value below the noise tells nothing: what follows it does."""
     for terms, sign in (
         ([0.5 * noise], 0),
         ([2.0 * noise], 1),
         ([-0.5 * noise, 1.0], 1),
         ([0.0, -0.5 * noise / series.AHEAD, 1.0], 1),
     ):
-        signs = [leading(side * np.array(terms), noise) for side in (1, -1)]
-        assert signs == [sign, -sign], terms
+        assert [leading(side * np.array(terms), noise) for side in (1, -1)] == [sign, -sign], terms
     for terms, root in (([0.5, 0.0, -1.0 / noise], 0.0), ([-0.5, 0.0, 1.0 / noise], None)):
         assert first_root(noise * np.array(terms), 1.0, noise) == root
     assert first_root([-0.5 * noise, 0.0, 0.0], 1.0, noise) is None
@@ -208,8 +186,7 @@ def test_what_is_noise_at_first_may_grow(noise):
     """In a long step a guard that starts as noise and falls is met where it has become more than
     noise."""
     c = [0.0, 0.0, 0.0, 0.0, -noise]  # -noise tau^4
-    assert leading(c, noise) == 0
-    assert first_root(c, 0.9, noise) is None
+    assert (leading(c, noise), first_root(c, 0.9, noise)) == (0, None)
     assert first_root(c, 10.0, noise) == pytest.approx(1.05, abs=0.15)
     # Met where it has fallen by the noise: noise tau^4 / 16 is that at tau = 2.
     assert first_root([0.0, 0.0, 0.0, 0.0, -noise / 16.0], 10.0, noise) == pytest.approx(
@@ -221,9 +198,8 @@ def test_what_is_noise_at_first_may_grow(noise):
 @pytest.mark.parametrize("ahead", [0.1, 10.0])
 def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead, share, leads):
     rate, bend = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
-    assert series.leads_up(1.0, rate, 0.0, 0.0, ahead) == leads
-    assert series.leads_up(1.0, 0.0, -bend, 0.0, ahead) == leads
-    assert series.leads_up(1.0, 0.0, 0.0, share, ahead) == leads
+    terms = ((rate, 0.0, 0.0), (0.0, -bend, 0.0), (0.0, 0.0, share))
+    assert [series.leads_up(1.0, *one, ahead) for one in terms] == [leads] * 3
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -233,8 +209,7 @@ def test_what_stays_below_a_level_is_below_it(seed):
     a = row_of(r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0)))
     highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
     for level in highest + np.array([-0.5, -1e-3, -1e-9, 0.1, 2.0]):
-        if series.stays_below(a, 0, n, tau, level):
-            assert highest < level
+        assert highest < level or not series.stays_below(a, 0, n, tau, level)
     assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
 
 
