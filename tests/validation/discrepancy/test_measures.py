@@ -117,7 +117,7 @@ def test_the_window_is_the_common_time_and_holds_its_own_ends(made):
     for pair in ((early, late), (late, early)):
         found = compare(*pair)
         assert (found.start, found.end) == (2.0, 8.0)
-        rows = [Pair(*pair, until=until).time.tolist() for until in (10.0, 6.0)]
+        rows = [Pair(*pair, until=until).time.tolist() for until in (math.inf, 6.0)]
         assert rows == [t[2:9].tolist(), t[2:7].tolist()]
     struck = made(np.linspace(0.0, 1.0, 11), t, events=[impact(4.0), impact(6.0), impact(7.0)])
     values = figures(struck, until=6.0)
