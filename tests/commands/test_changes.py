@@ -61,8 +61,9 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     ran("b", 0.00102)
     changes = diff("a", "b", 0)
     assert {change["what"] for change in changes} == {"figure"}
-    moved = {(change["model"], change["name"]): change for change in changes}
-    peak = moved["near", "theta_peak against still"]
+    peak = {(change["model"], change["name"]): change for change in changes}[
+        "near", "theta_peak against still"
+    ]
     assert peak["after"] / peak["before"] == pytest.approx(1.02, rel=1e-6)
 
 
@@ -119,8 +120,9 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, nam
             measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note
         )
         check = near.checks[0].model_copy(update={"figure": figure})
-        cell = near.model_copy(update={"figures": (figure,), "checks": (check,)})
-        return run.model_copy(update={"cells": (cell,)})
+        return run.model_copy(
+            update={"cells": (near.model_copy(update={"figures": (figure,), "checks": (check,)}),)}
+        )
 
     before = reached(peak)
     assert [one.name for one in changes(before, reached(peak + 0.1))] == names
@@ -179,8 +181,9 @@ def test_without_a_report_the_pages_of_the_run_before_are_gone():
     assert Path("a/pages/short.html").is_file()
     ran("a", 0.0012)
     assert not Path("a/index.html").exists()
-    left = {path.name for path in Path("a/pages").rglob("*.*") if path.parent.name != "assets"}
-    assert left == {"mine.html"}
+    assert {path.name for path in Path("a/pages").rglob("*.*") if path.parent.name != "assets"} == {
+        "mine.html"
+    }
     Path("a/index.html").write_text("my own", "utf-8")
     ran("a", 0.001)
     assert Path("a/index.html").is_file()

@@ -121,8 +121,9 @@ def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypat
     ):
         with lock, pytest.raises(site.InputError, match=rf"waited 0\.1 s for {holder}"):
             site.keep(run, tmp_path)
-        said = rf"rockcheck: waiting up to 0\.1 s for {holder}\n"
-        assert re.fullmatch(said, capsys.readouterr().err)
+        assert re.fullmatch(
+            rf"rockcheck: waiting up to 0\.1 s for {holder}\n", capsys.readouterr().err
+        )
     site.keep(run, tmp_path)
     assert capsys.readouterr().err == ""
     assert not (tmp_path / ".lock.holder").exists()

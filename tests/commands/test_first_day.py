@@ -141,8 +141,9 @@ def test_a_figure_without_tolerance_has_not_failed(typed):
     validate = "validate", *words, "--no-report"
     typed(*validate, code=1, holds=["verdict: no tolerance yet"], lacks=["fail"])
     before = set(Path().iterdir())
-    said = "2 changes would be written to mine.tolerances.toml"
-    typed("accept", *words, "--dry-run", holds=[said])
+    typed(
+        "accept", *words, "--dry-run", holds=["2 changes would be written to mine.tolerances.toml"]
+    )
     assert set(Path().iterdir()) == before
     typed("accept", *words)
     text = Path("mine.tolerances.toml").read_text()

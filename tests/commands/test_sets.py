@@ -69,8 +69,9 @@ def names(left_out: list[str]) -> list[str]:
     ],
 )
 def test_files_folders_and_patterns_each_shake_the_scene(told, words, played, left_out):
-    given = (part for word in words for part in ("--records", word))
-    found = told("validate", "rack.toml", *given, *STILL)
+    found = told(
+        "validate", "rack.toml", *(part for word in words for part in ("--records", word)), *STILL
+    )
     assert {cell["scene"]: cell["outcome"] for cell in found["cells"]} == dict.fromkeys(
         (f"rack, {name}" for name in played), "at rest"
     )
@@ -101,8 +102,9 @@ def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
         {"rack, RSN1_H1": 0.6, "rack, RSN1_H2": 0.6, "rack, RSN2_H1": 0.1}, rel=1e-2
     )
     Path("records/RSN2_H1.AT2").unlink()
-    said = refused(*words)
-    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in said
+    assert "RSN2_V.AT2: a vertical component, and no horizontal one is named alike" in refused(
+        *words
+    )
 
 
 def test_all_models_are_those_that_are_installed(told):

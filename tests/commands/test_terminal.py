@@ -78,8 +78,7 @@ def test_a_new_scene_file_is_a_scene_with_every_setting():
 
 def test_settings_shown_as_remarks_are_the_defaults():
     main(["new", "mine.toml"])
-    text = Path("mine.toml").read_text()
-    head, rest = text.split("[excitation]", 1)
+    head, rest = Path("mine.toml").read_text().split("[excitation]", 1)
     loud = (
         re.sub(r"^# (?=[a-z_]+ += )", "", head, flags=re.MULTILINE)
         .replace("mass = 60.0", "")

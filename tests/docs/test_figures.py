@@ -169,8 +169,9 @@ def test_a_threshold_that_the_limits_name(module, name, stated):
 
 def test_what_counts_as_closed_and_each_choice_is_on_the_page_of_limits():
     assert series.NOISE[Kind.POSITION] == 1e-13
-    page = (DOCS / "limits.md").read_text("utf-8")
-    assert set(re.findall(r"^\| ([\w ]+) \|", page, flags=re.MULTILINE)) >= set(names.RULE_NAMES)
+    assert set(
+        re.findall(r"^\| ([\w ]+) \|", (DOCS / "limits.md").read_text("utf-8"), flags=re.MULTILINE)
+    ) >= set(names.RULE_NAMES)
 
 
 def floor_impulses(scene, step=1e-4, alone=5) -> list[float]:
@@ -182,8 +183,7 @@ def floor_impulses(scene, step=1e-4, alone=5) -> list[float]:
     found = []
     for t in (event.t for event in history.event_list if event.kind == "wall impact"):
         after = int(np.searchsorted(times, t, side="right"))
-        single = np.sum(np.abs(instants - t) < alone * step) == 1
-        if single and 2 <= after < len(times) - 1:
+        if (np.sum(np.abs(instants - t) < alone * step) == 1) and 2 <= after < len(times) - 1:
             came = rate[after - 1] + (rate[after - 1] - rate[after - 2]) / step * (
                 t - times[after - 1]
             )

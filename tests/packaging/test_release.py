@@ -248,8 +248,9 @@ def test_an_audit_that_reaches_no_list_has_not_passed(nightly, tmp_path):
     }
     assert nightly.audited("words\n" + json.dumps(found)) == "1 of 2 packages looked up; b 1: X-1"
     nothing = json.dumps({"dependencies": found["dependencies"][:1]})
-    command = (sys.executable, "-c", f"print({nothing!r})")
-    part = nightly.Part("known weaknesses", command, nightly.audited)
+    part = nightly.Part(
+        "known weaknesses", (sys.executable, "-c", f"print({nothing!r})"), nightly.audited
+    )
     assert nightly.play(part, tmp_path).result == "not run"
 
 

@@ -320,8 +320,9 @@ def opened(visitor):
     unpacked; in the end it must have complained of nothing and asked for nothing elsewhere."""
 
     def page_at(path, home=None, **settings):
-        desk = {"viewport": {"width": 1280, "height": 900}}
-        page = visitor(home or path.parent, **desk | settings)
+        page = visitor(
+            home or path.parent, **{"viewport": {"width": 1280, "height": 900}} | settings
+        )
         page.goto(path.as_uri())
         until(page, "!window.rockcheck || !!window.rockcheckPage")
         return page

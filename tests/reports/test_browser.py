@@ -231,8 +231,9 @@ def test_a_block_that_falls_is_shown_up_to_its_fall(visit):
     assert shown[1] < 6.0 < 12.0  # the block lies then
     drawn = page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
     assert all(ends == pytest.approx(shown) for ends in drawn)
-    scale = page.evaluate("(y => [y.min, y.max])(rockcheckPage.drawn[2].scales.y)")
-    assert max(map(abs, scale)) < 1.8
+    assert (
+        max(map(abs, page.evaluate("(y => [y.min, y.max])(rockcheckPage.drawn[2].scales.y)"))) < 1.8
+    )
     assert "✕ fell" in page.locator("#plots").inner_text()
     assert page.locator("#result").get_by_text("fell").count() == 2
     page.get_by_role("button", name="Whole").click()
@@ -255,8 +256,9 @@ def test_a_measured_history_is_dots(opened, tmp_path, finished):
     )
     table.save(tmp_path / "histories" / "table.csv")
     measured = cell.model_copy(update={"model": "table", "history": "histories/table.csv"})
-    change = {"models": ("table", *finished.models), "cells": (measured, *finished.cells)}
-    finished.model_copy(update=change).save(tmp_path)
+    finished.model_copy(
+        update={"models": ("table", *finished.models), "cells": (measured, *finished.cells)}
+    ).save(tmp_path)
     write_site(tmp_path)
     page = opened(tmp_path / "pages" / "free.html", tmp_path)
     assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(

@@ -59,8 +59,9 @@ def test_the_papers_colours(panel, overturned):
     (mesh,) = axes.collections
     axes.figure.draw_without_rendering()
     colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)[[0, 7, 11], 0]
-    expected = [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
-    np.testing.assert_allclose(colours, expected)
+    np.testing.assert_allclose(
+        colours, [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
+    )
 
 
 def test_a_figure_has_the_papers_panels():
@@ -93,8 +94,7 @@ def test_the_pulse_of_ones_own_scene_is_marked():
         2.0 * math.pi / 0.8 / scene.frequency_parameter,
         6.0 / (scene.gravity * scene.block.slope),
     ]
-    plot = plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0)))
-    figure = figure_of(plot)
+    figure = figure_of(plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0))))
     (star,) = figure.axes[0].lines
     np.testing.assert_allclose(star.get_xydata(), [own])
     assert OWN_MARK["label"] in labels(figure)
@@ -158,8 +158,9 @@ def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, name):
     shown = (study / FIGURES / f"{name}.svg").read_bytes()
     unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)
     assert (tmp_path / "one.svg").read_bytes() == unstamped != shown
-    page = (study / "index.html").read_text("utf-8")
-    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in page
+    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in (study / "index.html").read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.parametrize(
@@ -189,8 +190,9 @@ def test_what_is_no_figure_is_refused_in_one_line(study, refused, data, words, s
 
 def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
     monkeypatch.setattr("rockcheck.reports.document.DRAWING", 1e-3)
-    said = refused("report", str(study), "--scene", "curves", "-o", "a.svg")
-    assert "did not end within 0.001 s" in said
+    assert "did not end within 0.001 s" in refused(
+        "report", str(study), "--scene", "curves", "-o", "a.svg"
+    )
 
 
 def test_the_folder_holds_one_run(tmp_path):

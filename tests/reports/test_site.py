@@ -50,8 +50,9 @@ def test_hostile_text_stays_text(site):
     assert [name for name, text in texts.items() if "<img src=x" in text] == []
     said = "<img src=x onerror=alert(1)>&\"'</script>"
     assert [name for name, text in texts.items() if said not in text_of(text)] == []
-    scripts = (site / PAGES / "data").glob("*.js")
-    assert [one.name for one in scripts if "<" in one.read_text("utf-8")] == []
+    assert [
+        one.name for one in (site / PAGES / "data").glob("*.js") if "<" in one.read_text("utf-8")
+    ] == []
 
 
 def test_index_lists_what_is_wrong_worst_first(run, index):
@@ -114,13 +115,14 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
         )
         for cell in finished.of_scene("free")
     ]
-    alone = {
-        "scenes": {"free": finished.scenes["free"]},
-        "cells": tuple(cells),
-        "ensembles": (),
-        "faults": (),
-    }
-    finished.model_copy(update=alone).save(tmp_path)
+    finished.model_copy(
+        update={
+            "scenes": {"free": finished.scenes["free"]},
+            "cells": tuple(cells),
+            "ensembles": (),
+            "faults": (),
+        }
+    ).save(tmp_path)
     index = write_site(tmp_path).read_text("utf-8")
     said = (
         "No tolerance yet",
@@ -172,8 +174,9 @@ def test_only_what_would_show_something_else_is_written_again(tmp_path, site, fi
     assert "2026-01-02" in (tmp_path / "index.html").read_text("utf-8")
 
     one, *others = finished.cells
-    slower = one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)})
-    second = again(cells=(slower, *others))
+    second = again(
+        cells=(one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)}), *others)
+    )
     assert second.keys() == first.keys()
     assert {name for name in first if second[name][1] != first[name][1]} == {"free.html"}
     assert all(second[name] == first[name] for name in first if "beside-a-wall" in name)
@@ -232,8 +235,9 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path, finis
     assert not list((tmp_path / PAGES / "figures").glob("free.*"))
     assert (tmp_path / PAGES / "figures" / "free-small.svg").exists()
     assert len(list((tmp_path / PAGES / "figures").glob("beside-a-wall.*"))) == 3
-    page = (tmp_path / PAGES / "free.html").read_text("utf-8")
-    assert "rockcheck report DIR --scene free -o free.pdf" in page
+    assert "rockcheck report DIR --scene free -o free.pdf" in (
+        tmp_path / PAGES / "free.html"
+    ).read_text("utf-8")
     for name, ending, begins in (
         ("free", ".svg", b"<?xml"),
         ("free", ".png", b"\x89PNG"),
@@ -278,11 +282,13 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
     rows = pd.read_csv(site / PAGES / "data" / "crowd.csv")
     names = [f"{what} {m}" for m in record.peaks for what in ("peak_rotation_alpha", "outcome")]
     assert list(rows.columns) == ["scene", *names]
-    expected = np.array(record.peaks["ebm-unilateral"])
-    np.testing.assert_array_equal(rows["peak_rotation_alpha ebm-unilateral"], expected)
+    np.testing.assert_array_equal(
+        rows["peak_rotation_alpha ebm-unilateral"], np.array(record.peaks["ebm-unilateral"])
+    )
     above, below = view.distributions().panels
     curve = next(one for one in above.series if one.label == "CM")
     sample = view.record.samples["cm"]
-    shares = [np.mean((sample.peaks <= peak) & ~sample.fallen) for peak in curve.x]
-    np.testing.assert_allclose(curve.y, shares, atol=1e-12)
+    np.testing.assert_allclose(
+        curve.y, [np.mean((sample.peaks <= peak) & ~sample.fallen) for peak in curve.x], atol=1e-12
+    )
     assert np.max(np.abs(below.series[0].y)) == pytest.approx(figures["ks_distance"], abs=1e-12)

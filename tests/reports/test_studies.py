@@ -122,8 +122,9 @@ def ida() -> Finding:
     level = np.linspace(0.1, 1.0, 10)
     peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
     peaks[peaks > 0.7] = np.inf
-    records = [f"r{k}" for k in range(4)]
-    return found(lines_of(records, peaks, level, Column("intensity", "PGA", "g")))
+    return found(
+        lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g"))
+    )
 
 
 def spectra(letters: str, *panels: Panel) -> Finding:

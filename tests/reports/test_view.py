@@ -38,8 +38,7 @@ def payload_of(site, slug):
     text = (site / PAGES / "data" / f"{slug}.js").read_text("utf-8")
     data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
     places = np.frombuffer(zlib.decompress(base64.b64decode(data["lines"])), np.uint8)
-    lines = np.ascontiguousarray(places.reshape(4, -1).T).view("<f4")
-    return data, lines.reshape(-1, data["rows"])
+    return data, np.ascontiguousarray(places.reshape(4, -1).T).view("<f4").reshape(-1, data["rows"])
 
 
 def view_of(folder, name):
@@ -303,7 +302,8 @@ def test_index_shows_peaks_against_the_reference_s(site, run, index):
 
 def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(site):
     view = view_of(site, "free")
-    landing = Event(t=0.5, kind="landing", impulse=1.0)
-    view.histories["ebm"] = replace(view.histories["ebm"], event_list=(landing,))
+    view.histories["ebm"] = replace(
+        view.histories["ebm"], event_list=(Event(t=0.5, kind="landing", impulse=1.0),)
+    )
     tracks = histories_figure(view).axes[-1].get_lines()
     assert [0.5] in [list(line.get_xdata()) for line in tracks if line.get_marker() == "|"]

@@ -70,10 +70,12 @@ def test_a_rectangular_pulse_overturns_a_slender_block(phase):
 
 @pytest.mark.parametrize(("a", "v", "mu"), [(5.0, 0.3, 0.2), (9.0, 1.0, 0.35), (3.0, 0.5, 0.1)])
 def test_newmarks_sliding_block(a, v, mu):
-    flat = Block(half_width=2.0, half_height=0.5)
-    history = played(shaken(flat, Record.from_samples([a, a], v / a), mu))
-    slip = np.max(np.abs(history.channels["slip"]))
-    assert slip == pytest.approx(criteria.newmark_slip(v, a, mu * G), rel=1e-12)
+    history = played(
+        shaken(Block(half_width=2.0, half_height=0.5), Record.from_samples([a, a], v / a), mu)
+    )
+    assert np.max(np.abs(history.channels["slip"])) == pytest.approx(
+        criteria.newmark_slip(v, a, mu * G), rel=1e-12
+    )
     assert criteria.newmark_slip(v, a, a) == 0.0
     assert math.isinf(criteria.newmark_slip(v, a, 0.0))
 
@@ -83,8 +85,7 @@ def test_newmarks_sliding_block(a, v, mu):
 @pytest.mark.parametrize("block", BLOCKS)
 def test_uplift_and_sliding_begin_where_the_criteria_say(block, kind, friction, k, ratio, moves):
     uplift, slip = G * block.slope, friction * G
-    pulse = Record.from_samples([ratio * min(uplift, slip)] * 2, 0.1)
-    scene = shaken(block, pulse, friction)
+    scene = shaken(block, Record.from_samples([ratio * min(uplift, slip)] * 2, 0.1), friction)
     assert any(event.kind == kind for event in played(scene).event_list) is moves
     assert criteria.CRITERIA[k].says(scene, criteria.base_of(scene)) == (moves, None)
 
@@ -145,7 +146,8 @@ def test_a_base_at_rest_moves_nothing_and_of_a_wide_block_each_estimate_is_a_num
     happens, estimate = criterion.says(still, criteria.base_of(still))
     assert not happens
     assert estimate in (None, 0.0)
-    wide = Block(half_width=1.6, half_height=1.0)
-    scene = shaken(wide, Sine(amplitude=30.0, period=1.0, cycles=2), 0.4, 4.0)
+    scene = shaken(
+        Block(half_width=1.6, half_height=1.0), Sine(amplitude=30.0, period=1.0, cycles=2), 0.4, 4.0
+    )
     assert (criterion.says(scene, criteria.base_of(scene))[1] or 0.0) >= 0.0
     assert criteria.reserve_rocking(scene, criteria.base_of(scene)) > 0.0

@@ -54,8 +54,7 @@ def test_a_branch_is_known_again(law: str, restitution: float, side: str) -> Non
 def test_the_default_law_is_closed_below_one_and_open_at_one_and_none_is_between(
     of: float, played: float, law: str
 ) -> None:
-    history = UNILATERAL.simulate(flush_landing(played))
-    assert law_followed(flush_landing(of), history).law == law
+    assert law_followed(flush_landing(of), UNILATERAL.simulate(flush_landing(played))).law == law
 
 
 @pytest.mark.parametrize(
@@ -69,8 +68,7 @@ def test_the_default_law_is_closed_below_one_and_open_at_one_and_none_is_between
 )
 def test_where_there_is_nothing_to_tell(restitution: float, of: dict, played: dict) -> None:
     scene = flush_landing(restitution)
-    history = UNILATERAL.simulate(scene.replace(**played))
-    assert law_followed(scene.replace(**of), history) is None
+    assert law_followed(scene.replace(**of), UNILATERAL.simulate(scene.replace(**played))) is None
 
 
 @pytest.mark.parametrize("closed", [stepping.CLOSED, 1.4 * stepping.CLOSED, 4.0 * stepping.CLOSED])

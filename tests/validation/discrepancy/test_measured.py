@@ -130,8 +130,9 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     given = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
     observe(scene, "measured", state, events=given).save(tmp_path / "a.csv")
     assert [e.t for e in read_measured(tmp_path / "a.csv", offset=-0.5).event_list] == [-0.3, 2.495]
-    table = Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5)
-    history = table.simulate(scene.replace(duration=duration))
+    history = Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
+        scene.replace(duration=duration)
+    )
     assert (history.outcome, history.overturned_at, [e.t for e in history.event_list]) == (
         outcome,
         fell,

@@ -237,8 +237,9 @@ def test_figures_of_one_history(made):
 
 def test_a_measured_history_may_lack_columns(made):
     whole = made(WAVE, T)
-    columns = {name: whole.channels[name] for name in ("t", "theta")}
-    bare = dataclasses.replace(whole, channels=columns, block=None)
+    bare = dataclasses.replace(
+        whole, channels={name: whole.channels[name] for name in ("t", "theta")}, block=None
+    )
     found = compare(whole, bare)
     assert "no column x" in found.figure("x_rms").note
     assert set(found.table.columns) == {"measure", "value", "unit", "note"}

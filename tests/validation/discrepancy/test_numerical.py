@@ -78,8 +78,9 @@ def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_
 def test_what_does_not_converge_gets_the_larger_factor(error):
     found = judged(Made(lambda h: 1.0 + error(h / 1e-3)))
     change = max(abs(error(n) - error(1.0)) for n in (2.0, 3.0, 4.0))
-    u_num = [found[name].u_num for name in ("peak_rotation", "theta_rms")]
-    assert u_num == pytest.approx([3.0 * 0.5 * change] * 2, rel=1e-3)
+    assert [found[name].u_num for name in ("peak_rotation", "theta_rms")] == pytest.approx(
+        [3.0 * 0.5 * change] * 2, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -103,8 +104,9 @@ def test_the_run_at_3h_tells_convergence_from_chance(at, u_num):
 def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
     """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
     given, finer = (Made(lambda step, wrong=wrong: 1.0 + wrong) for wrong in (1e-2, 1e-4))
-    model = SimpleNamespace(simulate=given.simulate, finer=lambda: finer)
-    found = numerical_uncertainty(model, BOOKCASE)
+    found = numerical_uncertainty(
+        SimpleNamespace(simulate=given.simulate, finer=lambda: finer), BOOKCASE
+    )
     assert found.converged
     change = 0.5 * 0.99e-2 * np.sin(BOOKCASE.output_times)
     assert [found.u_num(name) for name in ("theta_rms", "peak_rotation", "outcome")] == [

@@ -58,10 +58,12 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
     wilson = NORMAL**2 / (SAMPLES + NORMAL**2)
     assert span(inputs.overturns) == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
     # At the start the bands are the quantiles of a normal number.
-    quantiles = [0.5 + 0.05 * z for z in (-NORMAL, -0.994458, 0.0, 0.994458, NORMAL)]
-    assert found.bands[:, 0] == pytest.approx(quantiles, abs=2e-3)
-    half = 0.5 * (found.bands[4] - found.bands[0])
-    assert inputs.u_input("theta_rms") == pytest.approx(math.sqrt(np.mean(half**2)))
+    assert found.bands[:, 0] == pytest.approx(
+        [0.5 + 0.05 * z for z in (-NORMAL, -0.994458, 0.0, 0.994458, NORMAL)], abs=2e-3
+    )
+    assert inputs.u_input("theta_rms") == pytest.approx(
+        math.sqrt(np.mean((0.5 * (found.bands[4] - found.bands[0])) ** 2))
+    )
 
 
 @pytest.mark.parametrize("value", [0.5, 0.7])
@@ -77,8 +79,9 @@ def test_draws_of_sobol_are_balanced(asked, drawn):
 
 
 def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
-    paper = EventBasedModel(tolerance=1e-8)
-    found = propagate(tilted(1.0, duration=6.0), model=paper, indices=False).inputs
+    found = propagate(
+        tilted(1.0, duration=6.0), model=EventBasedModel(tolerance=1e-8), indices=False
+    ).inputs
     assert span(found.overturns) == (
         pytest.approx(0.5, abs=0.01),
         pytest.approx(0.5 - NORMAL / 2 / 32, abs=0.012),
@@ -107,8 +110,7 @@ def test_what_the_peak_does_not_depend_on_has_no_index():
 
 
 def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
-    said = "no number of this scene is uncertain"
-    assert said in str(fault_of(propagate, tilted(0.5, given={})))
+    assert "no number of this scene is uncertain" in str(fault_of(propagate, tilted(0.5, given={})))
 
 
 def test_correlated_inputs_have_no_indices_and_a_note_says_so():

@@ -120,8 +120,9 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
     ],
 )
 def test_faults_of_the_file_are_one_line(written, fault_of, old, new, said):
-    faulty = written("shelf.toml", UNCERTAIN.replace(old, new))
-    assert said in str(fault_of(load_uncertain_scene, faulty))
+    assert said in str(
+        fault_of(load_uncertain_scene, written("shelf.toml", UNCERTAIN.replace(old, new)))
+    )
 
 
 @pytest.mark.slow
@@ -133,8 +134,9 @@ def test_sobol_indices_agree_with_brute_force(written):
     chance = np.random.default_rng(5)
 
     def peaks(points):
-        batch = pack([given.at(row) for row in given.values(points)], model)
-        peak = run_batch(batch, model, until_decided=False).peak
+        peak = run_batch(
+            pack([given.at(row) for row in given.values(points)], model), model, until_decided=False
+        ).peak
         return np.minimum(peak / BOOKCASE.block.alpha, 1.0)
 
     points = chance.random((100_000, len(given.names)))

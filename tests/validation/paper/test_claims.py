@@ -276,8 +276,9 @@ def test_each_finding_counts_its_nodes_one_by_one():
         sum(wall[i][j] != 0 and free[i][j] == 0 for i, j in nodes),
     )
     free, left, right = by["7-unobstructed"], by["7-gap-53-e-1"], by["9-gap-53-e-1"]
-    lost = sum(free[i][j] == 0 and left[i][j] != 0 and right[i][j] != 0 for i, j in nodes)
-    assert either.lost.sum() == lost
+    assert either.lost.sum() == sum(
+        free[i][j] == 0 and left[i][j] != 0 and right[i][j] != 0 for i, j in nodes
+    )
     wall = by["8-gap-53-e-1"]
     count = sum(wall[i][j] == 0 and any(wall[k][j] != 0 for k in range(i)) for i, j in nodes)
     assert stronger.gained.sum() == count > 1000

@@ -102,8 +102,9 @@ def test_agreement_counts_equal_outcomes(agree):
     assert json.loads(json.dumps(found)) == found
     equal = {"ebm": 25, "ebm-unilateral": 25, "cm": 24}
     assert {one["model"]: one["equal"] for one in found["maps"]} == equal
-    panels = plot.data["panels"]
-    assert [(one["row"], len(one["outcomes"])) for one in panels] == [(name, 25) for name in equal]
+    assert [(one["row"], len(one["outcomes"])) for one in plot.data["panels"]] == [
+        (name, 25) for name in equal
+    ]
 
 
 def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):

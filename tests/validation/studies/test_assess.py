@@ -166,8 +166,9 @@ def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, s
     """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between
     the rows has changed the speed, so the last one stands. The wall is on the left."""
     events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (0.3, "wall impact")) if t]
-    rightward = np.array([-0.1, -0.2, -0.3, 0.2])
-    history = made([0.0] * 4, t=0.1 * np.arange(4), x_dot=rightward, events=events)
+    history = made(
+        [0.0] * 4, t=0.1 * np.arange(4), x_dot=np.array([-0.1, -0.2, -0.3, 0.2]), events=events
+    )
     assert wall_speeds(history, load_scene("fig5a")) == pytest.approx([speed])
 
 
@@ -279,10 +280,12 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
     assert main(["new", "new.toml", "--quiet"]) == 0
     said = assess("new.toml --models mujoco,ebm-unilateral --set time_step=1e-3", code=1)
     assert said["exit_code"] == 1
-    answers = [row["answer"] for row in said["tables"]["answers"]]
-    assert "Not converged: no figure of it is sure." in answers
-    summary = tmp_path / "out" / "summary.md"
-    assert "numerical error (no run is converged)" in summary.read_text("utf-8")
+    assert "Not converged: no figure of it is sure." in [
+        row["answer"] for row in said["tables"]["answers"]
+    ]
+    assert "numerical error (no run is converged)" in (tmp_path / "out" / "summary.md").read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.parametrize(

@@ -76,8 +76,9 @@ def with_creep(scene):
     t = history.channels["t"]
     share = -scene.excitation.acceleration(t) / (scene.floor.friction * scene.gravity)
     crept = 1e-6 * np.concatenate([[0.0], np.cumsum(np.diff(t) * share[1:])])
-    columns = history.channels | {"x": history.channels["x"] + crept}
-    return dataclasses.replace(history, channels=columns)
+    return dataclasses.replace(
+        history, channels=history.channels | {"x": history.channels["x"] + crept}
+    )
 
 
 class SinglePrecision(MuJoCo):
@@ -257,8 +258,9 @@ def test_another_program_takes_part_by_files(exported, histories, tmp_path, told
 
 @pytest.mark.parametrize("units", [[1.0, 1e3, 1.0, 1.0], [1e3, 1.0, 1.0, 1.0], [1, 1, 1, 57.3]])
 def test_a_column_in_other_units_is_told(exported, histories, units):
-    names = {"t": "t_s", "y": "y_m", "x": "x_m", "theta": "theta_rad"}
-    written_by(exported, histories, names, units)
+    written_by(
+        exported, histories, {"t": "t_s", "y": "y_m", "x": "x_m", "theta": "theta_rad"}, units
+    )
     rows = played(written(exported)).table("rows").records()
     told = {row["id"] for row in rows if row["verdict"] == "error" and "unit?" in row["reason"]}
     assert {"RC-10", "RC-11", "RC-14", "RC-25"} <= told

@@ -80,8 +80,9 @@ def records(tmp_path, monkeypatch):
     (tmp_path / "records").mkdir()
     for name, one in MOTIONS:
         rows = "".join(f"{0.02 * k:.2f},{a!r}\n" for k, a in enumerate(one.samples.tolist()))
-        path = tmp_path / "records" / f"{name}.csv"
-        path.write_text(f"time_s,acceleration_m_s2\n{rows}", "utf-8")
+        (tmp_path / "records" / f"{name}.csv").write_text(
+            f"time_s,acceleration_m_s2\n{rows}", "utf-8"
+        )
 
 
 # Lines
@@ -91,8 +92,9 @@ def test_a_run_is_the_record_at_that_intensity(lines):
     peaks, found = lines
     model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
     runs = itertools.product(MOTIONS, (1, -1), LEVELS)
-    rows = found.table("ida").rows
-    for ((name, one), sign, level), peak, row in zip(runs, peaks.ravel(), rows, strict=True):
+    for ((name, one), sign, level), peak, row in zip(
+        runs, peaks.ravel(), found.table("ida").rows, strict=True
+    ):
         factor = sign * level * 9.80665 / np.max(np.abs(one.samples))
         scaled = Record.from_samples(one.samples, one.time_step).scaled(factor)
         history = model.simulate(SCENE.replace(excitation=scaled, output_step=0.002))
@@ -206,8 +208,9 @@ def test_both_cases_and_directions_are_played():
     """Reversed, a symmetric block without a wall does the mirror image."""
     scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
     done, found = played(fragility(scene, np.linspace(1.0, 6.0, 4), (1.0, 3.0)))
-    cases = ["with the wall"] * PULSES + ["without a wall"] * PULSES
-    assert [batch.of[0] for batch in done] == cases
+    assert [batch.of[0] for batch in done] == (
+        ["with the wall"] * PULSES + ["without a wall"] * PULSES
+    )
     free = [runs.side for batch, runs in done.items() if not batch.scene.walls]
     sides = np.array(free).reshape(PULSES, 2, 4)
     assert set(np.unique(sides)) == {-1, 0, 1}
@@ -222,10 +225,12 @@ def test_both_cases_and_directions_are_played():
 def test_the_intensity_in_g_is_that_of_the_pivot_that_lifts_first():
     """Of a block whose mass lies to the right and low: its right corner, nearer to the mass's
     centre."""
-    block = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
-    scene = load_scene("loaded").replace(block=block)
-    found = fragility(scene, LEVELS, (1.0, 2.0)).data["pga_g"]
-    assert found == pytest.approx((0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665)
+    scene = load_scene("loaded").replace(
+        block=Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.1, -0.2))
+    )
+    assert fragility(scene, LEVELS, (1.0, 2.0)).data["pga_g"] == pytest.approx(
+        (0.3 - 0.1) / (1.0 - 0.2) * scene.gravity / 9.80665
+    )
 
 
 @pytest.mark.parametrize(
@@ -246,8 +251,9 @@ def test_a_set_that_is_none_is_refused(asked, said):
 def test_the_lognormal_curve_is_found_again():
     intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
     counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
-    found = fit_lognormal(intensities, counts, np.full(60, motions))
-    assert found == pytest.approx((2.5, 0.4), rel=1e-3)
+    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
+        (2.5, 0.4), rel=1e-3
+    )
 
 
 def test_a_curve_is_found_where_few_overturn():
@@ -270,8 +276,9 @@ def test_a_fitted_median_lies_inside_its_interval():
     chance = np.random.default_rng(8)
     draws = [hit[chance.integers(3, size=3)].sum(axis=(0, 1)) for _ in range(400)]
     medians = [fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
-    between = np.nanquantile(medians, [0.025, 0.975])
-    assert [curve.low, curve.high] == pytest.approx(between.tolist(), rel=0.2)
+    assert [curve.low, curve.high] == pytest.approx(
+        np.nanquantile(medians, [0.025, 0.975]).tolist(), rel=0.2
+    )
     assert curve.low < curve.median < curve.high
     assert math.isnan(curve_of("made", ~never, never, LEVELS, 200).low)
 

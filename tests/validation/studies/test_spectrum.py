@@ -67,8 +67,9 @@ def test_tiles_make_the_spectrum_of_one_batch(tmp_path, monkeypatch):
     assert [task.what for task in study.tasks({})].count("outcomes") == 4
     (mine,) = outcomes(run(study, tmp_path, jobs=1)).values()
     axes = study.request.frequencies, study.request.amplitudes
-    direct = overturning_spectrum(study.panels[0].scene, *axes)
-    np.testing.assert_array_equal(mine["outcomes"], direct.outcomes)
+    np.testing.assert_array_equal(
+        mine["outcomes"], overturning_spectrum(study.panels[0].scene, *axes).outcomes
+    )
 
 
 def test_a_task_that_failed_leaves_its_nodes_undecided():
@@ -231,8 +232,9 @@ def test_the_command_writes_figures_data_and_page(tmp_path, told):
     assert settings["scene"]["walls"] == [{"side": "right", "gap": 0.003, "restitution": 0.0}]
     assert settings["settings"] == {"tolerance": 4e-8} == said["settings"]
     table = np.loadtxt(tmp_path / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
-    expected = np.column_stack([np.linspace(1.0, 12.0, 9), data["outcomes"]])
-    np.testing.assert_allclose(table, expected)
+    np.testing.assert_allclose(
+        table, np.column_stack([np.linspace(1.0, 12.0, 9), data["outcomes"]])
+    )
     rows = said["tables"]["spectra"]
     assert [row["runs"] for row in rows] == 7 * [81]
     assert rows[1]["safe"] == np.mean(data["outcomes"] == 0)

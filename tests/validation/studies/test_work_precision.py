@@ -53,8 +53,9 @@ def measure(family: str, member: int, line: str, value: float) -> BenchmarkRun:
 
 def order_and_error(family: str, line: str, coarse: float, fine: float) -> tuple[float, float]:
     """Order between two settings, and the median error at the fine one, alpha, of three members."""
-    played = [measure(family, k, line, value) for k in SOME for value in (coarse, fine)]
-    first, second = points_of(frame_of(played)).rms
+    first, second = points_of(
+        frame_of([measure(family, k, line, value) for k in SOME for value in (coarse, fine)])
+    ).rms
     return math.log(first / second) / math.log(coarse / fine), second
 
 
@@ -193,8 +194,9 @@ def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not
     [("drake", {name for name in WALLS if not name.endswith("e 0.5")}), ("mujoco", set(WALLS))],
 )
 def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch, line, scenes):
-    module = "rockcheck.validation.studies.work_precision.study.not_installed"
-    monkeypatch.setattr(module, lambda model: "")
+    monkeypatch.setattr(
+        "rockcheck.validation.studies.work_precision.study.not_installed", lambda model: ""
+    )
     tasks = [task for task in WorkPrecision("convergence").tasks({}) if isinstance(task, Play)]
     assert {task.family for task in tasks if task.line == line} == scenes
     assert len(WALLS) == len(PULSES) * len(GAPS) * len(RESTITUTIONS) == 18

@@ -166,6 +166,7 @@ def test_the_reference_itself_counts_where_it_is_nearer(suite_file):
         EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
         for law in ("moreau", "floor-first")
     )
-    whole = ("", None, ["outcome_agrees", "peak_ratio"])
-    found = by_any(one, one, {"floor-first": other}, scene, whole)
+    found = by_any(
+        one, one, {"floor-first": other}, scene, ("", None, ["outcome_agrees", "peak_ratio"])
+    )
     assert [(figure.value, gap) for figure, gap, _ in found] == [(1.0, ""), (1.0, "")]
