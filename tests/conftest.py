@@ -145,7 +145,6 @@ def refused(typed: Callable[..., tuple[str, str]]) -> Callable[..., str]:
 
 @pytest.fixture
 def written(tmp_path: Path) -> Callable[[str, str | bytes], Path]:
-    """The path of a file of this name and content."""
 
     def write(name: str, content: str | bytes) -> Path:
         path = tmp_path / name
@@ -265,7 +264,6 @@ def made() -> Callable[..., History]:
 
 @pytest.fixture
 def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The models of `faulty.py` lie in `tmp_path`, and are imported afresh."""
     shutil.copy(Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))  # a suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)

@@ -26,8 +26,9 @@ def broken(monkeypatch):
 
 
 @pytest.mark.usefixtures("broken")
-def test_a_fault_inside_has_a_code_of_its_own(tmp_path, monkeypatch, typed):
-    """70, one line, and the traceback in a file that only the user can read."""
+def test_a_fault_inside_has_a_code_and_leaves_a_file_that_only_the_user_can_read(
+    tmp_path, monkeypatch, typed
+):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     (line,) = typed("scenes", code=70)[1].splitlines()
     assert line.startswith(
@@ -83,8 +84,9 @@ def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monk
     ],
 )
 @pytest.mark.parametrize("reader", ["head -1", "true"])
-def test_a_reader_that_goes_changes_no_exit_code(tmp_path, words, expected, reader):
-    """`rockcheck scenes | head -1` ends with 0, and in silence."""
+def test_a_reader_that_goes_changes_no_exit_code_and_hears_nothing(
+    tmp_path, words, expected, reader
+):
     done = subprocess.run(
         ["bash", "-c", f"{' '.join(ROCKCHECK)} {words} | {reader}; echo ${{PIPESTATUS[0]}}"],
         capture_output=True,

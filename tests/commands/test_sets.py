@@ -89,7 +89,6 @@ def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
 
 
 def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
-    """It is read as the others are."""
     at2("records/RSN2_H1.AT2", 0.15, "180")
     at2("records/RSN2_V.AT2", 0.05, "UP")
     words = (
@@ -107,8 +106,7 @@ def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
     )
 
 
-def test_all_models_are_those_that_are_installed(told):
-    """They play where none is named, too."""
+def test_without_names_all_models_play_that_are_installed(told):
     found = told("validate", "rack.toml", "--set", "mujoco.time_step=1e-3", "--no-report")
     models = [name for name in FAMILIES if name != "measured" and not not_installed(name)]
     assert {"ebm", "ebm-unilateral", "cm", "mujoco"} <= set(models)

@@ -43,7 +43,6 @@ def test_every_package_is_in_the_wheel_and_none_but_rockchecks():
 
 
 def test_every_data_file_is_in_the_wheel():
-    """Files that are not code lie in data/, or are those that package-data names."""
     for name, folder in FOLDERS.items():
         named = PROJECT["tool"]["setuptools"]["package-data"].get(name, [])
         for path in (path for path in (ROOT / folder).rglob("*") if path.is_file()):

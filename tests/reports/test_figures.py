@@ -32,7 +32,6 @@ SIZE = 12
 
 
 def plot_of(*panels, letter="R", ranges=()):
-    """The plot of spectra whose nodes were all played to one outcome."""
     study = Spectra(panels, Request(SIZE, *ranges))
     done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
     return next(study.gather(done).plots())
@@ -87,8 +86,7 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
     assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
 
 
-def test_the_pulse_of_ones_own_scene_is_marked():
-    """At its ratios; none is marked in the paper's figures."""
+def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
     scene = load_scene("rack").replace(excitation=Sine(amplitude=6.0, period=0.8))
     own = [
         2.0 * math.pi / 0.8 / scene.frequency_parameter,

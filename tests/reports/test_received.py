@@ -31,8 +31,6 @@ def published(folder):
 @pytest.mark.needs("POSIX")
 @pytest.mark.long
 def test_no_file_of_a_run_is_written_through(tmp_path, received):
-    """Every file that a run writes (tables, pages, data, figures, scripts), as a link and as a
-    pipe."""
     whole = tmp_path / "whole"
     shutil.copytree(received, whole)
     published(whole)

@@ -155,8 +155,9 @@ def files_of(site):
     }
 
 
-def test_only_what_would_show_something_else_is_written_again(tmp_path, site, finished):
-    """And the pages of scenes that are gone go."""
+def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_goes(
+    tmp_path, site, finished
+):
 
     def again(**change: object) -> dict[str, tuple[int, bytes]]:
         finished.model_copy(update=change).save(tmp_path)

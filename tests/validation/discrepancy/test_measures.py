@@ -26,7 +26,6 @@ def figures(history, **more):
 
 
 def times(found):
-    """Of impacts that have a counterpart, and of those only in the one, and only in the other."""
     return (
         [(first.t, second.t) for first, second in found.pairs],
         [e.t for e in found.only_reference],
@@ -110,8 +109,6 @@ def test_grids_may_differ_and_until_cuts(made):
 
 
 def test_the_window_is_the_common_time_and_holds_its_own_ends(made):
-    """From the later start to the earlier end, or to `until`; rows, and events, just at an end are
-    inside."""
     t = SECONDS
     late, early = made(np.zeros(9), t[2:]), made(np.zeros(9), t[:-2])
     for pair in ((early, late), (late, early)):
@@ -287,8 +284,7 @@ def described(scene, measures, **change):
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_the_event_based_model_meets_them(name):
-    """Of a scene of another kind a form has no meaning."""
+def test_the_event_based_model_meets_the_closed_forms_of_its_kind_of_scene(name):
     every = [form for forms in FORMS.values() for form in forms]
     found = {one.measure: one for one in described(load_suite("engines").scenes[name], every)}
     assert {form: (found[form].value, "needed" in found[form].note) for form in every} == {

@@ -203,8 +203,6 @@ def test_a_model_without_a_step_is_not_judged():
 
 
 def test_the_interval_covers_as_often_as_it_says():
-    """Errors a h + b h^1.5 + c h^2 with random signs, and powers with noise: at least 95 % of the
-    intervals hold the truth."""
     chance = np.random.default_rng(5)
     inside = []
     for k in range(400):

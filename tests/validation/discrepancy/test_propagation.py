@@ -25,7 +25,6 @@ FRICTION = {"floor.friction": Spread(low=0.9, high=1.1)}
 
 
 def tilted(tilt, correlations=None, duration=1.0, given=None):
-    """A block that is let go at a tilt (alpha) of this standard deviation, a twentieth of alpha."""
     scene = Scene(
         name="tilted",
         block=BLOCK,

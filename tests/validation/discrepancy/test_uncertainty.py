@@ -127,8 +127,6 @@ def test_faults_of_the_file_are_one_line(written, fault_of, old, new, said):
 
 @pytest.mark.slow
 def test_sobol_indices_agree_with_brute_force(written):
-    """The bookcase with five uncertain numbers: 100,000 draws, means within bins and numbers drawn
-    again one at a time."""
     given = load_uncertain_scene(written("bookcase.toml", FIVE))
     model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
     chance = np.random.default_rng(5)

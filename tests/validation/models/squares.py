@@ -19,8 +19,6 @@ FAULTS = {
 
 @dataclass(frozen=True)
 class Square(Task):
-    """A number to be squared; each time that it is, a line is added to a file."""
-
     value: float
     log: str
 

@@ -55,7 +55,6 @@ def worse_at_high_frequency(one):
 
 
 def turned_round(first):
-    """From a row on what overturns alone is turned round."""
 
     def edit(one):
         rows = one.outcomes[first:]

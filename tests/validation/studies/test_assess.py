@@ -153,7 +153,6 @@ def test_counts_motions_and_gaps_are_those_of_a_loop_of_ones_own(assess, loop):
 
 @pytest.mark.parametrize("name", ["R00", "R01", "R02", "R03"])
 def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loop, name):
-    """Against the same motion with a hundred times as many rows."""
     scene, history = loop[0.05, name]
     fine = EventBasedModel(pivot="unilateral").simulate(scene.replace(output_step=5e-5))
     assert motion_of(history, scene).wall_speed == pytest.approx(

@@ -215,8 +215,6 @@ def exported(tmp_path):
 
 
 def test_the_scenes_are_exported_as_plain_columns(exported):
-    """What another program needs is there without a reader of scene files, and is what the scene
-    is."""
     rows = pd.read_csv(exported / "scenes.csv", dtype=str).set_index("scene")
     assert list(rows.index) == list(SCENES)
     for name, scene in SCENES.items():
@@ -282,8 +280,9 @@ class Halfway(MuJoCo):
 """
 
 
-def test_code_of_ones_own_is_played_by_a_worker(tmp_path, monkeypatch, told):
-    """What has failed is played again."""
+def test_code_of_ones_own_is_played_by_a_worker_and_again_where_it_failed(
+    tmp_path, monkeypatch, told
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "halfway.py").write_text(HALFWAY, "utf-8")
     own = ["conformance", "--engine", "halfway:Halfway", "--allow-code", "halfway:Halfway"]

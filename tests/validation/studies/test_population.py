@@ -204,8 +204,7 @@ def test_a_task_depends_on_all_that_its_runs_do():
 # Fragility
 
 
-def test_both_cases_and_directions_are_played():
-    """Reversed, a symmetric block without a wall does the mirror image."""
+def test_both_cases_and_directions_are_played_and_without_a_wall_they_mirror():
     scene = SCENE.replace(excitation=Ricker(amplitude=1.0, period=1.0))
     done, found = played(fragility(scene, np.linspace(1.0, 6.0, 4), (1.0, 3.0)))
     assert [batch.of[0] for batch in done] == (
@@ -256,8 +255,7 @@ def test_the_lognormal_curve_is_found_again():
     )
 
 
-def test_a_curve_is_found_where_few_overturn():
-    """And none where the shares fall, or none or all do."""
+def test_a_curve_is_found_where_few_overturn_and_none_where_shares_do_not_rise():
     counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
     intensities = np.linspace(0.02, 2.0, 40)
     median, dispersion = fit_lognormal(intensities, counts, np.full(40, 12))
@@ -315,7 +313,6 @@ def test_the_band_covers_as_often_as_it_says(motions, shared):
 
 
 def test_a_curve_never_counts_a_failed_run_as_safe():
-    """Of four motions in both directions: what failed is in no share, no band and no fit."""
     hit = np.zeros((4, 2, 3), dtype=bool)
     hit[:, :, 2] = hit[:2, :, 1] = True
     some = np.zeros_like(

@@ -94,8 +94,7 @@ def test_adaptive_engines_are_within_a_twenty_thousandth_of_alpha(engine, family
     assert all(sample.steps < 450 * sample.horizon for sample in samples)
 
 
-def test_mujocos_default_contact_does_not_converge_beside_a_wall():
-    """Its error has reached a tenth of alpha and stays there as the step falls."""
+def test_the_error_of_mujocos_default_contact_stays_beside_a_wall():
     order, error = order_and_error("wall 53 mm e 0.5", "mujoco default", 1e-3, 2e-4)
     assert abs(order) < 0.3
     assert error > 0.02
@@ -231,8 +230,7 @@ def made(*errors: float, model: str = "mujoco", scene: str = TWO_WALLS[0]) -> li
     ]
 
 
-def test_levels_and_orders_of_known_errors():
-    """And what does not converge is named, not dropped."""
+def test_levels_and_orders_of_known_errors_and_what_does_not_converge_is_named():
     found = frame_of([*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])])
     both = levels_of(found)
     levels, orders = both[both.reference == "ebm-unilateral"], orders_of(found, both)

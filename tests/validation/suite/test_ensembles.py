@@ -222,7 +222,6 @@ def test_bias_and_scatter_by_student_and_chi_squared():
 
 
 def test_only_scenes_in_which_both_rock_have_a_ratio():
-    """A peak of a thousandth and less, and a fall, have none."""
     both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
     assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
 
@@ -258,8 +257,6 @@ def test_a_failed_scene_is_counted():
 
 
 def test_what_a_statistic_tells_apart():
-    """One of a thousand scenes is a thousandth of a share; areas and logarithms are told to a
-    ten-thousandth."""
     shares = {"ks_distance", "overturning_accuracy", "overturning_precision", "overturning_recall"}
     assert {name: one.resolution for name, one in STATISTICS.items()} == {
         name: 1e-3 if name in shares else 1e-4 for name in STATISTICS

@@ -102,9 +102,9 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run, scene, laws):
         ("flat", "trailing-first", ("moving", "overturned left"), 0.02),
     ],
 )
-def test_outcomes_and_peaks_are_judged_by_the_nearest_law(run, scene, law, outcomes, near):
-    """The two laws end differently, and yet both are right; the histories are held against each
-    other only up to where they part."""
+def test_outcomes_and_peaks_are_judged_by_the_nearest_law_and_histories_until_they_part(
+    run, scene, law, outcomes, near
+):
     reference, cell = run.cell(scene, "ebm-unilateral"), run.cell(scene, law)
     assert reference.outcome != cell.outcome
     assert outcomes in (None, (reference.outcome, cell.outcome))

@@ -71,8 +71,6 @@ def run(tmp_path, faulty):
 
 
 def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
-    """A history is compared as its worker gave it; read back from its files, where the comparisons
-    are lost, it gives the same."""
     first = run_suite(load_suite("smoke"), tmp_path, jobs=2)
     shutil.rmtree(tmp_path / "comparisons")
     again = run_suite(load_suite("smoke"), tmp_path, jobs=2)
@@ -125,8 +123,7 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
     assert (suite.get("skipped"), suite.get("failures")) == (("0", "1") if failed else ("1", "0"))
 
 
-def test_only_what_changed_runs_again(tmp_path, run):
-    """Neither documentation nor a remark is code."""
+def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run):
     models = STILL | {"b": 'model = "faulty:Still"\noffset = 1e-12'}
     path = write_suite(tmp_path, models, FINE.format(model="a"))
     code = tmp_path / "faulty.py"

@@ -149,8 +149,6 @@ EVIL = (
 
 
 def test_names_in_the_summary_and_in_junit_are_text():
-    """A model, scene, suite or reason may be called anything: no tag, link, picture, line or
-    control character comes of it."""
     made = Run(
         suite=EVIL,
         created="2026",

@@ -223,8 +223,6 @@ PASSES, CHANGES, FAILS = (cell("a", "m", check(value)) for value in (0.25, 0.4, 
 def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
     cells, more, verdict, code, strict
 ):
-    """A model that is not installed, a figure that has changed, a tolerance without its cell,
-    nothing to judge by, a fault inside."""
     runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
     assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
     assert (runs[0].words == "not judged") == (not more.get("judged", True))
