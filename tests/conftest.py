@@ -23,7 +23,8 @@ from rockcheck.validation.execute.models import not_installed
 
 # What tests of several folders share beside fixtures, and what is a program of its own, too.
 sys.path[:0] = [
-    str(Path(__file__).parent / folder) for folder in ("ebm", "stress", "../docs/site_tools")
+    str(Path(__file__).parent / folder)
+    for folder in ("ebm", "stress", "validation/made_up", "../docs/site_tools")
 ]
 
 if TYPE_CHECKING:

@@ -51,8 +51,8 @@ FINE = (
 
 
 def write_suite(folder, models, tolerances="", seconds=60.0):
-    tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path = folder / "mine.toml"
+    tables = "\n".join(f"[models.{label}]\n{lines}" for label, lines in models.items())
     path.write_text(SUITE.format(models=tables, tolerances=tolerances, seconds=seconds))
     return path
 
@@ -115,12 +115,12 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
         "a": ("done", "pass", ""),
         "pybullet": (status, "incomplete", "not installed: so"),
     }
-    failed = strict and status == "absent"
+    failed = int(strict and status == "absent")
     verdict = "incomplete" if status == "absent" else "pass"
-    assert (done.verdict, done.exit_code) == (verdict, int(failed))
+    assert (done.verdict, done.exit_code) == (verdict, failed)
     assert list(verdict_lines(done)) == ["pybullet: not installed: so"]
     (suite,) = ElementTree.fromstring(junit(done))
-    assert (suite.get("skipped"), suite.get("failures")) == (("0", "1") if failed else ("1", "0"))
+    assert [int(suite.get(name)) for name in ("skipped", "failures")] == [1 - failed, failed]
 
 
 def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run):
@@ -197,11 +197,9 @@ outcome_agrees = { expected = 0.0, limit = 1.0, drift = 0.0, why = "without flig
     ],
 )
 def test_models_of_different_form_may_fall_apart_where_that_is_accepted(
-    tmp_path, run, text, outcomes, kind, verdict
+    written, run, text, outcomes, kind, verdict
 ):
-    path = tmp_path / "mine.toml"
-    path.write_text(text, "utf-8")
-    done = run(path)
+    done = run(written("mine.toml", text))
     assert [cell.outcome for cell in done.cells] == outcomes
     assert [(check.kind, check.verdict) for _, check in done.checks()] == [(kind, verdict)] * 2
 
@@ -234,8 +232,7 @@ def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
     done = run(write_suite(tmp_path, STILL, FINE.format(model="a")))
     out = tmp_path / "out"
     done.save(out)
-    assert Run.load(out) == done
-    assert done.exit_code == 0
+    assert (Run.load(out), done.exit_code) == (done, 0)
     assert set(json.loads((out / "run.json").read_text())) == set(
         json.loads((out / "run.schema.json").read_text())["properties"]
     )
@@ -276,21 +273,19 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
         while pool._pool.active:
             time.sleep(0.01)
         ended = pool.run(deque(Call(math.sqrt, (n * n,)) for n in range(20)))
-        found = {next(ended).outcome}
+        first = next(ended).outcome
         pool._pool._pool_manager.handle_broken_pool(BrokenProcessPool("made up"))
-        found |= {one.outcome for one in ended}
-    assert found == set(range(20))
+        assert {first, *(one.outcome for one in ended)} == set(range(20))
 
 
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
-    study = SuiteStudy(load_suite("paper"), tmp_path)
-    begun = [(cell.variant.label, cell.place) for cell in in_order(study.items)]
+    cells = in_order(SuiteStudy(load_suite("paper"), tmp_path).items)
+    begun = [(cell.variant.label, cell.place) for cell in cells]
     assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
-    engines = begun[3:10]
-    assert {model for model, _ in engines} == {"mujoco", "pybullet"}
-    assert [scene[:4] for _, scene in engines] == 4 * ["fig5"] + 3 * ["fig4"]
+    assert {model for model, _ in begun[3:10]} == {"mujoco", "pybullet"}
+    assert [scene[:4] for _, scene in begun[3:10]] == 4 * ["fig5"] + 3 * ["fig4"]
 
 
 @pytest.mark.parametrize("name", sorted(FAMILIES))
@@ -317,5 +312,5 @@ def test_time_to_compile_does_not_count_for_a_cells_limit(
 ):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
-    study = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out")
-    assert {cell.compiles for cell in study.items if cell.variant.label == "a"} == {compiled}
+    cells = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out").items
+    assert {cell.compiles for cell in cells if cell.variant.label == "a"} == {compiled}
