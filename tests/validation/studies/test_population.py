@@ -76,8 +76,8 @@ def lines():
 def records(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rack.toml").write_text(TOML, "utf-8")
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "records").mkdir()
+    for name in ("empty", "records"):
+        (tmp_path / name).mkdir()
     for name, one in MOTIONS:
         rows = "".join(f"{0.02 * k:.2f},{a!r}\n" for k, a in enumerate(one.samples.tolist()))
         (tmp_path / "records" / f"{name}.csv").write_text(

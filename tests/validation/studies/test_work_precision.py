@@ -10,7 +10,6 @@ import pytest
 from rockcheck.reports.document import publish
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.studies.work_precision import runs, timings
 from rockcheck.validation.studies.work_precision.runs import (
     DURATION,
     FAMILIES,
@@ -23,6 +22,7 @@ from rockcheck.validation.studies.work_precision.runs import (
     WALLS,
     BenchmarkRun,
     Play,
+    at_the_cost,
     cost_at,
     error_at,
     exceptions_of,
@@ -30,16 +30,20 @@ from rockcheck.validation.studies.work_precision.runs import (
     levels_of,
     orders_of,
     points_of,
+    pooled,
     prepared,
     slope,
 )
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
 from rockcheck.validation.studies.work_precision.timings import (
     CASES,
+    KINDS,
     LEVEL,
+    Saving,
     at_level,
     batch_size,
     batch_times,
+    measured,
 )
 
 SOME = (1, 4, 7)
@@ -123,32 +127,30 @@ def line_of(*points: tuple[float, float, float]) -> pd.DataFrame:
 
 def test_the_order_is_the_slope_between_rounding_and_nonsense():
     line = line_of((1e-1, 0.9, 1.0), (1e-2, 3e-2, 1.0), (1e-3, 3e-4, 1.0), (1e-4, 1e-14, 1.0))
-    assert slope(line.value, line.rms, FITTED) == pytest.approx(2.0)
-    assert math.isnan(slope(line[:2].value, line[:2].rms, FITTED))
+    found = [slope(one.value, one.rms, FITTED) for one in (line, line[:2])]
+    assert found == pytest.approx([2.0, math.nan], nan_ok=True)
 
 
 def test_the_cost_of_a_level_is_interpolated_between_logarithms():
     line = line_of((1e-2, 1e-2, 1.0), (1e-3, 1e-4, 16.0), (1e-4, 1e-5, 3.0))
-    assert cost_at(line[:2]) == (pytest.approx(4.0), False)
-    assert cost_at(line[1:2]) == (16.0, True)
+    costs = [cost_at(one) for one in (line[:2], line[1:2], line)]
+    assert costs == [(pytest.approx(4.0), False), (16.0, True), (3.0, False)]
     assert math.isnan(cost_at(line[:1])[0])
-    assert cost_at(line) == (3.0, False)
 
 
 def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones():
     line = line_of((4e-3, 1e-2, 1.0), (1e-3, 1e-4, 16.0))
-    assert error_at(line, 4.0) == pytest.approx(1e-3)
-    assert math.isnan(error_at(line, 17.0))
+    found = [error_at(line, cost) for cost in (4.0, 17.0)]
+    assert found == pytest.approx([1e-3, math.nan], nan_ok=True)
     adaptive = (
         BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu)
         for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6))
         for k in range(3)
     )
-    pooled = runs.pooled(frame_of([*(sample(k, 5e-3) for k in range(10)), *adaptive]))
-    pooled["at_the_cost"] = runs.at_the_cost(pooled)
-    fixed, adaptive = pooled[(pooled.family == "all") & (pooled.value == 1e-3)].itertuples()
-    assert fixed.at_the_cost == pytest.approx(2e-4)
-    assert adaptive.rms_worst == pytest.approx(3e-5)
+    every = pooled(frame_of([*(sample(k, 5e-3) for k in range(10)), *adaptive]))
+    every["at_the_cost"] = at_the_cost(every)
+    fixed, adaptive = every[(every.family == "all") & (every.value == 1e-3)].itertuples()
+    assert (fixed.at_the_cost, adaptive.rms_worst) == pytest.approx((2e-4, 3e-5))
 
 
 def sample(member: int, rms: float, **change: object) -> BenchmarkRun:
@@ -269,7 +271,7 @@ def test_the_finding_holds_every_table(tmp_path):
         Play("free", 0, "pybullet", 1e-2): Failure("it blew up <fast>"),
         Measure("batch", "friction"): batch_times("friction", 6),
         Measure("size", "3", 20): [batch_size(20, 3)],
-        Measure("saving", "made"): [timings.Saving("cm", "wall", "ms", 2.0, 1.0)],
+        Measure("saving", "made"): [Saving("cm", "wall", "ms", 2.0, 1.0)],
     }
     found = WorkPrecision().gather(done)
     names = ("work-precision", "orders-and-ratios", "levels", "batch-times", "savings")
@@ -285,7 +287,7 @@ def test_the_finding_holds_every_table(tmp_path):
 def test_nothing_that_is_skipped_changes_the_motion():
     """Every saving but those that a scene may need (a sliding pivot's cone, a strong pulse's
     slip)."""
-    found = [one for name in timings.KINDS if name != "batches" for one in timings.measured(name)]
+    found = [one for name in KINDS if name != "batches" for one in measured(name)]
     needed = {"cone correction", "friction limit"}
     for saving in found:
         reference = 2e-2 if saving.thing in needed or saving.model == "pybullet" else 1e-5
