@@ -85,8 +85,10 @@ def test_settings_shown_as_remarks_are_the_defaults():
         .replace("moment_of_inertia = 0.35", "")
     )
     tables = tomllib.loads(loud)
-    assert tables["initial_height"] == 0.0
-    assert tables["floor"]["static_friction"] == tables["floor"]["friction"]
+    assert (tables["initial_height"], tables["floor"]["static_friction"]) == (
+        0.0,
+        tables["floor"]["friction"],
+    )
     Path("loud.toml").write_text(loud + "[excitation]" + rest)
     own = load_scene("mine.toml")
     assert load_scene("loud.toml").replace(floor=Floor(friction=0.4), name=own.name) == own

@@ -68,12 +68,14 @@ def test_a_figure_has_the_papers_panels():
     assert [axes.get_title(loc="left") for axes in figure.axes] == [
         panel.title for panel in paper_panels(9)
     ]
-    assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
-    assert labels(figure) == [
-        "safe",
-        "no wall: overturned clockwise",
-        "overturned; no wall: counterclockwise",
-    ]
+    assert (figure.get_suptitle(), labels(figure)) == (
+        "Fig. 9: Wall on the right, μ = 0.6",
+        [
+            "safe",
+            "no wall: overturned clockwise",
+            "overturned; no wall: counterclockwise",
+        ],
+    )
 
 
 def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
@@ -82,8 +84,10 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
     figure = figure_of(plot)
     assert {"undecided", "depends on the impact law"} <= {*labels(figure)}
     (ring,) = figure.axes[1].lines
-    assert ring.get_marker() == LAW_MARK["marker"]
-    assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
+    assert (ring.get_marker(), ring.get_xydata().tolist()) == (
+        LAW_MARK["marker"],
+        [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]],
+    )
 
 
 def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():

@@ -114,8 +114,7 @@ def test_data_are_the_histories(site):
 def test_a_history_that_ends_early_is_padded(site):
     data, lines = payload_of(site, "Free-2")
     theta = lines[data["models"][0]["values"]["theta"]]
-    assert len(theta) == data["rows"]
-    assert np.isnan(theta[[0, -1]]).tolist() == [False, True]
+    assert (len(theta), np.isnan(theta[[0, -1]]).tolist()) == (data["rows"], [False, True])
 
 
 def test_a_large_run_shows_every_nth_row(site, run):
@@ -235,9 +234,8 @@ def test_figures_are_reproducible_and_undated(tmp_path, site):
 
 def test_run_times_are_ratios_to_the_reference(run):
     times = {row[0]: row[1] for row in times_table(run).rows}
-    assert times["ebm-unilateral"] == pytest.approx(1.0)
     # 0.01 s (1 + 10 delay): 1.005 and 1.01 of the reference in the two scenes that the model played
-    assert times["cm"] == pytest.approx((1.005 * 1.01) ** 0.5)
+    assert (times["ebm-unilateral"], times["cm"]) == pytest.approx((1.0, (1.005 * 1.01) ** 0.5))
 
 
 @pytest.mark.parametrize(

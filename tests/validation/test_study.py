@@ -46,11 +46,9 @@ def test_what_was_played_is_read_back_whatever_plays_it(tmp_path, log, jobs):
     values = [2.0, 3.0, 11.0, 121.0, 14641.0]
     rows = [[value, value**2] for value in values]
     assert found.table("squares").rows == run(study, **how).table("squares").rows == rows
-    assert played(log) == values
-    assert (heard[0], heard[-1], found.complete) == ((0, 3), (5, 5), True)
+    assert (played(log), heard[0], heard[-1], found.complete) == (values, (0, 3), (5, 5), True)
     assert found.made
-    assert run(study, **how, force=True).data == {"count": 5}
-    assert played(log) == sorted(2 * values)
+    assert (run(study, **how, force=True).data, played(log)) == ({"count": 5}, sorted(2 * values))
 
 
 def test_a_fault_of_one_task_takes_no_other_down(tmp_path, log):

@@ -211,8 +211,12 @@ def test_events_agree_until_the_first_without_counterpart(made):
     }
     found = compare(*(made(WAVE, T, model=name, events=of) for name, of in events.items()))
     until = found.figure("events_agree_until")
-    assert (until.value, until.note) == (3.0, "floor impact only in r")
-    assert (found["unmatched_impacts"], found["impact_time"]) == (2.0, pytest.approx(0.004))
+    assert (until.value, until.note, found["unmatched_impacts"], found["impact_time"]) == (
+        3.0,
+        "floor impact only in r",
+        2.0,
+        pytest.approx(0.004),
+    )
 
 
 def test_matching_takes_the_nearest_and_each_once():

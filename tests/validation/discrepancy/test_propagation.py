@@ -51,8 +51,12 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
         ("last_slip", "m", pytest.approx((0.0, 0.0, 0.0), abs=1e-9)),
     ]
     sure = [inputs.u_input(name) for name in ("peak_rotation", "end_time")]
-    assert sure == [pytest.approx(0.05 * NORMAL, abs=2e-3), None]
-    assert (inputs.samples, inputs.model, inputs.sensitivities) == (SAMPLES, "ebm-unilateral", ())
+    assert (sure, inputs.samples, inputs.model, inputs.sensitivities) == (
+        [pytest.approx(0.05 * NORMAL, abs=2e-3), None],
+        SAMPLES,
+        "ebm-unilateral",
+        (),
+    )
     assert not found.fallen.any()
     wilson = NORMAL**2 / (SAMPLES + NORMAL**2)
     assert span(inputs.overturns) == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
@@ -87,8 +91,11 @@ def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
         pytest.approx(0.5 + NORMAL / 2 / 32, abs=0.012),
     )
     names = [one.name for one in found.figures]
-    assert (found.model, names) == ("ebm", ["peak_rotation", "last_slip"])
-    assert found.figures[0].high == 1.0
+    assert (found.model, names, found.figures[0].high) == (
+        "ebm",
+        ["peak_rotation", "last_slip"],
+        1.0,
+    )
 
 
 @pytest.mark.parametrize(("tilt", "all_fall"), [(1.05, False), (1.3, True)])

@@ -325,8 +325,7 @@ def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monk
 
 def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
     scaled = load_scene(folder / "pga.toml").excitation
-    assert scaled.peak == pytest.approx(0.5, rel=1e-12)
-    assert scaled.unscaled == noise(1).unscaled
+    assert (scaled.peak, scaled.unscaled) == (pytest.approx(0.5, rel=1e-12), noise(1).unscaled)
 
 
 def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
@@ -341,8 +340,12 @@ def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
     own = assess(f"{words} --levels pga:1:2:2")["tables"]["motions"][0]["own"]
     scaled = assess(f"{words} --levels pga:{own!r}:{1.3 * own!r}:2")["tables"]["ida"][1]
     ran = assess(f"{words} --read scale=1.3")["tables"]["runs"][0]
-    assert (scaled["record"], scaled["direction"], ran["record"]) == ("S1_H", 1, "S1_H")
-    assert scaled["peak_rotation_alpha"] == pytest.approx(ran["peak_rotation"], rel=1e-2)
+    assert (
+        scaled["record"],
+        scaled["direction"],
+        ran["record"],
+        scaled["peak_rotation_alpha"],
+    ) == ("S1_H", 1, "S1_H", pytest.approx(ran["peak_rotation"], rel=1e-2))
 
 
 def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(assess, tmp_path, refused):

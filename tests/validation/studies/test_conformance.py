@@ -251,8 +251,12 @@ def test_another_program_takes_part_by_files(exported, histories, tmp_path, told
     written_by(exported, histories, names, [1.0, 1e3, 1.0, 180.0 / math.pi])
     words = ["conformance", "--histories", str(exported), "--out", str(tmp_path), "--jobs", "1"]
     (card,) = told(*words)["cards"]
-    assert (card["engine"], card["settings"]) == ("my engine", "as it comes")
-    assert (card["counts"]["pass"], card["counts"]["total"]) == (len(PHENOMENA) - 1, len(PHENOMENA))
+    assert (card["engine"], card["settings"], card["counts"]["pass"], card["counts"]["total"]) == (
+        "my engine",
+        "as it comes",
+        len(PHENOMENA) - 1,
+        len(PHENOMENA),
+    )
     (exported / "coast.csv").unlink()
     (card,) = told(*words, code=1)["cards"]
     assert [row["id"] for row in card["phenomena"] if row["verdict"] == "error"] == ["RC-05"]
@@ -296,8 +300,10 @@ def test_code_of_ones_own_is_played_by_a_worker_and_again_where_it_failed(
     settings = "as it comes, cone_correction=False"
     assert (card["version"], card["settings"]) == ("7", settings)
     failed = {row["id"]: row["verdict"] for row in card["phenomena"] if row["verdict"] != "pass"}
-    assert failed == {"RC-04": "fail", "RC-05": "error", "RC-18": "reported"}
-    assert list(found["failures"]) == [f"halfway:Halfway, {settings}: RC-05"]
+    assert (failed, list(found["failures"])) == (
+        {"RC-04": "fail", "RC-05": "error", "RC-18": "reported"},
+        [f"halfway:Halfway, {settings}: RC-05"],
+    )
     scenes = (tmp_path / "played").read_text("utf-8").splitlines()
     assert [scenes.count(name) for name in ("coast", "rest", "uplift")] == [2, 1, 1]
 

@@ -329,8 +329,10 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
         for shares in ([0.0, 0.5, 1.0], [0.0, 1.0, 1.0], [0.0, math.nan, 1.0])
     ]
     # Wilson's band of both motions
-    assert curve.points[1][2:4] == pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4)
-    assert curve.undecided == 5
+    assert (curve.points[1][2:4], curve.undecided) == (
+        pytest.approx([2 / (2 + 3.8415), 1.0], rel=1e-4),
+        5,
+    )
     assert curve.median < plain.median
     assert nowhere.median > 0.0
     assert math.isnan(nothing.median)

@@ -174,9 +174,10 @@ def test_quantiles_are_those_of_the_sample_and_failed_runs_infinitely_wrong(good
     played = [sample(k, 1e-3 * (k + 1)) for k in range(good)]
     failed = BenchmarkRun("free", 10, "mujoco", 1e-3, 3.0, failure="it blew up")
     (row,) = points_of(frame_of(played + [failed] * (10 - good))).itertuples()
-    assert (row.runs, row.failed) == (10, 10 - good)
-    assert (row.rms, row.rms_10, row.rms_90, row.cpu) == pytest.approx(
-        (rms, 1.5e-3, 9.5e-3 if good == 10 else math.inf, 0.1)
+    assert (row.runs, row.failed, (row.rms, row.rms_10, row.rms_90, row.cpu)) == (
+        10,
+        10 - good,
+        pytest.approx((rms, 1.5e-3, 9.5e-3 if good == 10 else math.inf, 0.1)),
     )
 
 
@@ -236,8 +237,10 @@ def test_levels_and_orders_of_known_errors_and_what_does_not_converge_is_named()
     found = frame_of([*made(1e-2, 1e-3, 1e-4), *made(4e-2, 4e-4, 4e-6, scene=TWO_WALLS[1])])
     both = levels_of(found)
     levels, orders = both[both.reference == "ebm-unilateral"], orders_of(found, both)
-    assert levels["median"].tolist() == pytest.approx([2.5e-2, 7e-4, 5.2e-5])
-    assert levels.within.tolist() == [0, 2, 2]
+    assert (levels["median"].tolist(), levels.within.tolist()) == (
+        pytest.approx([2.5e-2, 7e-4, 5.2e-5]),
+        [0, 2, 2],
+    )
     order = orders.set_index(["reference", "scene"]).order
     known = {("ebm-unilateral", TWO_WALLS[0]): 1.0, ("ebm-unilateral", TWO_WALLS[1]): 2.0}
     known["ebm", ""] = 0.0

@@ -220,5 +220,7 @@ def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(accepted):
     same, other = (check(value, ALIKE, "outcome_agrees") for value in (1.0, 0.0))
     assert accepted(text, same) == ([], [], text)
     written = tomllib.loads(accepted(text, other, reason="one falls now")[2])
-    assert written["s"]["m"]["r"]["outcome_agrees"] == line_of(0.0, 1.0, 0.0, "one falls now")
-    assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
+    assert (written["s"]["m"]["r"]["outcome_agrees"], written["*"]) == (
+        line_of(0.0, 1.0, 0.0, "one falls now"),
+        tomllib.loads(EVERYWHERE)["*"],
+    )

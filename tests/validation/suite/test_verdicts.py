@@ -120,8 +120,10 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, ma
     numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
     root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
     cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
-    assert [[(one.tag, one.get("message")) for one in case] for case in cases] == marks
-    assert totals(root) == {"tests": 2 + len(cases), "failures": 0, "errors": 0}
+    assert ([[(one.tag, one.get("message")) for one in case] for case in cases], totals(root)) == (
+        marks,
+        {"tests": 2 + len(cases), "failures": 0, "errors": 0},
+    )
 
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
