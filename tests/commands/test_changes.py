@@ -43,17 +43,13 @@ def ran(out: str, offset: float, *words: str, code: int = 0) -> None:
 
 @pytest.fixture
 def diff(told):
-    def asked(a: str, b: str, code: int) -> list[dict]:
-        found = told("compare", a, b, code=code)
-        assert found["exit_code"] == code
-        return found["changes"]
-
-    return asked
+    return lambda a, b, code: told("compare", a, b, code=code)["changes"]
 
 
-def test_the_same_run_has_no_change(diff, typed):
+def test_the_same_run_has_no_change(told, typed):
     ran("b", 0.001)
-    assert diff("a", "b", 0) == []
+    found = told("compare", "a", "b")
+    assert (found["changes"], found["exit_code"]) == ([], 0)
     assert typed("compare", "a", "b")[0] == "mine: nothing changed\n"
 
 
@@ -67,7 +63,7 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     assert peak["after"] / peak["before"] == pytest.approx(1.02, rel=1e-6)
 
 
-def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
+def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, told, typed):
     ran("b", 0.002, code=1)
     assert [
         (place, c["scene"], c["model"], c["name"], c["before"], c["after"])
@@ -80,8 +76,9 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
     ]
     out = typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "])[0]
     assert max(map(len, out.splitlines())) <= 80
-    back = diff("b", "a", 1)[0]
-    assert (back["before"], back["after"]) == ("fail", "pass")
+    back = told("compare", "b", "a", code=1)
+    first = back["changes"][0]
+    assert (first["before"], first["after"], back["exit_code"]) == ("fail", "pass", 1)
 
 
 def changed(**change: object) -> None:
@@ -167,9 +164,8 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
 def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
     Path("runs.jsonl").write_text(f"\n{line}\n", "utf-8")
     ran("a", 0.001, "--history", "runs.jsonl", code=2)
-    assert capsys.readouterr().err.startswith(
-        "rockcheck: runs.jsonl, line 2: not a run of a history"
-    )
+    said = capsys.readouterr().err
+    assert said.startswith("rockcheck: runs.jsonl, line 2: not a run of a history")
     assert Path("runs.jsonl").read_text("utf-8") == f"\n{line}\n"
 
 

@@ -117,25 +117,25 @@ def test_compare_says_first_what_matters(typed):
     simulated(typed, "Falls", "b.csv")
     said = "note on the candidate: made to fall"
     out, _ = typed("compare", "a.csv", "b.csv", "--plot", "c.svg", holds=[said])
-    assert re.match(r"outcomes differ, overturned left at 1\.5.* against at rest; rotations", out)
-    assert re.search("^outcome agrees +no", out, re.MULTILINE)
+    differ = r"outcomes differ, overturned left at 1\.5.* against at rest; rotations"
+    assert re.match(rf"{differ}(?s:.*)\noutcome agrees +no", out)
     assert Path("c.svg").read_bytes().startswith(b"<?xml")
     out, _ = typed("compare", "a.csv", "a.csv")
     assert out.startswith("same outcome, at rest; rotations 0 alpha apart (RMS)\n")
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_simulate_draws(typed):
+@pytest.mark.parametrize(("first", "history"), [("a.csv", "a.csv"), ("a.svg", None)])
+def test_simulate_draws_and_a_figure_alone_writes_no_history(typed, first, history):
     drawn = "-o", "a.png", "-o", "a.pdf"
-    simulated(typed, "Falls", "a.csv", *drawn, holds=("figure: a.png", "figure: a.pdf"))
-    assert History.load("a.csv").outcome == "overturned left"
+    simulated(typed, "Falls", first, *drawn, holds=("figure: a.png", "figure: a.pdf"))
+    found = json.loads(simulated(typed, "Falls", first, *drawn, "--json"))
+    assert (found["files"], found["history"]) == ([first, "a.png", "a.pdf"], history)
     for name, start in (("a.png", rb"\x89PNG"), ("a.pdf", b"%PDF")):
         assert re.match(start + b"(?s:.{5000})", Path(name).read_bytes())
-
-
-def test_a_figure_alone_writes_no_history(typed):
-    found = json.loads(simulated(typed, "Still", "a.svg", "--json"))
-    assert (found["files"], found["history"], list(Path().glob("*.csv"))) == (["a.svg"], None, [])
+    assert [path.name for path in Path().glob("a*.csv")] == ["a.csv", "a.events.csv"] * bool(
+        history
+    )
 
 
 def test_a_figure_without_tolerance_has_not_failed(typed):
