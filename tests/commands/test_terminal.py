@@ -59,8 +59,7 @@ def test_help_has_an_example_that_the_command_understands(name, typed):
 def test_the_list_of_commands_is_not_cut_off(typed):
     assert typed("--version")[0] == f"rockcheck {version('rockcheck')}\n"
     out = typed("--help", holds=["--install-completion"])[0]
-    listed = re.findall(r"^  ([a-z]+) +\S", out, re.MULTILINE)
-    assert {*COMMANDS} - {*HIDDEN} <= {*listed}
+    assert {*COMMANDS} - {*HIDDEN} <= {*re.findall(r"^  ([a-z]+) +\S", out, re.MULTILINE)}
     assert "..." not in out.partition("Commands:")[2]
 
 
@@ -111,8 +110,9 @@ def test_json_is_all_that_is_on_stdout(mine, told):
     shifted = told(*own, "--set", "offset=0.001", "-o", "a.csv")
     assert (shifted["history"], shifted["scene"]) == ("a.csv", "mine")
     told(*own, "-o", "b.csv")
-    found = {one["measure"]: one["value"] for one in told("compare", "b.csv", "a.csv")["figures"]}
-    assert found["theta_rms"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
+    assert {one["measure"]: one["value"] for one in told("compare", "b.csv", "a.csv")["figures"]}[
+        "theta_rms"
+    ] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
     report = told("spectrum", "mine.toml", "--size", "3")["report"]
     assert report == "rockcheck-report/spectrum/index.html"
     Path("suite.toml").write_text(SUITE)

@@ -81,10 +81,11 @@ def test_the_tutorials_bookcase(tmp_path):
 
 def settings() -> dict[str, tuple[list[float], float]]:
     """Errors by kind of scene (alpha) and cost of each setting of the kept benchmark."""
-    table = whole_runs.load("benchmark").table("work-precision")
     return {
         f"{model} {setting}": ([error for error in errors if error is not None], cost)
-        for model, setting, cost, *errors in table.rows
+        for model, setting, cost, *errors in whole_runs.load("benchmark")
+        .table("work-precision")
+        .rows
     }
 
 

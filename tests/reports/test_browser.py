@@ -166,8 +166,7 @@ def test_animation_moves_the_block_and_slow_motion_is_slow(visit, eventually):
     ])(rockcheck, rockcheckPage)""")
     turned = block.get_attribute("transform") or ""
     assert turned != start
-    angle = float(re.search(r"rotate\((\S+)\)", turned)[1])
-    assert angle == pytest.approx(math.degrees(theta))
+    assert float(re.search(r"rotate\((\S+)\)", turned)[1]) == pytest.approx(math.degrees(theta))
     eventually(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
     page.locator("#time").fill("2000")
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(10.0)

@@ -122,10 +122,10 @@ def test_a_map_of_each_finding():
     paper = Paper(kept_spectra())
     found = findings_of(paper)
     _, plot, rows = beyond(paper, found)
-    letters = [panel["outcomes"] for panel in plot.data["panels"]]
-    assert [(one.count("G"), one.count("X")) for one in letters] == [
-        (one.gained.sum(), one.lost.sum()) for one in found
-    ]
+    assert [
+        (one.count("G"), one.count("X"))
+        for one in [panel["outcomes"] for panel in plot.data["panels"]]
+    ] == [(one.gained.sum(), one.lost.sum()) for one in found]
     assert len(figure_of(plot).axes) == 3
     assert len(rows.rows) == sum(len(one.rows) for one in found)
 

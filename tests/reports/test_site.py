@@ -20,8 +20,7 @@ from rockcheck.scenes import History
 
 def addresses(text: str) -> list[str]:
     """All that a page asks for or links to, but for what it holds itself."""
-    found = re.findall(r'\b(?:href|src)="(?!#|data:)([^"]+)"', text)
-    return list(map(html.unescape, found))
+    return list(map(html.unescape, re.findall(r'\b(?:href|src)="(?!#|data:)([^"]+)"', text)))
 
 
 def text_of(page: str) -> str:
@@ -41,8 +40,7 @@ def test_every_scene_has_a_page_and_every_address_is_a_file_of_the_folder(site):
         for address in addresses(page.read_text("utf-8"))
     }
     assert [place for place, target in targets.items() if not target.is_file()] == []
-    outside = [place for place, to in targets.items() if not to.is_relative_to(site.resolve())]
-    assert outside == []
+    assert [place for place, to in targets.items() if not to.is_relative_to(site.resolve())] == []
 
 
 def test_hostile_text_stays_text(site):
@@ -136,8 +134,9 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
     assert [words for words in said if words not in index] == []
     assert index.count("no tolerance yet</span>") >= len(cells) - 1
     # What waits for a tolerance has not failed, and is counted, not listed.
-    lacks = ("out of tolerance</span>", "Not within tolerance")
-    assert [words for words in lacks if words in index] == []
+    assert [
+        words for words in ("out of tolerance</span>", "Not within tolerance") if words in index
+    ] == []
 
 
 def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path):

@@ -98,8 +98,9 @@ def test_data_are_the_histories(site):
     assert lines[data["ground"]] == pytest.approx(view.ground / GRAVITY_OF_RECORDS, rel=1e-7)
     for model in data["models"]:
         history = view.histories[model["name"]]
-        theta = lines[model["values"]["theta"]]
-        assert theta == pytest.approx(history.channels["theta"] / view.scene.block.alpha, rel=1e-7)
+        assert lines[model["values"]["theta"]] == pytest.approx(
+            history.channels["theta"] / view.scene.block.alpha, rel=1e-7
+        )
         assert [event[1] for event in model["events"]] == [
             event.kind for event in history.event_list
         ]

@@ -220,8 +220,9 @@ def test_events_agree_until_the_first_without_counterpart(made):
 
 
 def test_matching_takes_the_nearest_and_each_once():
-    candidate = [impact(1.011), impact(1.015, kind="wall impact")]
-    found = match_impacts([impact(1.0), impact(1.012)], candidate)
+    found = match_impacts(
+        [impact(1.0), impact(1.012)], [impact(1.011), impact(1.015, kind="wall impact")]
+    )
     assert times(found) == ([(1.012, 1.011)], [1.0], [1.015])
 
 
@@ -307,6 +308,7 @@ def test_a_block_that_still_slides_has_no_place_where_it_stops(name, friction, d
 
 
 def test_a_wrong_history_is_seen():
-    scene = load_suite("engines").scenes["rocking"]
-    (figure,) = described(scene, ["quarter_period_error"], gravity=9.8)
+    (figure,) = described(
+        load_suite("engines").scenes["rocking"], ["quarter_period_error"], gravity=9.8
+    )
     assert figure.value == pytest.approx(0.5 * 0.01 / 9.81 * 0.733, rel=0.01)

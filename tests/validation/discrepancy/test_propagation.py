@@ -72,8 +72,9 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
 @pytest.mark.parametrize("value", [0.5, 0.7])
 def test_a_figure_lies_within_its_farther_end(value):
     one = Interval(name="a", unit="", value=value, low=0.4, high=0.8)
-    inputs = Inputs(samples=2, model="", names=(), figures=(one,), overturns=one, sensitivities=())
-    assert inputs.u_input("a") == pytest.approx(0.3)
+    assert Inputs(
+        samples=2, model="", names=(), figures=(one,), overturns=one, sensitivities=()
+    ).u_input("a") == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(("asked", "drawn"), [(33, 64), (2, 2), (SAMPLES, SAMPLES)])

@@ -291,8 +291,7 @@ def test_an_undecided_node_is_neither_safe_nor_overturned():
 
 
 def test_the_documentation_tells_the_findings_of_the_kept_spectra():
-    table = whole_runs.load("spectrum").table("findings")
-    assert table.rows == [
+    assert whole_runs.load("spectrum").table("findings").rows == [
         [one.about["sentence"], f"{one.case} (Fig. {one.figure})", one.words]
         for one in findings_of(Paper(kept_spectra()))
     ]

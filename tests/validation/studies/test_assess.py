@@ -334,8 +334,9 @@ def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
     t = 0.02 * np.arange(200)
     (folder / "pair").mkdir()
     for name, gain in (("S1_H", 3.0), ("S2_H", 4.0), ("S1_UP", 9.0), ("S2_UP", 9.0)):
-        samples = gain * np.sin((4.0 + gain) * t) * np.exp(-t)
-        write_record(folder / "pair" / f"{name}.csv", samples.tolist())
+        write_record(
+            folder / "pair" / f"{name}.csv", (gain * np.sin((4.0 + gain) * t) * np.exp(-t)).tolist()
+        )
     words = "cabinet.toml pair --read vertical=true"
     own = assess(f"{words} --levels pga:1:2:2")["tables"]["motions"][0]["own"]
     scaled = assess(f"{words} --levels pga:{own!r}:{1.3 * own!r}:2")["tables"]["ida"][1]

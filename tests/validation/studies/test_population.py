@@ -101,8 +101,9 @@ def test_a_run_is_the_record_at_that_intensity(lines):
         fell = history.outcome.startswith("overturned")
         own = math.inf if fell else history.peak_rotation / SCENE.block.alpha
         assert peak == pytest.approx(own, abs=2e-4)
-        shown = math.nan if fell else peak
-        assert row == pytest.approx([name, sign, level, shown, int(fell)], nan_ok=True)
+        assert row == pytest.approx(
+            [name, sign, level, math.nan if fell else peak, int(fell)], nan_ok=True
+        )
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
 
 
@@ -210,8 +211,9 @@ def test_both_cases_and_directions_are_played_and_without_a_wall_they_mirror():
     assert [batch.of[0] for batch in done] == (
         ["with the wall"] * PULSES + ["without a wall"] * PULSES
     )
-    free = [runs.side for batch, runs in done.items() if not batch.scene.walls]
-    sides = np.array(free).reshape(PULSES, 2, 4)
+    sides = np.array([runs.side for batch, runs in done.items() if not batch.scene.walls]).reshape(
+        PULSES, 2, 4
+    )
     assert set(np.unique(sides)) == {-1, 0, 1}
     np.testing.assert_array_equal(sides[:, 0], -sides[:, 1])
     shares = [row[2] for row in found.table("fragility").rows]

@@ -229,9 +229,9 @@ def test_the_command_writes_figures_data_and_page(tmp_path, told):
     settings = json.loads(str(data["settings"]))
     assert settings["scene"]["walls"] == [{"side": "right", "gap": 0.003, "restitution": 0.0}]
     assert settings["settings"] == {"tolerance": 4e-8} == said["settings"]
-    table = np.loadtxt(tmp_path / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2)
     np.testing.assert_allclose(
-        table, np.column_stack([np.linspace(1.0, 12.0, 9), data["outcomes"]])
+        np.loadtxt(tmp_path / "figure-8-gap-3-e-0.csv", delimiter=",", skiprows=2),
+        np.column_stack([np.linspace(1.0, 12.0, 9), data["outcomes"]]),
     )
     rows = said["tables"]["spectra"]
     assert [row["runs"] for row in rows] == 7 * [81]

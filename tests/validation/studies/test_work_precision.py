@@ -127,8 +127,9 @@ def line_of(*points: tuple[float, float, float]) -> pd.DataFrame:
 
 def test_the_order_is_the_slope_between_rounding_and_nonsense():
     line = line_of((1e-1, 0.9, 1.0), (1e-2, 3e-2, 1.0), (1e-3, 3e-4, 1.0), (1e-4, 1e-14, 1.0))
-    found = [slope(one.value, one.rms, FITTED) for one in (line, line[:2])]
-    assert found == pytest.approx([2.0, math.nan], nan_ok=True)
+    assert [slope(one.value, one.rms, FITTED) for one in (line, line[:2])] == pytest.approx(
+        [2.0, math.nan], nan_ok=True
+    )
 
 
 def test_the_cost_of_a_level_is_interpolated_between_logarithms():
@@ -140,8 +141,9 @@ def test_the_cost_of_a_level_is_interpolated_between_logarithms():
 
 def test_the_error_of_adaptive_steps_is_told_at_the_cost_of_fixed_ones():
     line = line_of((4e-3, 1e-2, 1.0), (1e-3, 1e-4, 16.0))
-    found = [error_at(line, cost) for cost in (4.0, 17.0)]
-    assert found == pytest.approx([1e-3, math.nan], nan_ok=True)
+    assert [error_at(line, cost) for cost in (4.0, 17.0)] == pytest.approx(
+        [1e-3, math.nan], nan_ok=True
+    )
     adaptive = (
         BenchmarkRun("pulse a", k, "mujoco adaptive", value, 3.0, rms=rms * (1 + k % 3), cpu=cpu)
         for value, rms, cpu in ((2e-3, 1e-3, 0.15), (1e-3, 1e-5, 0.6))

@@ -219,8 +219,9 @@ def test_bias_and_scatter_by_student_and_chi_squared():
 
 
 def test_only_scenes_in_which_both_rock_have_a_ratio():
-    both = samples([0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,))
-    assert both.log_ratios() == pytest.approx(np.log([2.0, 2.0]))
+    assert samples(
+        [0.1, 0.2, 1e-3, 0.4, 0.3], [0.2, 0.4, 0.4, 1e-3, 0.6], fallen=(4,)
+    ).log_ratios() == pytest.approx(np.log([2.0, 2.0]))
 
 
 @pytest.mark.parametrize("name", ["peak_bias", "peak_scatter"])

@@ -173,8 +173,9 @@ def test_a_new_line_holds_what_it_was_made_from(accepted, measure, value):
 @pytest.mark.parametrize("name", named_suites())
 def test_a_shipped_suite_loads_and_its_tolerances_are_whole_and_have_cells(name):
     suite = load_suite(name)
-    cells = {((of or scene).name, variant.label) for scene, variant, of in suite.cells()}
-    assert cells >= {(place.scene, place.model) for place in suite.tolerances}
+    assert {((of or scene).name, variant.label) for scene, variant, of in suite.cells()} >= {
+        (place.scene, place.model) for place in suite.tolerances
+    }
     assert [
         str(place)
         for place, line in suite.tolerances.items()

@@ -31,8 +31,9 @@ def check(
     **more: str,
 ) -> Check:
     about = {"label": measure, "unit": "alpha", "against": "r", **more}
-    figure = Figure(measure=measure, value=value, **about)
-    return judge(figure, line, kind=kind, measure=DIFFERENCES[measure])
+    return judge(
+        Figure(measure=measure, value=value, **about), line, kind=kind, measure=DIFFERENCES[measure]
+    )
 
 
 def run_of(*cells: Cell, **more: object) -> Run:
