@@ -226,9 +226,7 @@ def visitor(browser: Browser) -> Iterator[Callable[..., Page]]:
 
 
 # Synthetic histories: motions whose discrepancies are known by hand.
-HALF_WIDTH, HALF_HEIGHT = 0.397, 1.555
-ALPHA = float(np.arctan2(HALF_WIDTH, HALF_HEIGHT))
-RADIUS = float(np.hypot(HALF_WIDTH, HALF_HEIGHT))
+MADE = Block(half_width=0.397, half_height=1.555)
 
 
 def synthetic(
@@ -242,11 +240,11 @@ def synthetic(
 ) -> History:
     """A history with theta in alpha; x, y and velocities are zero unless given, y touches the
     floor."""
-    theta = ALPHA * np.asarray(theta, dtype=float)
+    theta = MADE.alpha * np.asarray(theta, dtype=float)
     time = np.asarray(t if t is not None else 0.01 * np.arange(len(theta)), dtype=float)
     zero = np.zeros(len(theta))
-    channels = {"t": time, "x": zero, "y": RADIUS * np.cos(ALPHA - np.abs(theta)), "theta": theta}
-    channels |= dict.fromkeys(("x_dot", "y_dot", "theta_dot", "slip", "slip_rate"), zero)
+    channels = {"t": time, "y": MADE.radius * np.cos(MADE.alpha - np.abs(theta)), "theta": theta}
+    channels |= dict.fromkeys(("x", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate"), zero)
     channels |= {name: np.asarray(column, dtype=float) for name, column in columns.items()}
     return History(
         name="made",
@@ -254,7 +252,7 @@ def synthetic(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        block=Block(half_width=HALF_WIDTH, half_height=HALF_HEIGHT),
+        block=MADE,
     )
 
 

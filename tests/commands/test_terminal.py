@@ -110,9 +110,8 @@ def test_json_is_all_that_is_on_stdout(mine, told):
     shifted = told(*own, "--set", "offset=0.001", "-o", "a.csv")
     assert (shifted["history"], shifted["scene"]) == ("a.csv", "mine")
     told(*own, "-o", "b.csv")
-    assert {one["measure"]: one["value"] for one in told("compare", "b.csv", "a.csv")["figures"]}[
-        "theta_rms"
-    ] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
+    found = {one["measure"]: one["value"] for one in told("compare", "b.csv", "a.csv")["figures"]}
+    assert found["theta_rms"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
     report = told("spectrum", "mine.toml", "--size", "3")["report"]
     assert report == "rockcheck-report/spectrum/index.html"
     Path("suite.toml").write_text(SUITE)

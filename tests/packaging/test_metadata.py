@@ -9,7 +9,6 @@ import sys
 import tomllib
 from functools import cache
 from importlib.metadata import packages_distributions
-from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -119,7 +118,8 @@ def test_hints_name_packages_that_there_are():
         ]
         if re.search(r"pip install [^`\n]*rockcheck\[", path.read_text("utf-8"))
     ] == []
-    declared = names_of(chain(*PROJECT["project"]["optional-dependencies"].values()))
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    declared = {name for extra in extras for name in names_of(extra)}
     for engine in (getattr(rockcheck, name) for name in ENGINES):
         if engine.module:
             assert (engine.package or engine.module) in declared & owners_of(engine.module)

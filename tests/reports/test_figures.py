@@ -11,7 +11,6 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
-from rockcheck.commands.cli import main
 from rockcheck.reports.document import FIGURES, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
@@ -122,10 +121,10 @@ def test_a_map_of_each_finding():
     paper = Paper(kept_spectra())
     found = findings_of(paper)
     _, plot, rows = beyond(paper, found)
-    assert [
-        (one.count("G"), one.count("X"))
-        for one in [panel["outcomes"] for panel in plot.data["panels"]]
-    ] == [(one.gained.sum(), one.lost.sum()) for one in found]
+    letters = [panel["outcomes"] for panel in plot.data["panels"]]
+    assert [(one.count("G"), one.count("X")) for one in letters] == [
+        (one.gained.sum(), one.lost.sum()) for one in found
+    ]
     assert len(figure_of(plot).axes) == 3
     assert len(rows.rows) == sum(len(one.rows) for one in found)
 
@@ -143,19 +142,18 @@ PLOTS = [
 
 
 @pytest.fixture
-def study(tmp_path):
-    folder = tmp_path / "study"
-    folder.mkdir()
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
     return publish(Finding("made", "Made up", "Two figures.", PLOTS), folder).parent
 
 
 @pytest.mark.parametrize("name", ["curves", "strips"])
-def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, name):
+def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, typed, name):
     assert {path.suffix for path in (study / FIGURES).iterdir()} == {".svg", ".json"}
     assert b"only the page" not in (study / FIGURES / f"{name}.json").read_bytes()
     for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
         path = tmp_path / f"one{ending}"
-        assert main(["report", str(study), "--scene", name, "-o", str(path)]) == 0
+        typed("report", str(study), "--scene", name, "-o", str(path))
         assert path.read_bytes().startswith(begins)
     shown = (study / FIGURES / f"{name}.svg").read_bytes()
     unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)

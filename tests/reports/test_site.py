@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rockcheck.commands.cli import main
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.show.words import number
 from rockcheck.reports.site import PAGES, write_site
@@ -139,11 +138,11 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
     ] == []
 
 
-def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path):
+def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path, typed):
     text = (site / PAGES / "beside-a-wall.html").read_text("utf-8")
     found = re.search(r"<code>rockcheck (simulate [^<]+)</code>", text)
     monkeypatch.chdir(site)
-    assert main([*found[1].split(), "-o", str(tmp_path / "again.csv")]) == 0
+    typed(*found[1].split(), "-o", str(tmp_path / "again.csv"))
     assert History.load(tmp_path / "again.csv").model == "ebm-unilateral"
 
 
@@ -227,7 +226,9 @@ def test_a_scene_that_no_model_plays_has_no_page(tmp_path, finished):
 
 
 @pytest.mark.long
-def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path, finished, refused):
+def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
+    tmp_path, finished, typed, refused
+):
     """The page of a scene without them says how to get one, and the command draws it: the same
     figure."""
     write_site(tmp_path)
@@ -249,7 +250,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(tmp_path, finis
         ("crowd", ".svg", b"<?xml"),
     ):
         path = tmp_path / f"{name}{ending}"
-        assert main(["report", str(tmp_path), "--scene", name, "-o", str(path)]) == 0
+        typed("report", str(tmp_path), "--scene", name, "-o", str(path))
         assert path.read_bytes().startswith(begins)
     assert (tmp_path / "free.svg").read_bytes() == drawn
     for asked, said in (

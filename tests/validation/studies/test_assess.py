@@ -11,7 +11,6 @@ import pytest
 from dask.distributed import LocalCluster
 
 from rockcheck import Event, EventBasedModel, Record, load_scene
-from rockcheck.commands.cli import main
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.compare import motion_of, wall_speeds
@@ -275,8 +274,10 @@ def test_an_engine_may_play_and_is_compared(assess):
     assert said["quantities"][0]["u_num"] != 0.0
 
 
-def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(assess, tmp_path):
-    assert main(["new", "new.toml", "--quiet"]) == 0
+def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(
+    assess, typed, tmp_path
+):
+    typed("new", "new.toml")
     said = assess("new.toml --models mujoco,ebm-unilateral --set time_step=1e-3", code=1)
     assert said["exit_code"] == 1
     assert "Not converged: no figure of it is sure." in [

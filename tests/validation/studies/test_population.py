@@ -21,7 +21,6 @@ from rockcheck import (
     Wall,
     load_scene,
 )
-from rockcheck.commands.cli import main
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.scenes.recordings import Recording
 from rockcheck.validation.execute.pool import Failure
@@ -389,6 +388,6 @@ def test_the_command_writes_curves_tables_and_page(records, tmp_path, told):
 
 
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, told):
-    assert main(["new", "pulse.toml", "-q"]) == 0
+    assert told("new", "pulse.toml") == {"file": "pulse.toml"}
     fits = told("assess", "pulse.toml", "--levels", "1:6:6")["tables"]["fits"]
     assert [1.0 < fit["median"] < 6.0 for fit in fits] == [True, True]
