@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
@@ -111,10 +112,14 @@ def but_progress() -> Callable[[str], list[str]]:
 @pytest.fixture
 def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
     """What a command says on stdout and stderr, once its exit code is as expected, and it `holds`
-    the words that it should and `lacks` those that it should not."""
+    the words that it should and `lacks` those that it should not, within so many `columns`."""
 
     def say(
-        *words: str, code: int = 0, holds: Sequence[str] = (), lacks: Sequence[str] = ()
+        *words: str,
+        code: int = 0,
+        holds: Sequence[str] = (),
+        lacks: Sequence[str] = (),
+        columns: float = math.inf,
     ) -> tuple[str, str]:
         capsys.readouterr()
         assert main(list(words)) == code
@@ -122,6 +127,7 @@ def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
         told = said.out + said.err
         assert [part for part in holds if part not in told] == [], told
         assert [part for part in lacks if part in told] == [], told
+        assert [line for line in said.out.splitlines() if len(line) > columns] == []
         return said
 
     return say
@@ -270,6 +276,5 @@ def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, faulty: None) -> None:
-    """The working folder is an empty one, but for the models of `faulty.py`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

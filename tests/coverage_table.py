@@ -23,7 +23,6 @@ COUNTS = ["num_statements", "num_branches", "covered_lines", "covered_branches"]
 
 
 def main() -> None:
-    """Prints the table, and the modules below nine tenths with their lines."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     (compiled,) = (
         one["module"]

@@ -74,8 +74,7 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, told, typed):
         (1, "short", "near", "", "pass", "fail"),
         (2, "short", "near", "theta_peak against still", "pass", "fail"),
     ]
-    out = typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "])[0]
-    assert max(map(len, out.splitlines())) <= 80
+    typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "], columns=80)
     back = told("compare", "b", "a", code=1)
     first = back["changes"][0]
     assert (first["before"], first["after"], back["exit_code"]) == ("fail", "pass", 1)

@@ -10,7 +10,6 @@ import pytest
 from filelock import FileLock
 
 from rockcheck.commands import cli
-from rockcheck.commands.cli import EXIT_CODES
 from rockcheck.reports import site
 from rockcheck.validation.suite.results import Run
 
@@ -53,13 +52,12 @@ def test_a_fault_that_cannot_be_written_down_is_told(tmp_path, monkeypatch, type
 def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
     said = typed("--help")[0]
     page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text("utf-8")
-    for code, meaning in EXIT_CODES.items():
+    for code, meaning in cli.EXIT_CODES.items():
         assert re.search(rf"^ +{code} +{re.escape(meaning)}$", said, re.MULTILINE), code
         assert f"\n| {code} | " in page, code
 
 
 def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monkeypatch, typed):
-    """What is missing is played by the next call."""
     monkeypatch.setattr("rockcheck.commands.studies.MINUTES", 1e-9)
     typed(
         *("benchmark", "skipping", "--quick", "--jobs", "1", "--out", str(tmp_path)),

@@ -157,8 +157,6 @@ def test_every_dependency_is_imported():
 
 
 def test_the_facade_has_every_public_name():
-    """`import rockcheck` gives what its parts call public, and loads none of them until it is asked
-    for."""
     parts = {
         name: importlib.import_module(f"rockcheck.{name}")
         for name in ("scenes", "ebm", "cm", "engines", "validation")

@@ -30,8 +30,9 @@ def spans(page: playwright.Page) -> list[list[float]]:
     return page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
 
 
-def test_a_browser_that_cannot_show_the_data_is_told(visitor, visit, site):
-    """One that cannot unpack them; without scripts the figures remain."""
+def test_a_browser_that_cannot_unpack_the_data_is_told_and_figures_need_no_scripts(
+    visitor, visit, site
+):
     page = visitor(site)
     page.add_init_script("delete window.DecompressionStream")
     page.goto((site / WALL).as_uri())
@@ -122,8 +123,7 @@ def test_mouse_buttons_and_keys_zoom_and_move_all_plots(visit):
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(6.03)
 
 
-def test_models_and_the_reference_of_the_differences_are_chosen(visit):
-    """Of each difference the running RMS is drawn, up to where it is judged."""
+def test_models_and_the_reference_of_differences_with_their_running_rms_are_chosen(visit):
     page = visit(WALL)
     # 6 models: the third's running RMS
     running = page.evaluate("rockcheckPage.drawn[3].data[9].filter(v => v !== null)")

@@ -195,8 +195,7 @@ def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
     )
 
 
-def test_the_folder_holds_one_run(tmp_path):
-    """Tables and figures of the run before are gone; files of the user's stay."""
+def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
     (tmp_path / "mine.csv").write_text("a\n", "utf-8")
     first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
     publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)

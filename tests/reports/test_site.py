@@ -202,8 +202,6 @@ def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_g
 def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_are_wanted(
     tmp_path, finished, monkeypatch, fault_of
 ):
-    """The index names the others where it has to, without a link, and says how to get their
-    pages."""
     monkeypatch.setattr("rockcheck.reports.site.shown", lambda run: ("free",))
     index = write_site(tmp_path).read_text("utf-8")
     said = ("1 of 3 scenes have a page", "rockcheck report DIR --scene NAME")
@@ -229,8 +227,6 @@ def test_a_scene_that_no_model_plays_has_no_page(tmp_path, finished):
 def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     tmp_path, finished, typed, refused
 ):
-    """The page of a scene without them says how to get one, and the command draws it: the same
-    figure."""
     write_site(tmp_path)
     drawn = (tmp_path / PAGES / "figures" / "free.svg").read_bytes()
     finished.model_copy(update={"printed": ("beside a wall",)}).save(tmp_path)

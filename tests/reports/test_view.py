@@ -34,7 +34,6 @@ from rockcheck.validation.suite.results import Check, Run
 
 
 def payload_of(site, slug):
-    """A scene's data and their lines, unpacked as a page does."""
     text = (site / PAGES / "data" / f"{slug}.js").read_text("utf-8")
     data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
     places = np.frombuffer(zlib.decompress(base64.b64decode(data["lines"])), np.uint8)

@@ -119,7 +119,6 @@ def test_the_sliding_estimate_is_the_displacement_of_its_oscillator(vertical):
 
 @pytest.mark.parametrize("factor", [0.5, 0.6, 0.75, 1.0, 1.4, 10.0])
 def test_the_rocking_estimate_is_the_angle_whose_capacity_is_the_demand(factor):
-    """Written out: frequency and damping by the formulas, the demand by the spectrum."""
     a, h = 0.24 / 0.8, 0.8
     block = Block(half_width=a * h, half_height=h)
     scene = SCENE.replace(excitation=SCENE.excitation.scaled(factor), block=block)

@@ -29,7 +29,6 @@ from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 from rockcheck.validation.suite.tables import markdown
 from rockcheck.validation.uncertainty import numerical
-from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 from rockcheck.validation.uncertainty.population import Inputs, Interval, propagate, sensitivities
 
 BOOKCASE = Scene(
@@ -224,10 +223,9 @@ def test_nothing_is_claimed_for_settings_that_the_suites_do_not_have(model, clai
 
 def test_the_domain_names_the_axis_that_leaves_it():
     inside = {axis: Range(low=min(v), high=max(v)) for axis, v in axes_of(BOOKCASE).items()}
-    assert outside(BOOKCASE, inside) == []
-    assert outside(BOOKCASE.replace(floor=Floor(friction=0.9)), inside) == [
-        "friction is 0.9; the suites cover 0.3 to 0.3"
-    ]
+    slippery = BOOKCASE.replace(floor=Floor(friction=0.9))
+    said = ["friction is 0.9; the suites cover 0.3 to 0.3"]
+    assert [outside(one, inside) for one in (BOOKCASE, slippery)] == [[], said]
 
 
 # --- in a suite
@@ -276,14 +274,14 @@ FALL_IN_PART = Inputs(
     ("inputs", "verdict"), [(None, "not explained"), (FALL_IN_PART, numerical.INPUTS)]
 )
 def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, verdict):
-    outcome = Quantity(name="outcome", unit="", value="", verdict="converged")
+    outcome = numerical.Quantity(name="outcome", unit="", value="", verdict="converged")
     own, other = (
         Cell(
             scene="s",
             model="ebm",
             status="done",
             outcome=ends,
-            numerical=Numerical(method="", quantities=(outcome,)),
+            numerical=numerical.Numerical(method="", quantities=(outcome,)),
         )
         for ends in ("at rest", "overturned left")
     )

@@ -151,8 +151,7 @@ def test_the_engines_here_are_those_that_are_installed():
         ),
     ],
 )
-def test_an_engine_gets_a_card(name, settings, lacks, failing):
-    """What fails is known and listed in the documentation; the counts of verdicts add up."""
+def test_an_engine_gets_a_card_on_which_what_fails_is_known(name, settings, lacks, failing):
     found = played(named(name, settings, {}))
     wrong, reported = verdicts(found, "fail", "error"), verdicts(found, "reported")
     assert (wrong, reported, found.exit_code) == (failing, {"RC-18"}, bool(failing))

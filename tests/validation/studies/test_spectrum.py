@@ -14,9 +14,16 @@ from rockcheck import Block, ContinuousModel, Ricker, Scene, Spectrum, Wall, ove
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.paper import Panel, paper_panels
-from rockcheck.validation.studies.spectrum import tiles
 from rockcheck.validation.studies.spectrum.study import KEPT_AN_AXIS, Spectra
-from rockcheck.validation.studies.spectrum.tiles import Book, Request, differing, nodes_of
+from rockcheck.validation.studies.spectrum.tiles import (
+    COARSE,
+    PARTS,
+    Book,
+    Request,
+    build,
+    differing,
+    nodes_of,
+)
 from rockcheck.validation.study import run
 
 SCENE = """duration = 1.0
@@ -61,7 +68,7 @@ def test_the_papers_28_spectra(figure, side, friction):
 
 
 def test_tiles_make_the_spectrum_of_one_batch(tmp_path, monkeypatch):
-    monkeypatch.setattr(tiles, "TILE", 20)
+    monkeypatch.setattr("rockcheck.validation.studies.spectrum.tiles.TILE", 20)
     study = Spectra((PANELS["figure-8-gap-3-e-0"],), Request(8))
     assert [task.what for task in study.tasks({})].count("outcomes") == 4
     (mine,) = outcomes(run(study, tmp_path, jobs=1)).values()
@@ -125,14 +132,14 @@ def test_motions_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path):
     assert (len(nodes), nodes[0], nodes[-1]) == (KEPT_AN_AXIS**2, [0, 0], [19, 19])
     rows = np.frombuffer(base64.b64decode(played["rows"]), "<f4").reshape(-1, 4)
     parts = np.split(rows.astype(float), played["ends"][:-1])
-    model = tiles.build("ebm", study.request.settings)
+    model = build("ebm", study.request.settings)
     for number in (0, 1, 100, 255):
         i, j = nodes[number]
         node = study.request.amplitudes[i], study.request.frequencies[j]
         scene = node_scene(study.panels[0].scene, *map(float, node))
-        frame = model.simulate(scene.replace(output_step=scene.duration / tiles.PARTS)).frame
+        frame = model.simulate(scene.replace(output_step=scene.duration / PARTS)).frame
         shown = np.interp(frame.t, parts[number][:, 0], parts[number][:, 1])
-        assert np.abs(shown - frame.theta).max() <= 1.001 * tiles.COARSE * scene.block.alpha
+        assert np.abs(shown - frame.theta).max() <= 1.001 * COARSE * scene.block.alpha
         assert len(parts[number]) < len(frame)
 
 

@@ -109,7 +109,8 @@ def test_statistics_of_known_outcomes():
     names = ("overturning_accuracy", "overturning_precision", "overturning_recall", "ks_distance")
     found = [STATISTICS[name].evaluate(Samples(reference, other))[0] for name in names]
     assert found == [0.5, 0.5, 0.5, 0.0]
-    lost = Sample(np.array([1.0, math.nan, 1.0, 1.0]), ("moving", "failed", "moving", "moving"))
+    lost = Sample(np.array([1.0, math.nan, math.inf, 1.0]), ("moving", "", *reference.outcomes[:2]))
+    assert (lost.failures, list(lost.fallen)) == (2, [False, False, True, False])
     unknown = evaluate(STATISTICS["ks_distance"], Samples(reference, lost), "alpha")
     assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
@@ -247,11 +248,6 @@ def test_shares_have_wilsons_interval():
         "recall": (1.0, "none fall"),
     }
     assert STATISTICS["overturning_precision"].evaluate(one_falls)[0] == 0.0
-
-
-def test_a_failed_scene_is_counted():
-    sample = Sample(np.array([0.1, np.nan, np.inf]), ("at rest", "", "overturned left"))
-    assert (sample.failures, list(sample.fallen)) == (2, [False, False, True])
 
 
 def test_what_a_statistic_tells_apart():

@@ -177,13 +177,6 @@ def test_the_share_of_its_limit_that_a_figure_uses(measure, line, shares):
     assert {value: used(check(measure, value, tolerance)) for value in shares} == shares
 
 
-@pytest.mark.parametrize("value", [None, math.nan, math.inf])
-@pytest.mark.parametrize("note", ["", "m has no events"])
-def test_what_is_no_number_fails_and_says_why(value, note):
-    found = check("theta_rms", value, Tolerance(limit=0.5), note=note)
-    assert (found.verdict, found.reason) == ("fail", note or "not a number")
-
-
 def test_floors_come_from_the_rows_and_from_u_num():
     """p = sqrt(3 g/(4 R)): what a block turns beyond a chord between two rows, (p h)^2/8 in alpha;
     g h^2/8 in m; a row in time."""
@@ -244,8 +237,6 @@ def test_what_is_better_passes_unless_both_are_asked_for(strict, codes, failures
     ],
 )
 def test_a_ratio_to_nothing_is_not_defined(made, reference, candidate, defined):
-    """Neither against one that also stands, nor against one that moves; a candidate that stands
-    beside a reference that rocks has one."""
     motions = {"still": [0.0] * 300, "shivers": [1e-5, -1e-5] * 150, "rocks": [0.1, -0.2] * 150}
     found = compare(made(motions[reference]), made(motions[candidate], model="c"))
     ratios = ("peak_ratio", "sprague_geers_m", "sprague_geers_p", "sprague_geers_c")

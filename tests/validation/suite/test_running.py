@@ -292,9 +292,9 @@ def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
 
 @pytest.mark.parametrize("name", sorted(FAMILIES))
 def test_how_things_look_plays_no_cell_again(name):
-    code = provenance.reachable(provenance.home(name))
-    assert "rockcheck.scenes.base" in code
-    assert not [module for module in code if module.startswith("rockcheck.reports")]
+    parts = {module.split(".")[1] for module in provenance.reachable(provenance.home(name))}
+    assert "scenes" in parts
+    assert "reports" not in parts
 
 
 @pytest.mark.parametrize(

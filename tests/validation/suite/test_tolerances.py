@@ -24,19 +24,20 @@ def check(value, line=LINE, measure="theta_rms", note="", **more):
 
 
 @pytest.mark.parametrize(
-    "one",
+    ("one", "reason"),
     [
         *(
-            check(value, LINE, measure)
+            (check(value, LINE, measure, note), note or "not a number")
             for measure in ("theta_rms", "events_agree_until", "peak_rotation")
             for value in (None, math.nan, math.inf, -math.inf)
+            for note in ("", "m has no events")
         ),
-        check(0.0, line=None),
-        check(1.0e-3, gap="mujoco ends at 3 s"),
+        (check(0.0, line=None), "no tolerance yet"),
+        (check(1.0e-3, gap="mujoco ends at 3 s"), "mujoco ends at 3 s"),
     ],
 )
-def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails(one):
-    assert one.verdict == "fail"
+def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails_and_says_why(one, reason):
+    assert (one.verdict, one.reason) == ("fail", reason)
 
 
 @pytest.mark.parametrize(

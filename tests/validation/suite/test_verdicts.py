@@ -69,8 +69,6 @@ def totals(element: ET.Element) -> dict[str, int]:
 
 @pytest.mark.parametrize(("strict", "failures"), [(False, [1, 1, 1]), (True, [2, 2, 1])])
 def test_totals_and_failures_of_the_junit_file(strict, failures):
-    """A test case a run and a check; what has changed is red in a strict run only; totals of a
-    suite and of all are the sums."""
     root = ET.fromstring(
         junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
     )
@@ -116,8 +114,6 @@ SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
     ],
 )
 def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, marks):
-    """A case of its own, beside the run's: green where the run has converged, none where nothing
-    was asked for."""
     numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
     root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
     cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
@@ -128,8 +124,6 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, ma
 
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
-    """One row a scene with such a landing, one column a model that followed a law in any scene;
-    others have none."""
     laws = {"am": "closed", "an": "", "ao": "", "bn": "open", "bm": "", "cm": ""}
     met = {law: LawFollowed(t=1.25, law=law, errors={}, spread=0.1) for law in ("closed", "open")}
     cells = (cell(*names, impact_law=met.get(law)) for names, law in laws.items())
