@@ -260,8 +260,7 @@ def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit, eventually
     page.mouse.click(*place_of_node(page, 0, 7, 7))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
     row, column = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
-    assert 6 <= row <= 8
-    assert 6 <= column <= 8
+    assert {row, column} <= {6, 7, 8}
     start = page.evaluate("rockcheckPlayer.store.time")
     eventually(page, f"rockcheckPlayer.store.time > {start + 0.2}")
     page.get_by_role("button", name="Pause").click()

@@ -50,11 +50,14 @@ def run_of(*checks: Check, **more: object) -> Run:
     )
 
 
+FLOOR = {"floor": 2.3e-5}
+
+
 @pytest.mark.parametrize(
     ("measure", "line", "more", "values"),
     [
         *(
-            (measure, line, {}, values)
+            (measure, line, FLOOR if MEASURES[measure].role == "quantity" else {}, values)
             for measure, line, values in (
                 # A quantity counts by what it has beyond its floor, on either side of zero; far
                 # from zero the floor says nothing.
@@ -155,8 +158,6 @@ def run_of(*checks: Check, **more: object) -> Run:
 )
 def test_the_rule(measure, line, more, values):
     tolerance = Tolerance(**dict(zip(("expected", "limit", "drift"), line, strict=True)))
-    if MEASURES[measure].role == "quantity" and not more:
-        more = {"floor": 2.3e-5}
     assert {value: check(measure, value, tolerance, **more).verdict for value in values} == values
 
 
