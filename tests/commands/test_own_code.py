@@ -134,8 +134,13 @@ def test_an_allowed_model_is_imported_by_a_worker_only(folder, words, code):
         " code = main(sys.argv[1:]); print(os.getpid(), code)"
     )
     (folder / "mine.toml").write_text(SUITE.replace("{model}", "spy:Told") + SCENE)
-    command = [sys.executable, "-c", script, *words, "--allow-code", "spy:Told", "--quiet"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words, "--allow-code", "spy:Told", "--quiet"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     process, ended = done.stdout.split()
     assert int(ended) == code, done.stderr
     assert traces(folder)

@@ -186,9 +186,8 @@ def test_contributions_are_shares_and_the_largest_comes_first(assess):
     said = assess("uncertain.toml records --samples 8 --models ebm-unilateral,ebm")
     shares = {row["source"]: row["share"] for row in said["contributions"]}
     assert set(shares) == {"records", "inputs", "numerical error", "model form", "impact law"}
-    assert sum(shares.values()) == pytest.approx(1.0)
     assert list(shares.values()) == sorted(shares.values(), reverse=True)
-    assert said["runs"] == 8 * COUNT
+    assert (sum(shares.values()), said["runs"]) == (pytest.approx(1.0), 8 * COUNT)
     assert said["overturning"]["low"] < said["overturning"]["probability"]
 
 
@@ -314,8 +313,8 @@ def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monk
     drawn = study.parts["drawn"]
     found = study.gather(done | {t: t.play() for t in [*drawn["a"], drawn["b"][0]]})
     assert found.data["runs"] == 8
-    (left_out,) = [line for line in notes_of(found) if line.startswith("left out")]
-    assert left_out.endswith(": b, c")
+    left_out = [line for line in notes_of(found) if line.startswith("left out")]
+    assert [line.endswith(": b, c") for line in left_out] == [True]
 
 
 def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):

@@ -16,7 +16,6 @@ from xml.etree import ElementTree
 import pytest
 
 from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite.results import Run
 from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
@@ -288,13 +287,6 @@ def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
     assert {model for model, _ in begun[3:10]} == {"mujoco", "pybullet"}
     assert [scene[:4] for _, scene in begun[3:10]] == 4 * ["fig5"] + 3 * ["fig4"]
-
-
-@pytest.mark.parametrize("name", sorted(FAMILIES))
-def test_how_things_look_plays_no_cell_again(name):
-    parts = {module.split(".")[1] for module in provenance.reachable(provenance.home(name))}
-    assert "scenes" in parts
-    assert "reports" not in parts
 
 
 @pytest.mark.parametrize(

@@ -178,23 +178,15 @@ WAITS = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
         (WAITS, "no tolerance yet"),
         (WAITS.model_copy(update={"gap": "early"}), "fail"),
         (WAITS.model_copy(update={"figure": check(None).figure}), "fail"),
+        # A run of such checks.
+        (run_of(cell("a", "m", WAITS)), "no tolerance yet"),
+        (run_of(cell("a", "m", WAITS), faults=("a tolerance without its cell",)), "fail"),
+        (run_of(cell("a", "m", WAITS), cell("b", "m", check(0.75))), "fail"),
+        (run_of(cell("a", "m", WAITS), BROKEN), "error"),
     ],
 )
-def test_what_waits_for_its_tolerance_has_not_failed_unless_a_part_is_missing(one, words):
+def test_what_waits_for_its_tolerance_has_not_failed_unless_something_else_has(one, words):
     assert one.words == words
-
-
-@pytest.mark.parametrize(
-    ("cells", "faults", "words"),
-    [
-        ([cell("a", "m", WAITS)], (), "no tolerance yet"),
-        ([cell("a", "m", WAITS)], ("a tolerance without its cell",), "fail"),
-        ([cell("a", "m", WAITS), cell("b", "m", check(0.75))], (), "fail"),
-        ([cell("a", "m", WAITS), BROKEN], (), "error"),
-    ],
-)
-def test_nor_has_a_run_that_waits_unless_something_else_failed(cells, faults, words):
-    assert run_of(*cells, faults=faults).words == words
 
 
 ABSENT = Cell(scene="a", model="n", status="absent", reason="needs it")
