@@ -190,8 +190,11 @@ def test_both_fell_the_same_way_is_whole(made):
     measured = dataclasses.replace(second, event_list=())  # as a table of a test: its end
     for other, time in ((second, 0.01), (measured, T[2003] - T[2000])):
         found = compare(first, other)
-        same = (found.gap, found["outcome_agrees"], found["overturning_time"])
-        assert same == ("", 1.0, pytest.approx(time))
+        assert (found.gap, found["outcome_agrees"], found["overturning_time"]) == (
+            "",
+            1.0,
+            pytest.approx(time),
+        )
     found = compare(first, dataclasses.replace(second, outcome="overturned right"))
     assert (bool(found.gap), found["outcome_agrees"]) == (True, 0.0)
 
