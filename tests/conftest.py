@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import shutil
@@ -23,7 +24,8 @@ from rockcheck.validation.execute.models import not_installed
 
 # What tests of several folders share beside fixtures, and what is a program of its own, too.
 sys.path[:0] = [
-    str(Path(__file__).parent / folder) for folder in ("ebm", "stress", "../docs/site_tools")
+    str(Path(__file__).parent / folder)
+    for folder in ("ebm", "stress", "validation/made_up", "../docs/site_tools")
 ]
 
 if TYPE_CHECKING:
@@ -110,10 +112,14 @@ def but_progress() -> Callable[[str], list[str]]:
 @pytest.fixture
 def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
     """What a command says on stdout and stderr, once its exit code is as expected, and it `holds`
-    the words that it should and `lacks` those that it should not."""
+    the words that it should and `lacks` those that it should not, within so many `columns`."""
 
     def say(
-        *words: str, code: int = 0, holds: Sequence[str] = (), lacks: Sequence[str] = ()
+        *words: str,
+        code: int = 0,
+        holds: Sequence[str] = (),
+        lacks: Sequence[str] = (),
+        columns: float = math.inf,
     ) -> tuple[str, str]:
         capsys.readouterr()
         assert main(list(words)) == code
@@ -121,6 +127,7 @@ def typed(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[str, str]]:
         told = said.out + said.err
         assert [part for part in holds if part not in told] == [], told
         assert [part for part in lacks if part in told] == [], told
+        assert [line for line in said.out.splitlines() if len(line) > columns] == []
         return said
 
     return say
@@ -145,7 +152,6 @@ def refused(typed: Callable[..., tuple[str, str]]) -> Callable[..., str]:
 
 @pytest.fixture
 def written(tmp_path: Path) -> Callable[[str, str | bytes], Path]:
-    """The path of a file of this name and content."""
 
     def write(name: str, content: str | bytes) -> Path:
         path = tmp_path / name
@@ -195,40 +201,26 @@ def visitor(browser: Browser) -> Iterator[Callable[..., Page]]:
     def visit(folder: Path, **settings: Any) -> Page:
         contexts.append(browser.new_context(**settings))
         page = contexts[-1].new_page()
-        home = folder.as_uri()
-        page.on(
-            "console",
-            lambda message: (
-                complaints.append(message.text) if message.type in ("error", "warning") else None
-            ),
-        )
-        page.on("pageerror", lambda error: complaints.append(str(error)))
-        page.on(
-            "requestfailed",
-            lambda request: (
-                None if request.failure == ABORTED else complaints.append(f"failed: {request.url}")
-            ),
-        )
-        page.on(
-            "request",
-            lambda request: (
-                None
-                if request.url.startswith((home, "data:", "about:"))
-                else complaints.append(request.url)
-            ),
-        )
+        inside = (folder.as_uri(), "data:", "about:")
+        # Of what happens: what is to be complained of, if anything.
+        heard: dict[str, Callable[[Any], str]] = {
+            "console": lambda said: said.text * (said.type in ("error", "warning")),
+            "pageerror": str,
+            "requestfailed": lambda one: f"failed: {one.url}" * (one.failure != ABORTED),
+            "request": lambda one: one.url * (not one.url.startswith(inside)),
+        }
+        for event, told in heard.items():
+            page.on(event, lambda thing, told=told: complaints.append(told(thing)))
         return page
 
     yield visit
     for context in contexts:
         context.close()
-    assert complaints == []
+    assert [one for one in complaints if one] == []
 
 
 # Synthetic histories: motions whose discrepancies are known by hand.
-HALF_WIDTH, HALF_HEIGHT = 0.397, 1.555
-ALPHA = float(np.arctan2(HALF_WIDTH, HALF_HEIGHT))
-RADIUS = float(np.hypot(HALF_WIDTH, HALF_HEIGHT))
+MADE = Block(half_width=0.397, half_height=1.555)
 
 
 def synthetic(
@@ -242,11 +234,11 @@ def synthetic(
 ) -> History:
     """A history with theta in alpha; x, y and velocities are zero unless given, y touches the
     floor."""
-    theta = ALPHA * np.asarray(theta, dtype=float)
+    theta = MADE.alpha * np.asarray(theta, dtype=float)
     time = np.asarray(t if t is not None else 0.01 * np.arange(len(theta)), dtype=float)
     zero = np.zeros(len(theta))
-    channels = {"t": time, "x": zero, "y": RADIUS * np.cos(ALPHA - np.abs(theta)), "theta": theta}
-    channels |= dict.fromkeys(("x_dot", "y_dot", "theta_dot", "slip", "slip_rate"), zero)
+    channels = {"t": time, "y": MADE.radius * np.cos(MADE.alpha - np.abs(theta)), "theta": theta}
+    channels |= dict.fromkeys(("x", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate"), zero)
     channels |= {name: np.asarray(column, dtype=float) for name, column in columns.items()}
     return History(
         name="made",
@@ -254,7 +246,7 @@ def synthetic(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        block=Block(half_width=HALF_WIDTH, half_height=HALF_HEIGHT),
+        block=MADE,
     )
 
 
@@ -265,7 +257,6 @@ def made() -> Callable[..., History]:
 
 @pytest.fixture
 def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The models of `faulty.py` lie in `tmp_path`, and are imported afresh."""
     shutil.copy(Path(__file__).parent / "validation" / "models" / "faulty.py", tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))  # a suite's folder joins it
     monkeypatch.delitem(sys.modules, "faulty", raising=False)
@@ -273,6 +264,5 @@ def faulty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, faulty: None) -> None:
-    """The working folder is an empty one, but for the models of `faulty.py`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

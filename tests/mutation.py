@@ -10,7 +10,6 @@ Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), a
 pytest is given, too.
 """
 
-import argparse
 import ast
 import copy
 import os
@@ -22,6 +21,9 @@ import sys
 import tempfile
 import tomllib
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 ROOT = Path(__file__).parents[1]
 #: Where faults are planted, the tests that should notice them, and faults that nothing can notice.
@@ -98,11 +100,8 @@ class Plant(ast.NodeTransformer):
     def _around(self, node: ast.AST) -> str:
         """Of a number the expression that it stands in: a line may hold the same number more than
         once."""
-        if not isinstance(node, ast.Constant):
-            return ""
-        return next(
-            ast.unparse(one) for one in reversed(self.within) if not isinstance(one, ast.UnaryOp)
-        )
+        outside = (one for one in reversed(self.within) if not isinstance(one, ast.UnaryOp))
+        return ast.unparse(next(outside)) if isinstance(node, ast.Constant) else ""
 
 
 def shown(node: ast.AST) -> str:
@@ -154,23 +153,21 @@ def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
         path.write_text(plain, encoding="utf-8")
 
 
-def main() -> None:
+def main(
+    pytest: Annotated[list[str] | None, typer.Argument()] = None,
+    sample: int = 12,
+    seed: int = 1,
+    file: list[str] | None = None,
+) -> None:
     """Plants, runs, counts; exit 1 where fewer than 95 of 100 are noticed."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--sample", type=int, default=12)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--file", action="append")
-    parser.add_argument("pytest", nargs="*")
-    asked = parser.parse_args()
     killed = total = 0
     with tempfile.TemporaryDirectory() as folder:
-        tree = Path(folder)
         shutil.copytree(
-            ROOT / "rockcheck", tree / "rockcheck", ignore=shutil.ignore_patterns("__pycache__")
+            ROOT / "rockcheck", f"{folder}/rockcheck", ignore=shutil.ignore_patterns("__pycache__")
         )
         for target in DATA["target"]:
-            name, tests = target["file"], target["tests"]
-            if asked.file and not any(part in name for part in asked.file):
+            name, tests = target["file"], [*target["tests"], *(pytest or ())]
+            if file and not any(part in name for part in file):
                 continue
             source = (ROOT / name).read_text(encoding="utf-8")
             lines = source.splitlines()
@@ -180,36 +177,27 @@ def main() -> None:
             for one in equivalent:
                 if not any(is_told(one, fault, lines) for fault in listed.found):
                     sys.exit(f"{name}: mutation.toml tells of a fault that is none: {one['fault']}")
-            if not survives(tree, name, source, [*tests, *asked.pytest]):
+            if not survives(Path(folder), name, source, tests):
                 sys.exit(f"{name}: its tests fail without a fault")
-            chosen = sorted(
-                random.Random(f"{asked.seed} {name}").sample(
-                    range(len(listed.found)), min(asked.sample, len(listed.found))
-                )
-            )
-            noticed = judged = 0
-            for index in chosen:
-                line, text, around = listed.found[index]
+            possible = range(len(listed.found))
+            chosen = random.Random(f"{seed} {name}").sample(possible, min(sample, len(possible)))
+            judged = noticed = 0
+            for index in sorted(chosen):
                 if any(is_told(one, listed.found[index], lines) for one in equivalent):
                     continue
-                fault = ast.unparse(
-                    ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))
-                )
+                fault = ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))
+                lives = survives(Path(folder), name, ast.unparse(fault), tests)
                 judged += 1
-                lives = survives(tree, name, fault, [*tests, *asked.pytest])
                 noticed += not lives
                 if lives:
-                    print(
-                        f"survives  {name}:{line}  {text}" + (f"  in  {around}" if around else ""),
-                        flush=True,
-                    )
-            print(
-                f"{name}: {noticed} of {judged} noticed ({len(listed.found)} possible)", flush=True
-            )
+                    line, text, around = listed.found[index]
+                    within = f"  in  {around}" * bool(around)
+                    print(f"survives  {name}:{line}  {text}{within}", flush=True)
+            print(f"{name}: {noticed} of {judged} noticed ({len(possible)} possible)", flush=True)
             killed, total = killed + noticed, total + judged
     print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
     sys.exit(killed < 0.95 * total)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -43,17 +43,13 @@ def ran(out: str, offset: float, *words: str, code: int = 0) -> None:
 
 @pytest.fixture
 def diff(told):
-    def asked(a: str, b: str, code: int) -> list[dict]:
-        found = told("compare", a, b, code=code)
-        assert found["exit_code"] == code
-        return found["changes"]
-
-    return asked
+    return lambda a, b, code: told("compare", a, b, code=code)["changes"]
 
 
-def test_the_same_run_has_no_change(diff, typed):
+def test_the_same_run_has_no_change(told, typed):
     ran("b", 0.001)
-    assert diff("a", "b", 0) == []
+    found = told("compare", "a", "b")
+    assert (found["changes"], found["exit_code"]) == ([], 0)
     assert typed("compare", "a", "b")[0] == "mine: nothing changed\n"
 
 
@@ -61,12 +57,13 @@ def test_a_figure_that_moves_within_its_limits_is_told_and_no_fault(diff):
     ran("b", 0.00102)
     changes = diff("a", "b", 0)
     assert {change["what"] for change in changes} == {"figure"}
-    moved = {(change["model"], change["name"]): change for change in changes}
-    peak = moved["near", "theta_peak against still"]
+    peak = {(change["model"], change["name"]): change for change in changes}[
+        "near", "theta_peak against still"
+    ]
     assert peak["after"] / peak["before"] == pytest.approx(1.02, rel=1e-6)
 
 
-def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
+def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, told, typed):
     ran("b", 0.002, code=1)
     assert [
         (place, c["scene"], c["model"], c["name"], c["before"], c["after"])
@@ -77,10 +74,10 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, typed):
         (1, "short", "near", "", "pass", "fail"),
         (2, "short", "near", "theta_peak against still", "pass", "fail"),
     ]
-    out = typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "])[0]
-    assert max(map(len, out.splitlines())) <= 80
-    back = diff("b", "a", 1)[0]
-    assert (back["before"], back["after"]) == ("fail", "pass")
+    typed("compare", "a", "b", code=1, holds=["mine: 3 verdicts, "], columns=80)
+    back = told("compare", "b", "a", code=1)
+    first = back["changes"][0]
+    assert (first["before"], first["after"], back["exit_code"]) == ("fail", "pass", 1)
 
 
 def changed(**change: object) -> None:
@@ -119,8 +116,9 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, nam
             measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note
         )
         check = near.checks[0].model_copy(update={"figure": figure})
-        cell = near.model_copy(update={"figures": (figure,), "checks": (check,)})
-        return run.model_copy(update={"cells": (cell,)})
+        return run.model_copy(
+            update={"cells": (near.model_copy(update={"figures": (figure,), "checks": (check,)}),)}
+        )
 
     before = reached(peak)
     assert [one.name for one in changes(before, reached(peak + 0.1))] == names
@@ -148,8 +146,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
     first, second, third = (one.figures[name] for one in moments)
-    assert second / first == pytest.approx(1.05, rel=1e-6)
-    assert third == second
+    assert (second / first, third) == (pytest.approx(1.05, rel=1e-6), second)
     page = Path("a/trend/index.html").read_text("utf-8")
     assert [part for part in ("mine over 3 runs", name, head) if part not in page] == []
     assert 'href="trend/index.html"' in Path("a/index.html").read_text("utf-8")
@@ -166,9 +163,8 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
 def test_a_history_that_is_none_is_named_with_its_line(capsys, line):
     Path("runs.jsonl").write_text(f"\n{line}\n", "utf-8")
     ran("a", 0.001, "--history", "runs.jsonl", code=2)
-    assert capsys.readouterr().err.startswith(
-        "rockcheck: runs.jsonl, line 2: not a run of a history"
-    )
+    said = capsys.readouterr().err
+    assert said.startswith("rockcheck: runs.jsonl, line 2: not a run of a history")
     assert Path("runs.jsonl").read_text("utf-8") == f"\n{line}\n"
 
 
@@ -179,8 +175,9 @@ def test_without_a_report_the_pages_of_the_run_before_are_gone():
     assert Path("a/pages/short.html").is_file()
     ran("a", 0.0012)
     assert not Path("a/index.html").exists()
-    left = {path.name for path in Path("a/pages").rglob("*.*") if path.parent.name != "assets"}
-    assert left == {"mine.html"}
+    assert {path.name for path in Path("a/pages").rglob("*.*") if path.parent.name != "assets"} == {
+        "mine.html"
+    }
     Path("a/index.html").write_text("my own", "utf-8")
     ran("a", 0.001)
     assert Path("a/index.html").is_file()

@@ -93,8 +93,11 @@ def test_a_history_in_another_format_is_that_of_the_csv(typed, file):
     table = History.load("a.csv")
     read, parts = FORMATS[file]
     channels, outcome, kinds = parts(read())
-    assert (outcome, kinds) == (table.outcome, [event.kind for event in table.event_list])
-    assert list(channels) == list(table.channels)
+    assert (outcome, kinds, list(channels)) == (
+        table.outcome,
+        [event.kind for event in table.event_list],
+        list(table.channels),
+    )
     for name, column in table.channels.items():
         np.testing.assert_array_equal(channels[name], column)
 
@@ -114,26 +117,24 @@ def test_compare_says_first_what_matters(typed):
     simulated(typed, "Falls", "b.csv")
     said = "note on the candidate: made to fall"
     out, _ = typed("compare", "a.csv", "b.csv", "--plot", "c.svg", holds=[said])
-    assert re.match(r"outcomes differ, overturned left at 1\.5.* against at rest; rotations", out)
-    assert re.search("^outcome agrees +no", out, re.MULTILINE)
+    differ = r"outcomes differ, overturned left at 1\.5.* against at rest; rotations"
+    assert re.match(rf"{differ}(?s:.*)\noutcome agrees +no", out)
     assert Path("c.svg").read_bytes().startswith(b"<?xml")
-    out, _ = typed("compare", "a.csv", "a.csv")
+    out, _ = typed("compare", "a.csv", "a.csv", columns=80)
     assert out.startswith("same outcome, at rest; rotations 0 alpha apart (RMS)\n")
-    assert max(map(len, out.splitlines())) <= 80
 
 
-def test_simulate_draws(typed):
+@pytest.mark.parametrize(("first", "history"), [("a.csv", "a.csv"), ("a.svg", None)])
+def test_simulate_draws_and_a_figure_alone_writes_no_history(typed, first, history):
     drawn = "-o", "a.png", "-o", "a.pdf"
-    simulated(typed, "Falls", "a.csv", *drawn, holds=("figure: a.png", "figure: a.pdf"))
-    assert History.load("a.csv").outcome == "overturned left"
+    simulated(typed, "Falls", first, *drawn, holds=("figure: a.png", "figure: a.pdf"))
+    found = json.loads(simulated(typed, "Falls", first, *drawn, "--json"))
+    assert (found["files"], found["history"]) == ([first, "a.png", "a.pdf"], history)
     for name, start in (("a.png", rb"\x89PNG"), ("a.pdf", b"%PDF")):
         assert re.match(start + b"(?s:.{5000})", Path(name).read_bytes())
-
-
-def test_a_figure_alone_writes_no_history(typed):
-    found = json.loads(simulated(typed, "Still", "a.svg", "--json"))
-    assert (found["files"], found["history"]) == (["a.svg"], None)
-    assert list(Path().glob("*.csv")) == []
+    assert [path.name for path in Path().glob("a*.csv")] == ["a.csv", "a.events.csv"] * bool(
+        history
+    )
 
 
 def test_a_figure_without_tolerance_has_not_failed(typed):
@@ -141,8 +142,9 @@ def test_a_figure_without_tolerance_has_not_failed(typed):
     validate = "validate", *words, "--no-report"
     typed(*validate, code=1, holds=["verdict: no tolerance yet"], lacks=["fail"])
     before = set(Path().iterdir())
-    said = "2 changes would be written to mine.tolerances.toml"
-    typed("accept", *words, "--dry-run", holds=[said])
+    typed(
+        "accept", *words, "--dry-run", holds=["2 changes would be written to mine.tolerances.toml"]
+    )
     assert set(Path().iterdir()) == before
     typed("accept", *words)
     text = Path("mine.tolerances.toml").read_text()

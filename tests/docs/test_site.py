@@ -136,8 +136,9 @@ def test_the_search_finds_without_a_server(site, page):
 
 
 def test_the_api_page_has_every_public_name(site):
-    text = (site / "api.html").read_text("utf-8")
-    shown = set(re.findall(r'id="rockcheck(?:\.\w+)?\.(\w+)"', text))
+    shown = set(
+        re.findall(r'id="rockcheck(?:\.\w+)?\.(\w+)"', (site / "api.html").read_text("utf-8"))
+    )
     assert set(rockcheck.__all__) - shown == {"__version__"}
 
 

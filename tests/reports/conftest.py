@@ -66,29 +66,16 @@ def motion(scene, model, delay, *, falls=False):
         ]
     )
     zeros = [k * math.pi / 3.0 + delay for k in range(1, 11)]
+    modes = {"mode_before": "rock", "mode_after": "rock"}
+    slides = {"mode_before": "rock", "mode_after": "slide-rock"}
     events = [
-        Event(
-            t=zero,
-            kind="floor impact",
-            mode_before="rock",
-            mode_after="rock",
-            impulse=0.4 / (1 + zero),
-        )
-        for zero in zeros
+        *(Event(t=t, kind="floor impact", impulse=0.4 / (1 + t), **modes) for t in zeros),
+        *(
+            Event(t=t + 0.4, kind="wall impact", impulse=0.2, **slides)
+            for t in zeros[1::2] * bool(scene.walls)
+        ),
+        *[Event(t=float(late[-1]), kind="overturned left")] * falls,
     ]
-    if scene.walls:
-        events += [
-            Event(
-                t=zero + 0.4,
-                kind="wall impact",
-                mode_before="rock",
-                mode_after="slide-rock",
-                impulse=0.2,
-            )
-            for zero in zeros[1::2]
-        ]
-    if falls:
-        events.append(Event(t=float(late[-1]), kind="overturned left"))
     return observe(
         scene,
         model,
@@ -320,8 +307,9 @@ def opened(visitor):
     unpacked; in the end it must have complained of nothing and asked for nothing elsewhere."""
 
     def page_at(path, home=None, **settings):
-        desk = {"viewport": {"width": 1280, "height": 900}}
-        page = visitor(home or path.parent, **desk | settings)
+        page = visitor(
+            home or path.parent, **{"viewport": {"width": 1280, "height": 900}} | settings
+        )
         page.goto(path.as_uri())
         until(page, "!window.rockcheck || !!window.rockcheckPage")
         return page

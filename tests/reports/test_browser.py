@@ -26,23 +26,28 @@ def window(page: playwright.Page) -> list[float]:
     return page.evaluate("rockcheckPage.store.window")
 
 
-def test_a_browser_that_cannot_show_the_data_is_told(visitor, visit, site):
-    """One that cannot unpack them; without scripts the figures remain."""
+def spans(page: playwright.Page) -> list[list[float]]:
+    return page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
+
+
+def test_a_browser_that_cannot_unpack_the_data_is_told_and_figures_need_no_scripts(
+    visitor, visit, site
+):
     page = visitor(site)
     page.add_init_script("delete window.DecompressionStream")
     page.goto((site / WALL).as_uri())
     assert [page.locator(one).is_visible() for one in ("#too-old", "#live")] == [True, False]
     page = visit(WALL, java_script_enabled=False)
     assert "need JavaScript" in page.locator("noscript").inner_text()
-    assert not page.locator("#live").is_visible()
-    assert page.locator(".paper img").first.is_visible()
+    shown = [page.locator(one).first.is_visible() for one in ("#live", ".paper img")]
+    assert shown == [False, True]
 
 
 @pytest.mark.parametrize("address", ["index.html", "pages/free.html", WALL, "pages/Free-2.html"])
 def test_opens_draws_and_fits_a_phone(visit, eventually, address):
     page = visit(address, viewport={"width": 390, "height": 800})
-    assert page.locator("h1").count() == 1
-    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    width = page.evaluate("document.documentElement.scrollWidth")
+    assert (page.locator("h1").count(), width) == (1, 390)
     inked = """() => [...document.querySelectorAll('#live canvas')].map(c =>
         c.getContext('2d').getImageData(0, 0, c.width, c.height).data.some(v => v > 0))"""
     eventually(page, f"({inked})().every(Boolean)")
@@ -96,8 +101,7 @@ def test_mouse_buttons_and_keys_zoom_and_move_all_plots(visit):
         return window(page)
 
     assert dragged(0.25, 0.5) == pytest.approx([3.0, 6.0], abs=0.1)
-    spans = page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
-    assert all(span == pytest.approx(window(page)) for span in spans)
+    assert all(span == pytest.approx(window(page)) for span in spans(page))
     page.keyboard.down("Shift")
     assert dragged(0.5, 0.25) == pytest.approx([3.75, 6.75], abs=0.15)
     page.keyboard.up("Shift")
@@ -119,12 +123,10 @@ def test_mouse_buttons_and_keys_zoom_and_move_all_plots(visit):
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(6.03)
 
 
-def test_models_and_the_reference_of_the_differences_are_chosen(visit):
-    """Of each difference the running RMS is drawn, up to where it is judged."""
+def test_models_and_the_reference_of_differences_with_their_running_rms_are_chosen(visit):
     page = visit(WALL)
-    running = page.evaluate(
-        "rockcheckPage.drawn[3].data[9].filter(v => v !== null)"
-    )  # 6 models: the third's running RMS
+    # 6 models: the third's running RMS
+    running = page.evaluate("rockcheckPage.drawn[3].data[9].filter(v => v !== null)")
     judged = "b => b.model === 'cm' && b.channel === 'theta' && b.against === 'ebm-unilateral'"
     band = page.evaluate(f"rockcheck.bands.find({judged})")
     assert len(running) == round(band["until"] / page.evaluate("rockcheck.step")) + 1
@@ -132,8 +134,8 @@ def test_models_and_the_reference_of_the_differences_are_chosen(visit):
     shown = "rockcheckPage.drawn.slice(2).map(u => u.series[3].show)"
     assert all(page.evaluate(shown))
     page.get_by_role("checkbox", name="CM").uncheck()
-    assert not any(page.evaluate(shown))
-    assert page.evaluate("rockcheckPage.drawn[3].series[9].show") is False
+    running = page.evaluate("rockcheckPage.drawn[3].series[9].show")
+    assert {running, *page.evaluate(shown)} == {False}
     hidden = page.locator('#block [data-model="cm"], #values tr[data-model="cm"]')
     assert [one.is_visible() for one in hidden.all()] == [False, False]
     page.get_by_role("checkbox", name="CM").check()
@@ -159,15 +161,12 @@ def test_animation_moves_the_block_and_slow_motion_is_slow(visit, eventually):
     page.get_by_label("Speed").select_option("1")
     eventually(page, "rockcheckPage.store.time > 0.3")
     page.get_by_role("button", name="Pause").click()
-    time = page.evaluate("rockcheckPage.store.time")
-    assert block.get_attribute("transform") != start
-    expected = page.evaluate(
-        "(m => rockcheckPage.store.at(m, 'theta', rockcheckPage.store.time))(rockcheck.models[0])"
-    )
-    angle = re.search(r"rotate\((\S+)\)", block.get_attribute("transform") or "")
-    assert float(angle[1]) == pytest.approx(
-        math.degrees(expected * page.evaluate("rockcheck.alpha"))
-    )
+    time, theta = page.evaluate("""(({models, alpha}, {store}) => [
+        store.time, alpha * store.at(models[0], 'theta', store.time)
+    ])(rockcheck, rockcheckPage)""")
+    turned = block.get_attribute("transform") or ""
+    assert turned != start
+    assert float(re.search(r"rotate\((\S+)\)", turned)[1]) == pytest.approx(math.degrees(theta))
     eventually(page, f"document.getElementById('now').textContent === '{time:.3f} s'")
     page.locator("#time").fill("2000")
     assert page.evaluate("rockcheckPage.store.time") == pytest.approx(10.0)
@@ -229,10 +228,9 @@ def test_a_block_that_falls_is_shown_up_to_its_fall(visit):
     shown = window(page)
     assert page.evaluate("rockcheck.window") == pytest.approx(shown)
     assert shown[1] < 6.0 < 12.0  # the block lies then
-    drawn = page.evaluate("rockcheckPage.drawn.slice(1).map(u => [u.scales.x.min, u.scales.x.max])")
-    assert all(ends == pytest.approx(shown) for ends in drawn)
-    scale = page.evaluate("(y => [y.min, y.max])(rockcheckPage.drawn[2].scales.y)")
-    assert max(map(abs, scale)) < 1.8
+    assert all(span == pytest.approx(shown) for span in spans(page))
+    low, high = page.evaluate("(y => [y.min, y.max])(rockcheckPage.drawn[2].scales.y)")
+    assert -1.8 < low < high < 1.8
     assert "✕ fell" in page.locator("#plots").inner_text()
     assert page.locator("#result").get_by_text("fell").count() == 2
     page.get_by_role("button", name="Whole").click()
@@ -245,7 +243,7 @@ def test_a_block_that_falls_is_shown_up_to_its_fall(visit):
 
 def test_a_measured_history_is_dots(opened, tmp_path, finished):
     cell = finished.cell("free", "cm")
-    history = History.load(tmp_path / (cell.history or ""))
+    history = History.load(tmp_path / cell.history)
     table = dataclasses.replace(
         history,
         model="table",
@@ -255,14 +253,15 @@ def test_a_measured_history_is_dots(opened, tmp_path, finished):
     )
     table.save(tmp_path / "histories" / "table.csv")
     measured = cell.model_copy(update={"model": "table", "history": "histories/table.csv"})
-    change = {"models": ("table", *finished.models), "cells": (measured, *finished.cells)}
-    finished.model_copy(update=change).save(tmp_path)
+    finished.model_copy(
+        update={"models": ("table", *finished.models), "cells": (measured, *finished.cells)}
+    ).save(tmp_path)
     write_site(tmp_path)
     page = opened(tmp_path / "pages" / "free.html", tmp_path)
-    assert page.evaluate("rockcheckPage.drawn[2].data[1].filter(v => v !== null).length") == len(
-        table.channels["t"]
-    )
-    assert page.evaluate("rockcheckPage.drawn[2].series[1].points.show(rockcheckPage.drawn[2], 1)")
+    dots = """(plot => [
+        plot.data[1].filter(v => v !== null).length, plot.series[1].points.show(plot, 1)
+    ])(rockcheckPage.drawn[2])"""
+    assert page.evaluate(dots) == [len(table.channels["t"]), True]
     page.evaluate("rockcheckPage.store.change({time: 3})")
     assert not page.locator('#block [data-model="table"]').is_visible()
     assert "null" not in (page.locator("#close").get_attribute("viewBox") or "null")

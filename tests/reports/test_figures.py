@@ -3,15 +3,14 @@
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+import whole_runs
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
-from rockcheck.commands.cli import main
 from rockcheck.reports.document import FIGURES, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
@@ -32,7 +31,6 @@ SIZE = 12
 
 
 def plot_of(*panels, letter="R", ranges=()):
-    """The plot of spectra whose nodes were all played to one outcome."""
     study = Spectra(panels, Request(SIZE, *ranges))
     done = {task: Played(letter * len(task.amplitudes)) for task in study.tasks({})}
     return next(study.gather(done).plots())
@@ -59,8 +57,9 @@ def test_the_papers_colours(panel, overturned):
     (mesh,) = axes.collections
     axes.figure.draw_without_rendering()
     colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)[[0, 7, 11], 0]
-    expected = [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
-    np.testing.assert_allclose(colours, expected)
+    np.testing.assert_allclose(
+        colours, [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
+    )
 
 
 def test_a_figure_has_the_papers_panels():
@@ -68,12 +67,14 @@ def test_a_figure_has_the_papers_panels():
     assert [axes.get_title(loc="left") for axes in figure.axes] == [
         panel.title for panel in paper_panels(9)
     ]
-    assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
-    assert labels(figure) == [
-        "safe",
-        "no wall: overturned clockwise",
-        "overturned; no wall: counterclockwise",
-    ]
+    assert (figure.get_suptitle(), labels(figure)) == (
+        "Fig. 9: Wall on the right, μ = 0.6",
+        [
+            "safe",
+            "no wall: overturned clockwise",
+            "overturned; no wall: counterclockwise",
+        ],
+    )
 
 
 def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
@@ -82,19 +83,19 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
     figure = figure_of(plot)
     assert {"undecided", "depends on the impact law"} <= {*labels(figure)}
     (ring,) = figure.axes[1].lines
-    assert ring.get_marker() == LAW_MARK["marker"]
-    assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
+    assert (ring.get_marker(), ring.get_xydata().tolist()) == (
+        LAW_MARK["marker"],
+        [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]],
+    )
 
 
-def test_the_pulse_of_ones_own_scene_is_marked():
-    """At its ratios; none is marked in the paper's figures."""
+def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
     scene = load_scene("rack").replace(excitation=Sine(amplitude=6.0, period=0.8))
     own = [
         2.0 * math.pi / 0.8 / scene.frequency_parameter,
         6.0 / (scene.gravity * scene.block.slope),
     ]
-    plot = plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0)))
-    figure = figure_of(plot)
+    figure = figure_of(plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0))))
     (star,) = figure.axes[0].lines
     np.testing.assert_allclose(star.get_xydata(), [own])
     assert OWN_MARK["label"] in labels(figure)
@@ -102,12 +103,12 @@ def test_the_pulse_of_ones_own_scene_is_marked():
 
 
 def test_the_documentation_shows_the_kept_study():
-    kept = read_json(Path(__file__).parents[2] / "docs" / "runs" / "spectrum.json")
-    (shown,) = (block for block in kept["blocks"] if block.get("name") == "agreement")
     found = read_json(KEPT / "agreement.json")
     panels = mapped(paper_panels())
     _, table, by_spectrum, plot = blocks(found, panels, came=True)
-    assert [list(map(plain, row)) for row in table.rows] == shown["rows"]
+    assert [list(map(plain, row)) for row in table.rows] == [
+        list(map(plain, row)) for row in whole_runs.load("spectrum").table("agreement").rows
+    ]
     assert len({row[0] for row in by_spectrum.rows}) == 28
     assert all(
         share["nodes"] == 100 for share in found["shares"] if share["model"] not in PLAYED_SHARE
@@ -141,25 +142,25 @@ PLOTS = [
 
 
 @pytest.fixture
-def study(tmp_path):
-    folder = tmp_path / "study"
-    folder.mkdir()
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("study")
     return publish(Finding("made", "Made up", "Two figures.", PLOTS), folder).parent
 
 
 @pytest.mark.parametrize("name", ["curves", "strips"])
-def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, name):
+def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, typed, name):
     assert {path.suffix for path in (study / FIGURES).iterdir()} == {".svg", ".json"}
     assert b"only the page" not in (study / FIGURES / f"{name}.json").read_bytes()
     for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
         path = tmp_path / f"one{ending}"
-        assert main(["report", str(study), "--scene", name, "-o", str(path)]) == 0
+        typed("report", str(study), "--scene", name, "-o", str(path))
         assert path.read_bytes().startswith(begins)
     shown = (study / FIGURES / f"{name}.svg").read_bytes()
     unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)
     assert (tmp_path / "one.svg").read_bytes() == unstamped != shown
-    page = (study / "index.html").read_text("utf-8")
-    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in page
+    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in (study / "index.html").read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.parametrize(
@@ -189,12 +190,12 @@ def test_what_is_no_figure_is_refused_in_one_line(study, refused, data, words, s
 
 def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
     monkeypatch.setattr("rockcheck.reports.document.DRAWING", 1e-3)
-    said = refused("report", str(study), "--scene", "curves", "-o", "a.svg")
-    assert "did not end within 0.001 s" in said
+    assert "did not end within 0.001 s" in refused(
+        "report", str(study), "--scene", "curves", "-o", "a.svg"
+    )
 
 
-def test_the_folder_holds_one_run(tmp_path):
-    """Tables and figures of the run before are gone; files of the user's stay."""
+def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
     (tmp_path / "mine.csv").write_text("a\n", "utf-8")
     first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
     publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)

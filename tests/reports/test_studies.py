@@ -122,8 +122,9 @@ def ida() -> Finding:
     level = np.linspace(0.1, 1.0, 10)
     peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
     peaks[peaks > 0.7] = np.inf
-    records = [f"r{k}" for k in range(4)]
-    return found(lines_of(records, peaks, level, Column("intensity", "PGA", "g")))
+    return found(
+        lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g"))
+    )
 
 
 def spectra(letters: str, *panels: Panel) -> Finding:
@@ -259,8 +260,7 @@ def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit, eventually
     page.mouse.click(*place_of_node(page, 0, 7, 7))
     playwright.expect(page.locator(".played figcaption")).to_contain_text("overturned clockwise")
     row, column = page.evaluate("rockcheckFigures['figure-8'].store.chosen.node")
-    assert 6 <= row <= 8
-    assert 6 <= column <= 8
+    assert {row, column} <= {6, 7, 8}
     start = page.evaluate("rockcheckPlayer.store.time")
     eventually(page, f"rockcheckPlayer.store.time > {start + 0.2}")
     page.get_by_role("button", name="Pause").click()

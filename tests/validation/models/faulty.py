@@ -68,8 +68,6 @@ class Nothing(Frozen):
 
 
 class Falls(Frozen):
-    """Turns at 1 rad/s and lies after pi/2 s; a note says so."""
-
     def simulate(self, scene: Scene) -> History:
         t = scene.output_times
         state = np.zeros((len(t), 6))

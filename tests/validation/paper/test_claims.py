@@ -3,20 +3,17 @@ say."""
 
 import dataclasses
 import itertools
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+import whole_runs
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.paper import kept_spectra, paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
 from rockcheck.validation.studies.spectrum.tiles import nodes_of
-
-ROOT = Path(__file__).parents[3]
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
 
@@ -55,7 +52,6 @@ def worse_at_high_frequency(one):
 
 
 def turned_round(first):
-    """From a row on what overturns alone is turned round."""
 
     def edit(one):
         rows = one.outcomes[first:]
@@ -73,10 +69,10 @@ def tongue(spectrum):
 
 
 def as_said(mu, *wall):
-    _, gap, e = wall or ("", 0.0, 0.0)
+    if not wall:
+        return {0.3: 0.5, 0.6: 0.4}[mu]
     helps = 0.5 if wall == ("right", 0.003, 0.0) else 0.0
-    beside = 0.2 - 0.3 * (mu - 0.3) - 0.05 * e - 0.5 * gap + helps
-    return beside if wall else {0.3: 0.5, 0.6: 0.4}[mu]
+    return 0.2 - 0.3 * (mu - 0.3) - 0.05 * wall[2] - 0.5 * wall[1] + helps
 
 
 def harmed_by_e(*walls):
@@ -276,8 +272,9 @@ def test_each_finding_counts_its_nodes_one_by_one():
         sum(wall[i][j] != 0 and free[i][j] == 0 for i, j in nodes),
     )
     free, left, right = by["7-unobstructed"], by["7-gap-53-e-1"], by["9-gap-53-e-1"]
-    lost = sum(free[i][j] == 0 and left[i][j] != 0 and right[i][j] != 0 for i, j in nodes)
-    assert either.lost.sum() == lost
+    assert either.lost.sum() == sum(
+        free[i][j] == 0 and left[i][j] != 0 and right[i][j] != 0 for i, j in nodes
+    )
     wall = by["8-gap-53-e-1"]
     count = sum(wall[i][j] == 0 and any(wall[k][j] != 0 for k in range(i)) for i, j in nodes)
     assert stronger.gained.sum() == count > 1000
@@ -286,21 +283,15 @@ def test_each_finding_counts_its_nodes_one_by_one():
 def test_an_undecided_node_is_neither_safe_nor_overturned():
     spectra = kept_spectra()
     k = [one.scene.name for one in spectra].index("figure-8-gap-103-e-1")
-    safe = np.argwhere(spectra[k].safe & ~spectra[0].safe)
     counted = findings_of(Paper(spectra))[0].gained.sum()
+    safe = np.argwhere(spectra[k].safe & ~spectra[0].safe)
     spectra[k] = dataclasses.replace(spectra[k], undecided=safe[:1])
     found = findings_of(Paper(spectra))[0]
     assert (found.case, found.gained.sum()) == ("right wall, 103 mm, e = 1, μ = 0.3", counted - 1)
 
 
 def test_the_documentation_tells_the_findings_of_the_kept_spectra():
-    kept = json.loads((ROOT / "docs" / "runs" / "spectrum.json").read_text("utf-8"))
-    (table,) = (
-        block
-        for block in kept["blocks"]
-        if (block["block"], block.get("name")) == ("table", "findings")
-    )
-    assert table["rows"] == [
+    assert whole_runs.load("spectrum").table("findings").rows == [
         [one.about["sentence"], f"{one.case} (Fig. {one.figure})", one.words]
         for one in findings_of(Paper(kept_spectra()))
     ]

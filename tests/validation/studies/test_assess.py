@@ -11,7 +11,6 @@ import pytest
 from dask.distributed import LocalCluster
 
 from rockcheck import Event, EventBasedModel, Record, load_scene
-from rockcheck.commands.cli import main
 from rockcheck.scenes.files import load_uncertain_scene
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.compare import motion_of, wall_speeds
@@ -43,14 +42,14 @@ def noise(seed: int) -> Record:
     t = 0.02 * np.arange(500)
     tones = np.arange(0.4, 5.0, 0.2)
     phases = random.uniform(0.0, 2.0 * math.pi, len(tones))
-    samples = np.sin(2.0 * math.pi * np.outer(t, tones) + phases) @ (1.0 / tones)
-    samples *= np.minimum(t / 2.0, 1.0) * np.exp(-np.maximum(t - 5.0, 0.0))
+    envelope = np.minimum(t / 2.0, 1.0) * np.exp(-np.maximum(t - 5.0, 0.0))
+    samples = envelope * (np.sin(2.0 * math.pi * np.outer(t, tones) + phases) @ (1.0 / tones))
     return Record.from_samples(samples * random.uniform(4.0, 12.0) / np.abs(samples).max(), 0.02)
 
 
 def write_record(path, samples):
-    rows = [f"{0.02 * k!r},{a!r}" for k, a in enumerate(samples)]
-    path.write_text("\n".join(["time_s,acceleration_m_s2", *rows, ""]), "utf-8")
+    rows = "".join(f"{0.02 * k!r},{a!r}\n" for k, a in enumerate(samples))
+    path.write_text(f"time_s,acceleration_m_s2\n{rows}", "utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -75,13 +74,9 @@ def folder(tmp_path_factory):
 @pytest.fixture
 def assess(folder, tmp_path, monkeypatch, told):
     monkeypatch.chdir(folder)
-
-    def run(words: str, code: int = 0, out: str = "out"):
-        said = told(*f"assess {words}".split(), "--out", str(tmp_path / out), code=code)
-        assert said["exit_code"] == code
-        return said
-
-    return run
+    return lambda words, code=0, out="out": told(
+        *f"assess {words}".split(), "--out", str(tmp_path / out), code=code
+    )
 
 
 @pytest.fixture(scope="module")
@@ -90,8 +85,10 @@ def loop(folder):
     scene, model = load_scene(folder / "cabinet.toml"), EventBasedModel(pivot="unilateral")
     found = {}
     for gap, path in itertools.product((*GAPS, math.inf), sorted((folder / "records").iterdir())):
-        walls = [] if math.isinf(gap) else [scene.walls[0].replace(gap=gap)]
-        shaken = scene.replace(walls=walls, excitation=Record.from_file(path))
+        shaken = scene.replace(
+            walls=[] if math.isinf(gap) else [scene.walls[0].replace(gap=gap)],
+            excitation=Record.from_file(path),
+        )
         found[gap, path.stem] = shaken, model.simulate(shaken)
     return found
 
@@ -122,14 +119,17 @@ def test_counts_motions_and_gaps_are_those_of_a_loop_of_ones_own(assess, loop):
             for k, f in stand.items()
         },
     }
-    told = ("of", "record", "median", "largest")
-    assert {name: [said["quantities"][name][one] for one in told] for name in values} == {
-        name: [
+    told = {name: said["quantities"][name] for name in values}
+    assert {
+        name: (one["of"], one["record"], one["median"], one["largest"])
+        for name, one in told.items()
+    } == {
+        name: (
             len(stand),
             max(of, key=of.get),
             pytest.approx(np.median(list(of.values())), rel=1e-9),
             pytest.approx(max(of.values()), rel=1e-9),
-        ]
+        )
         for name, of in values.items()
     }
     runs = [at[gap].values() for gap in GAPS]
@@ -142,19 +142,21 @@ def test_counts_motions_and_gaps_are_those_of_a_loop_of_ones_own(assess, loop):
         np.max(np.hypot(0.3, 1.0) * np.sin(math.atan(0.3) + np.abs(f.theta)) - 0.3 + f.x)
         for f in (history.frame for history in at[math.inf].values())
     ]
-    assert said["clearance"] == pytest.approx(max(reach), rel=1e-9)
     safe = [gap for k, gap in enumerate(GAPS) if not any(fallen_at[: k + 1])]
-    assert said["none_overturns_up_to"] == max(safe, default=None)
-    assert said["monotonic"] == (fallen_at == sorted(fallen_at))
+    assert (said["clearance"], said["none_overturns_up_to"], said["monotonic"]) == (
+        pytest.approx(max(reach), rel=1e-9),
+        max(safe, default=None),
+        fallen_at == sorted(fallen_at),
+    )
 
 
 @pytest.mark.parametrize("name", ["R00", "R01", "R02", "R03"])
 def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loop, name):
-    """Against the same motion with a hundred times as many rows."""
     scene, history = loop[0.05, name]
     fine = EventBasedModel(pivot="unilateral").simulate(scene.replace(output_step=5e-5))
-    expected = pytest.approx(motion_of(fine, scene).wall_speed, rel=5e-3)
-    assert motion_of(history, scene).wall_speed == expected
+    assert motion_of(history, scene).wall_speed == pytest.approx(
+        motion_of(fine, scene).wall_speed, rel=5e-3
+    )
 
 
 @pytest.mark.parametrize(("before", "speed"), [(None, 0.4), (0.15, 0.3)])
@@ -162,8 +164,9 @@ def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, s
     """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between
     the rows has changed the speed, so the last one stands. The wall is on the left."""
     events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (0.3, "wall impact")) if t]
-    rightward = np.array([-0.1, -0.2, -0.3, 0.2])
-    history = made([0.0] * 4, t=0.1 * np.arange(4), x_dot=rightward, events=events)
+    history = made(
+        [0.0] * 4, t=0.1 * np.arange(4), x_dot=np.array([-0.1, -0.2, -0.3, 0.2]), events=events
+    )
     assert wall_speeds(history, load_scene("fig5a")) == pytest.approx([speed])
 
 
@@ -183,9 +186,8 @@ def test_contributions_are_shares_and_the_largest_comes_first(assess):
     said = assess("uncertain.toml records --samples 8 --models ebm-unilateral,ebm")
     shares = {row["source"]: row["share"] for row in said["contributions"]}
     assert set(shares) == {"records", "inputs", "numerical error", "model form", "impact law"}
-    assert sum(shares.values()) == pytest.approx(1.0)
     assert list(shares.values()) == sorted(shares.values(), reverse=True)
-    assert said["runs"] == 8 * COUNT
+    assert (sum(shares.values()), said["runs"]) == (pytest.approx(1.0), 8 * COUNT)
     assert said["overturning"]["low"] < said["overturning"]["probability"]
 
 
@@ -194,18 +196,18 @@ def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(assess)
     first, again = (assess(f"{words}{more}") for more in ("", " --jobs 1"))
     assert again["made"]["jobs"] == 1
     assert again == first | {"made": again["made"]}
-    where = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
-    with LocalCluster(**where) as cluster:
+    with LocalCluster(1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         there = assess(f"{words} --scheduler {cluster.scheduler_address}", out="there")
     assert there["gaps"] == first["gaps"]
 
 
 def test_one_run_says_how_sure_it_is(assess):
     said = assess("uncertain.toml --samples 16")
-    assert (said["runs"], said["converged"], said["inputs"]["samples"]) == (1, True, 16)
+    assert (said["exit_code"], said["runs"], said["converged"]) == (0, 1, True)
+    inputs = said["inputs"]
+    assert (inputs["samples"], inputs["sensitivities"][0]["name"]) == (16, "floor.friction")
     assert {q["name"] for q in said["quantities"]} >= {"peak_rotation", "last_slip", "outcome"}
     assert said["numerical"]["quantities"] == said["quantities"]
-    assert said["inputs"]["sensitivities"][0]["name"] == "floor.friction"
     assert said["motion"]["top_displacement"]["of"] == 1
 
 
@@ -227,9 +229,9 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, tmp_path, lo
     assess("cabinet.toml records/R0*.csv --gaps 0.05")
     out = tmp_path / "out"
     page = (out / "index.html").read_text("utf-8")
-    assert "as CSV, in at most 2000 rows" in page
+    shown = ("as CSV, in at most 2000 rows", *(f'href="histories/R0{k}.csv"' for k in (0, 9)))
+    assert [part for part in shown if part not in page] == []
     for name in ("R00", "R09"):
-        assert f'href="histories/{name}.csv"' in page
         theta = loop[0.05, name][1].channels["theta"]
         kept = pd.read_csv(out / "histories" / f"{name}.csv").theta
         assert kept.tolist() == pytest.approx(theta[:: -(-len(theta) // 2000)].tolist(), abs=1e-15)
@@ -264,20 +266,19 @@ def test_each_record_has_a_file_of_its_own(folder, assess, tmp_path):
     assert len(list((tmp_path / "out" / "histories").iterdir())) == 2
 
 
-def test_an_engine_may_play_and_is_compared(assess):
-    said = assess("cabinet.toml --models mujoco,ebm-unilateral --set time_step=4e-3")
-    assert said["model"] == "mujoco"
-    assert said["quantities"][0]["u_num"] != 0.0
-    assert [row["model"] for row in said["tables"]["models"]] == ["ebm-unilateral"]
-
-
-def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(assess, tmp_path):
-    assert main(["new", "new.toml", "--quiet"]) == 0
+def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_most(
+    assess, typed, tmp_path
+):
+    typed("new", "new.toml")
     said = assess("new.toml --models mujoco,ebm-unilateral --set time_step=1e-3", code=1)
-    answers = [row["answer"] for row in said["tables"]["answers"]]
-    assert "Not converged: no figure of it is sure." in answers
-    page = (tmp_path / "out" / "summary.md").read_text("utf-8")
-    assert "numerical error (no run is converged)" in page
+    compared = [row["model"] for row in said["tables"]["models"]]
+    assert (said["exit_code"], said["model"], compared) == (1, "mujoco", ["ebm-unilateral"])
+    assert "Not converged: no figure of it is sure." in [
+        row["answer"] for row in said["tables"]["answers"]
+    ]
+    assert "numerical error (no run is converged)" in (tmp_path / "out" / "summary.md").read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.parametrize(
@@ -312,14 +313,13 @@ def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monk
     drawn = study.parts["drawn"]
     found = study.gather(done | {t: t.play() for t in [*drawn["a"], drawn["b"][0]]})
     assert found.data["runs"] == 8
-    (left_out,) = [line for line in notes_of(found) if line.startswith("left out")]
-    assert left_out.endswith(": b, c")
+    left_out = [line for line in notes_of(found) if line.startswith("left out")]
+    assert [line.endswith(": b, c") for line in left_out] == [True]
 
 
 def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
     scaled = load_scene(folder / "pga.toml").excitation
-    assert scaled.peak == pytest.approx(0.5, rel=1e-12)
-    assert scaled.unscaled == noise(1).unscaled
+    assert (scaled.peak, scaled.unscaled) == (pytest.approx(0.5, rel=1e-12), noise(1).unscaled)
 
 
 def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
@@ -328,19 +328,25 @@ def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
     t = 0.02 * np.arange(200)
     (folder / "pair").mkdir()
     for name, gain in (("S1_H", 3.0), ("S2_H", 4.0), ("S1_UP", 9.0), ("S2_UP", 9.0)):
-        samples = gain * np.sin((4.0 + gain) * t) * np.exp(-t)
-        write_record(folder / "pair" / f"{name}.csv", samples.tolist())
+        write_record(
+            folder / "pair" / f"{name}.csv", (gain * np.sin((4.0 + gain) * t) * np.exp(-t)).tolist()
+        )
     words = "cabinet.toml pair --read vertical=true"
     own = assess(f"{words} --levels pga:1:2:2")["tables"]["motions"][0]["own"]
     scaled = assess(f"{words} --levels pga:{own!r}:{1.3 * own!r}:2")["tables"]["ida"][1]
     ran = assess(f"{words} --read scale=1.3")["tables"]["runs"][0]
-    assert (scaled["record"], scaled["direction"], ran["record"]) == ("S1_H", 1, "S1_H")
-    assert scaled["peak_rotation_alpha"] == pytest.approx(ran["peak_rotation"], rel=1e-2)
+    assert (
+        scaled["record"],
+        scaled["direction"],
+        ran["record"],
+        scaled["peak_rotation_alpha"],
+    ) == ("S1_H", 1, "S1_H", pytest.approx(ran["peak_rotation"], rel=1e-2))
 
 
 def test_numbers_of_an_excitation_that_records_replace_are_not_drawn(assess, tmp_path, refused):
     words = "uncertain-pulse.toml records/R00.csv"
     assess(words)
     assert "--samples 64" not in (tmp_path / "out" / "summary.md").read_text("utf-8")
-    said = refused("assess", *words.split(), "--samples", "8")
-    assert "besides the excitation that the records replace" in said
+    assert "besides the excitation that the records replace" in refused(
+        "assess", *words.split(), "--samples", "8"
+    )

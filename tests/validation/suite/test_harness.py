@@ -48,8 +48,9 @@ def project(tmp_path_factory):
     """The folder of a copy in which files can be changed and put back, compiled code and times
     kept."""
     folder = tmp_path_factory.mktemp("project")
-    ignore = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(ROOT / "rockcheck", folder / "rockcheck", ignore=ignore)
+    shutil.copytree(
+        ROOT / "rockcheck", folder / "rockcheck", ignore=shutil.ignore_patterns("__pycache__")
+    )
     code, out = run(folder, "--strict")
     assert code == 0, out
     return folder

@@ -19,8 +19,6 @@ FAULTS = {
 
 @dataclass(frozen=True)
 class Square(Task):
-    """A number to be squared; each time that it is, a line is added to a file."""
-
     value: float
     log: str
 
@@ -60,7 +58,6 @@ class Squares(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         rows = [[task.value, one.value] for task, one in done.items() if isinstance(one, Squared)]
-        table = Table("squares", [Column("value"), Column("square", unit="m")], rows)
-        return Finding(
-            self.name, "Squares", f"{len(rows)} squares", [table], data={"count": len(rows)}
-        )
+        columns = [Column("value"), Column("square", unit="m")]
+        blocks = [Table("squares", columns, rows)]
+        return Finding(self.name, "Squares", "", blocks, data={"count": len(rows)})
