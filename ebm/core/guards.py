@@ -89,11 +89,8 @@ def fill_guards(block, state, a):
     mode = state.mode
     for which in range(len(KIND)):
         drop(a, which)
-    unloads = mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]
-    if state.winds and mode.pivot == Pivot.SLIPPING and unloads:
-        _enter(a, Guard.LOADS, 1, Row.Z, -float(mode.slip))
     if mode.family == Family.FLAT:
-        _fill_flat(block, mode, a)
+        _fill_flat(block, state, a)
         return
     _enter(a, Guard.PHI, 0, Row.PHI, 1.0)
     # Else no step on the floor is long enough to turn the block over.
@@ -104,7 +101,7 @@ def fill_guards(block, state, a):
         _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
         a[Row.TABLE + Guard.LANDING, Row.COS] = -1.0
     else:
-        _fill_friction(block, mode, block.mu_s * mode.pull, state.winds, a)
+        _fill_friction(block, state, block.mu_s * mode.pull, a)
     if mode.pivot == Pivot.SLIPPING and on_wall(mode):
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
         # of slip everywhere.
@@ -122,17 +119,22 @@ def fill_guards(block, state, a):
 
 
 @inner_kernel
-def _fill_friction(block, mode, mu, winds, a):
+def _fill_friction(block, state, mu, a):
     """The floor's push, and the two sides of the friction cone |Q| <= mu P.
 
-    Friction that `winds` (Bouc-Wen's) has no cone to leave.
+    The friction of a wedged block that winds (Bouc-Wen's) has no cone to leave. Where the pivot
+    unloads, z comes to the sense of slip.
     """
-    if block.unilateral or mode.pivot == Pivot.SLIPPING or winds:
+    mode = state.mode
+    wedged = state.winds and mode.family == Family.TILT and mode.pivot == Pivot.STICK
+    if block.unilateral or mode.pivot == Pivot.SLIPPING or wedged:
         _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
-    if mode.pivot == Pivot.STICK and not block.no_slip and not winds:
+    if mode.pivot == Pivot.STICK and not block.no_slip and not wedged:
         _enter(a, Guard.CONE_PLUS, 2, Row.P, mu)
         _enter(a, Guard.CONE_MINUS, 2, Row.P, mu)
         a[Row.TABLE + Guard.CONE_PLUS, Row.Q], a[Row.TABLE + Guard.CONE_MINUS, Row.Q] = -1.0, 1.0
+    if state.winds and mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]:
+        _enter(a, Guard.LOADS, 1, Row.Z, -float(mode.slip))
 
 
 @inner_kernel
@@ -165,8 +167,9 @@ def _fill_gap(block, state, a, tip):
 
 
 @inner_kernel
-def _fill_flat(block, mode, a):
+def _fill_flat(block, state, a):
     """The guards of a translating block; tip means the left wall, far the right one."""
+    mode = state.mode
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
     if block.gap_left < np.inf and mode.tip == 0:
         _enter(a, Guard.TIP_GAP, 0, Row.XI, 1.0)
@@ -183,17 +186,18 @@ def _fill_flat(block, mode, a):
         _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
         a[Row.TABLE + Guard.LANDING, _CONSTANT] = -block.height
     else:
-        _fill_flat_floor(block, mode, hangs, a)
+        _fill_flat_floor(block, state, hangs, a)
 
 
 @inner_kernel
-def _fill_flat_floor(block, mode, hangs, a):
+def _fill_flat_floor(block, state, hangs, a):
     """The guards of a translating block that the floor holds."""
+    mode = state.mode
     if mode.pivot == Pivot.SLIPPING:
         _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
     # A force below rounding is to stay what it is where P vanishes.
     least = block.mu_s == LEAST_FRICTION
-    _fill_friction(block, mode, 0.0 if least else block.mu_s, False, a)
+    _fill_friction(block, state, 0.0 if least else block.mu_s, a)
     if least:
         a[Row.TABLE + Guard.CONE_PLUS, _CONSTANT] = block.mu_s
         a[Row.TABLE + Guard.CONE_MINUS, _CONSTANT] = block.mu_s

@@ -222,10 +222,7 @@ def _possible(block, state, at):
         return False
     if mode.pivot != Pivot.OFF and mode.pull < 0 and not _may_pull(block, mode, flat, mine):
         return False
-    if block.no_slip and mode.pivot == Pivot.SLIPPING:
-        return False
-    # Friction that winds (Bouc-Wen's) lets the pivot slip, however little, unless it is wedged.
-    if state.winds and (mode.pivot == Pivot.STICK) != (mine == 3 and not flat):
+    if not _friction_allows(block, state, mine == 3 and not flat):
         return False
     if flat and not _flat_on(mode, mine, at.upright_walls):
         return False
@@ -238,6 +235,18 @@ def _possible(block, state, at):
     if mode.pivot == Pivot.STICK:
         return v == 0.0
     return mode.pivot == Pivot.OFF or mode.slip * v >= 0.0
+
+
+@inner_kernel
+def _friction_allows(block, state, wedged):
+    """Whether the law of friction knows what the pivot does.
+
+    That which winds (Bouc-Wen's) lets it slip, however little, unless both walls hold the block.
+    """
+    pivot = state.mode.pivot
+    if block.no_slip:
+        return pivot != Pivot.SLIPPING
+    return not state.winds or (pivot == Pivot.STICK) == wedged
 
 
 @inner_kernel

@@ -121,16 +121,20 @@ def friction(block, state):
 def _late_friction(block, mode, k, a):
     """Coefficient k of what the later terms of z add to the friction -kappa P."""
     a[Row.LATE, k] = -block.mu_k * mode.pull * _products(a, Row.Z, Row.P, 1, k, k)
-    return a[Row.LATE, k]
 
 
 @inner_kernel
-def _wind(block, mode, k, a):
-    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2.
+def _wind(block, state, k, a):
+    """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, and k of its friction.
 
-    Those of V and z up to k are given. The pivot loads where V z > 0.
+    What comes before them is given. The pivot loads where V z > 0.
     """
-    rate = a[Row.V, k]
+    if not state.winds:
+        return
+    mode = state.mode
+    a[Row.Q, k] += a[Row.LATE, k]
+    turned_by = a[Row.SIN, k + 1] if mode.family == Family.TILT else 0.0
+    rate = a[Row.V, k] = (k + 1) * (a[Row.XI, k + 1] - turned_by)
     if mode.slip * a[Row.Z, 0] > -NOISE[Kind.POSITION]:
         a[Row.Z2, k] = product(a, Row.Z, Row.Z, k)
         rate -= product(a, Row.V, Row.Z2, k)
@@ -357,7 +361,7 @@ def _contact_series(block, state, order, enough, reach, a):
 
     The matrix of the unknown forces is the same for each term.
     """
-    mode, winds = state.mode, state.winds
+    mode = state.mode
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
     static = tip and far
     side = side_of(block, mode.sense)
@@ -381,15 +385,13 @@ def _contact_series(block, state, order, enough, reach, a):
         ds = -_products(a, Row.OMEGA, Row.COS, 0, k, k + 1)
         dc = _products(a, Row.OMEGA, Row.SIN, 0, k, k + 1)
         along, moment = -a[Row.U, k], _moment_of_lower_orders(acting, k, a)
-        if winds:
-            along += _late_friction(block, mode, k, a)
+        if state.winds:
+            _late_friction(block, mode, k, a)
+            along += a[Row.LATE, k]
             moment += product(a, Row.COS, Row.LATE, k)
         free = ds * (i - 1.0), dc * (i - 1.0), along, moment
         ax, ay, aphi = _accelerations(acting, n, free, k, a)
-        if winds:
-            a[Row.Q, k] += a[Row.LATE, k]
-            a[Row.V, k] = (k + 1) * (a[Row.XI, k + 1] - a[Row.SIN, k + 1])
-            _wind(block, mode, k, a)
+        _wind(block, state, k, a)
         if static:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
@@ -521,9 +523,8 @@ def flat_series(block, base, run, order):
         if mode.pivot == Pivot.SLIPPING:
             a[Row.Q, k] = -kappa * a[Row.P, k]
             if run.state.winds:
-                a[Row.Q, k] += _late_friction(block, mode, k, a)
-                a[Row.V, k] = (k + 1) * a[Row.XI, k + 1]
-                _wind(block, mode, k, a)
+                _late_friction(block, mode, k, a)
+            _wind(block, run.state, k, a)
         if mode.pivot == Pivot.STICK:
             a[Row.Q, k] = a[Row.U, k]
         elif press != 0:
