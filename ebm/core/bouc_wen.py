@@ -10,13 +10,14 @@ pivot that sticks is thus a stiff undamped spring, and after some u_y of slip z 
 invariant state: the pivot has *yielded* and slips as in (7), (8) until V = 0. So the equation,
 stiff as it looks (eigenvalue -2 |V|/u_y), is smooth between the instants at which V or z changes
 sign, and needs no stiff integrator: Taylor steps stop there, and hold z once it has come within the
-tolerance of +-1. Everything else (guards, impacts, natural units, state and mode vectors) is the
-exact model's.
+tolerance of +-1. Q takes part in the series of `ebm.core.motion`; z coming to the sense of slip is
+a guard. Everything else (modes, guards, impacts, natural units) is the exact model's.
 
-What (9) leaves open: a block at rest on its base does not move at all, z being -u/(mu_k G0), so
-that it uplifts or slides exactly when it should. Impacts are the paper's, with their own stick and
-slip; they change velocities only, so that z goes on through them. "slip" and "stick" events, and
-the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that has not (ROCK, LEAN).
+What (9) leaves open: where the pivot has stood, friction begins as Coulomb's, z being the share
+that it takes, so that a block at rest uplifts or slides exactly when it should. Impacts are the
+paper's, with their own stick and slip; they change velocities only, so that z goes on through them.
+"slip" and "stick" events, and the modes, tell a yielded pivot (SLIDE-ROCK, LADDER) from one that
+has not (ROCK, LEAN).
 """
 
 import math
@@ -84,6 +85,7 @@ def after_event(block, base, run):
         _turn(run)
         return
     contacts.upright(block, motion)
+    contacts.stand_if_slow(block, motion)
     flat = motion.theta == 0.0 and motion.w == 0.0
     stands = flat and (motion.vx == 0.0 or which == Guard.SLIP)
     begins = stands or math.isnan(state.zeta)

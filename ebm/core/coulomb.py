@@ -1,16 +1,17 @@
 """Coulomb's friction behind its four doors: `expand`, `locate`, `advance` and `after_event`.
 
-How to add a law of friction: a module beside this one, with the same doors and `LOOKS_AHEAD`.
+How to add a law of friction: a module beside this one, with the same doors.
 
 - `expand`: the series PHI to Q of the mode, in the pivot's frame (see `ebm.core.motion`); in the
   state `order`, `place` and `length`.
 - `locate`: `tau` and `guard`. `fill_guards`, then `drop` for the cone and slip guards that the law
   has not, then `first_event`.
 - `advance`: the law's own variable at the end of the step; a field of STATE, set by `march.begin`.
-- `after_event`, at the start, after an impact and after a guard: the mode that follows,
-  `modes.slacken` where nothing was struck, and the event (`tell`).
-- `LOOKS_AHEAD`: whether rest may be skipped to the next time at which abs(u) leaves its limit
-  (`ebm.core.steps.rest`).
+- `after_event`, at the start, after an impact and after a guard: the mode that follows (`select`),
+  and the event (`tell`).
+
+Friction that is known with the motion stands in `motion.friction` and `motion.flat_series`; what a
+mode may be, in `modes._friction_allows`.
 
 Its constants stand in SETTING (`ebm.natural.setting_of`). Impacts have Coulomb's friction, mu_s and
 mu_k of SETTING: say what these are. Its loop is a `play` in `ebm.core.march` and a line in `LOOPS`;
@@ -27,8 +28,6 @@ from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Sh
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rests, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
-#: Whether rest is looked past, to the next uplift or slip.
-LOOKS_AHEAD = True
 #: Largest ratio of successive steps; where a block rattles, short steps need few terms.
 _FARTHER = 8.0
 

@@ -56,7 +56,7 @@ _COMBINES = np.array(
 )
 # The columns of the table: the weight of each series, a constant, and how many terms fewer than the
 # order the guard has (-1: no guard).
-_CONSTANT, _SHORTER = 30, 31
+_CONSTANT, _SHORTER = Row.GUARD + 1, Row.GUARD + 2
 #: A force is the second derivative of a truncated series: its zero is found to rounding from nearby
 #: only, within this share of a step.
 _NEARBY = 0.25

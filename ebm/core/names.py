@@ -177,11 +177,9 @@ class Rule(IntEnum):
     #: A corner that meets the wall as the block lands, on its base or on its side, belongs to the
     #: landing.
     LANDS_ALONG = 9
-    #: Bouc-Wen: beyond Painleve's limit on a wall the motion goes on with the pull.
-    PULLS = 10
     #: Both bottom corners strike the floor at once: they share the impact, unless the law of
     #: impacts names the one that is first.
-    FLAT_LANDING = 11
+    FLAT_LANDING = 10
 
 
 RULES = len(Rule)
@@ -197,6 +195,5 @@ RULE_NAMES = (
     "flush landing",
     "grazes",
     "lands along a wall",
-    "pulls beyond Painleve",
     "flat landing",
 )

@@ -22,14 +22,7 @@ from situations import (
 from stepping import ROCKS, TILTED, run_at, setting_of
 
 from rockcheck.ebm import natural
-from rockcheck.ebm.core import (
-    contacts,
-    ground,
-    modes,
-    motion,
-    series,
-    steps,
-)
+from rockcheck.ebm.core import contacts, ground, guards, modes, motion, series, steps
 from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
 from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
@@ -291,3 +284,7 @@ def test_series_keep_the_corner_on_its_wall(case, friction):
         assert y == pytest.approx(c, rel=1e-10, abs=1e-10)
         sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
         assert x[1:] == pytest.approx(case * (sine * c - cosine * s)[1:], rel=1e-10, abs=1e-10)
+
+
+def test_the_table_of_guards_has_a_column_for_each_series():
+    assert max(max(series) for _, *series in guards.GUARDS.values()) < Row.GUARD
