@@ -173,20 +173,18 @@ def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
     title = f"## {block.title}\n\n" if block.title else ""
     if isinstance(block, Text):
-        lists = [": ".join(fact) for fact in block.facts], block.items
+        lists = ([f"{name}: {value}" for name, value in block.facts], block.items)
         parts = [block.text, *("\n".join(f"- {item}" for item in items) for items in lists)]
         return title + "\n\n".join(filter(None, parts))
     if isinstance(block, Plot) or block.on == "file":
         return ""
     block = block.shown
-    table = markdown_table(
-        [column.head for column in block.columns],
-        (
-            [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
-            for row in block.rows
-        ),
+    rows = (
+        [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
+        for row in block.rows
     )
-    return "\n\n".join(filter(None, [title + table, block.note]))
+    note = f"\n\n{block.note}" if block.note else ""
+    return title + markdown_table([column.head for column in block.columns], rows) + note
 
 
 def _draw(plot: Plot, stem: Path, stamp: str) -> None:
@@ -312,23 +310,18 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     `name` and the `links` of its navigation: (title, address).
     """
     *parts, name = address.split("/")
-    return write_whole(
-        made(folder, *parts) / name,
-        TEMPLATES.get_template(template).render(
-            root="../" * len(parts), address=address, **context
-        ),
+    page = TEMPLATES.get_template(template).render(
+        root="../" * len(parts), address=address, **context
     )
+    return write_whole(made(folder, *parts) / name, page)
 
 
 def write_assets(folder: Path) -> None:
     """Write style sheets, scripts and the plotting library, once for all pages of a folder."""
     target = made(folder, PAGES, "assets")
     for source in (*(DATA / "assets").iterdir(), *(DATA / "vendor").glob("*/*")):
-        write_whole(
-            target
-            / (source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"),
-            source.read_bytes(),
-        )
+        name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
+        write_whole(target / name, source.read_bytes())
     write_whole(
         target / "models.css",
         "".join(

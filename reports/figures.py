@@ -120,10 +120,9 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
     with figure_style() as new_figure:
         figure = new_figure(figsize=(3.4, 0.9))
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        style = "steps-post" if step else "default"
         for x, y, look in curves:
-            ax.plot(
-                x, y, color=look.light, linewidth=0.7, drawstyle="steps-post" if step else "default"
-            )
+            ax.plot(x, y, color=look.light, linewidth=0.7, drawstyle=style)
         if step:
             ax.set_ylim(0.0, 1.0)
         else:
@@ -371,9 +370,8 @@ def _tracks(ax: Any, view: SceneView) -> None:
                 color=view.looks[model].light,
                 linestyle="",
             )
-    ax.set_yticks(
-        range(len(shown)), [_short(view.looks[model].label) for model in shown], fontsize=6
-    )
+    labels = [_short(view.looks[model].label) for model in shown]
+    ax.set_yticks(range(len(shown)), labels, fontsize=6)
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.text(
@@ -400,13 +398,10 @@ def _shades(view: SceneView, against: str | None, beyond: bool) -> list[Any]:
     bands = view.bands(against) if against else ()
     shown = {channel.name for channel in PAPER_CHANNELS}
     kinds = {band.kind for band in bands if band.channel in shown}
-    return [
-        handle
-        for shown, handle in [
-            ("peak" in kinds, Patch(color=TOLERANCE, alpha=0.25, label="tolerance")),
-            ("rms" in kinds, Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far")),
-            ("rms" in kinds, Line2D([], [], **LIMIT | {"linestyle": "", "label": "its limit"})),
-            (beyond, Patch(color="#000000", alpha=0.08, label="beyond the horizon")),
-        ]
-        if shown
+    entries: list[tuple[bool, Any]] = [
+        ("peak" in kinds, Patch(color=TOLERANCE, alpha=0.25, label="tolerance")),
+        ("rms" in kinds, Line2D([], [], color="#555555", linewidth=1.8, label="RMS so far")),
+        ("rms" in kinds, Line2D([], [], **LIMIT | {"linestyle": "", "label": "its limit"})),
+        (beyond, Patch(color="#000000", alpha=0.08, label="beyond the horizon")),
     ]
+    return [handle for shown, handle in entries if shown]

@@ -192,14 +192,12 @@ class _Pages:
         found: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
         self.links = {view.name: f"{PAGES}/{view.slug}.html" for view in found}
+        studies = [one for one in STUDIES if (folder / one[1]).exists()]
         #: What every page shows, and calls.
         self.common: dict[str, Any] = {
             "site": {
                 "name": f"rockcheck: {self.run.suite}",
-                "links": [
-                    *self.links.items(),
-                    *(one for one in STUDIES if (folder / one[1]).exists()),
-                ],
+                "links": [*self.links.items(), *studies],
             },
             "run": self.run,
             "looks": looks(self.run.models),
@@ -352,14 +350,11 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     if sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW:
         yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
         return
-    yield from side_by_side(
-        (
-            Call(_write_page, (pages.folder, pages.wanted, *one))
-            for one in (*stamps.items(), (INDEX, ""))
-        ),
-        min(jobs, len(stamps)),
-        least=2,
-    )
+    calls = [
+        Call(_write_page, (pages.folder, pages.wanted, *one))
+        for one in (*stamps.items(), (INDEX, ""))
+    ]
+    yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
 
 
 def _belongings(page: Path) -> set[str]:

@@ -121,7 +121,7 @@ def figure_style() -> Iterator[type[Figure]]:
     import matplotlib as mpl
     from matplotlib.figure import Figure as NewFigure
 
-    settings: Any = {
+    settings: dict[Any, Any] = {
         "font.family": "sans-serif",
         "font.sans-serif": ["DejaVu Sans"],
         "font.size": 7.5,

@@ -126,14 +126,12 @@ def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
     failed: list[tuple[Cell, Check | None]] = [
         (cell, None) for cell in run.cells if cell.status != "done"
     ]
-    return failed + sorted(
-        (
-            (cell, check)
-            for cell, check in run.checks()
-            if check.weighs != "pass" and check.words != "no tolerance yet"
-        ),
-        key=lambda pair: (pair[1].verdict != "fail", -use(pair[1])),
-    )
+    checks = [
+        (cell, check)
+        for cell, check in run.checks()
+        if check.weighs != "pass" and check.words != "no tolerance yet"
+    ]
+    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -use(pair[1])))
 
 
 def use(check: Check) -> float:
@@ -168,25 +166,17 @@ def times_table(run: Run) -> Table:
     base, rows = taken.get(run.reference, {}), []
     for model, own in taken.items():
         ratios = {at: own[at] / base[at] for at in own if own[at] * base.get(at, 0.0) > 0.0}
-        rows.append(
-            [
-                model,
-                geometric_mean(ratios.values()) if ratios else None,
-                *(
-                    Mark(ratio(ratios.get(at)), more=duration(own[at]) if at in own else "")
-                    for at in places
-                ),
-            ]
+        shown = (
+            Mark(ratio(ratios.get(at)), more=duration(own[at]) if at in own else "")
+            for at in places
         )
-    return Table(
-        "times",
-        [
-            Column("model", kind="model"),
-            Column("ratio", "geometric mean, ×"),
-            *(Column(f"scene {place}", place) for place in places),
-        ],
-        rows,
-    )
+        rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
+    columns = [
+        Column("model", kind="model"),
+        Column("ratio", "geometric mean, ×"),
+        *(Column(f"scene {place}", place) for place in places),
+    ]
+    return Table("times", columns, rows)
 
 
 def measures_table(view: SceneView, against: str) -> Table:
@@ -196,10 +186,8 @@ def measures_table(view: SceneView, against: str) -> Table:
     """
     found: dict[tuple[str, str], dict[str, tuple[Figure, Check | None]]] = {}
     for cell in view.cells:
-        for figure, check in (
-            *[(check.figure, check) for check in cell.checks],
-            *((figure, None) for figure in cell.figures),
-        ):
+        judged = [(check.figure, check) for check in cell.checks]
+        for figure, check in (*judged, *((figure, None) for figure in cell.figures)):
             if figure.against == against:
                 row = found.setdefault((figure.measure, figure.window), {})
                 row.setdefault(cell.model, (figure, check))
@@ -221,12 +209,11 @@ def measures_table(view: SceneView, against: str) -> Table:
 
 
 def _measured(figure: Figure, check: Check | None) -> Mark:
+    limit = f"limit {number(check.limit)}" if check else ""
     return Mark(
         f"{number(figure.value, 4)} {unit(figure.unit)}",
         check.weighs if check and check.verdict != "not defined" else "",
-        more="; ".join(
-            filter(None, [f"limit {number(check.limit)}" if check else "", figure.note])
-        ),
+        more="; ".join(filter(None, [limit, figure.note])),
     )
 
 
@@ -293,16 +280,15 @@ def runs_table(
         ]
         for cell in cells
     ]
+    columns = [
+        Column("model", kind="model"),
+        text("settings"),
+        *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
+        *map(text, ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]),
+    ]
     return Table(
         "models",
-        [
-            Column("model", kind="model"),
-            text("settings"),
-            *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
-            *map(
-                text, ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]
-            ),
-        ],
+        columns,
         rows,
         "Models, settings and run times",
         folded=histories is not None,
@@ -351,14 +337,13 @@ def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, An
         if one and one["cell"].model != run.reference and one["rms"]
     )
     accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
+    changed = [pair for pair in accepted if _moved(pair[1])]
     return {
         "farthest": max(others, key=lambda one: one["rms"].value, default=None),
         "apart": [
             (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
         ],
-        "changed": sorted(
-            (pair for pair in accepted if _moved(pair[1])), key=lambda pair: -use(pair[1])
-        ),
+        "changed": sorted(changed, key=lambda pair: -use(pair[1])),
         "judged": len(accepted),
     }
 
@@ -457,18 +442,28 @@ def accuracy(run: Run) -> list[Block]:
     panels, rows = [], []
     for model, (here, in_all) in trusts.items():
         trust, (x, y) = in_all or here, zip(*pairs[model], strict=True)
-        panels.append(
-            Panel(
-                styles[model].label,
-                [
-                    Series("", ends, ends, style="thin"),
-                    *(_expected(trust, ends, styles[model].key) if trust else ()),
-                    Series("", x, y, look=styles[model].key, style="points"),
-                ],
-            )
-        )
+        lines = [
+            Series("", ends, ends, style="thin"),
+            *(_expected(trust, ends, styles[model].key) if trust else ()),
+            Series("", x, y, look=styles[model].key, style="points"),
+        ]
+        panels.append(Panel(styles[model].label, lines))
         shown = [getattr(one, name, None) for one in (here, in_all) for name in ("bias", "scatter")]
         rows.append([model, len(x), *shown])
+    columns = [
+        Column("model", kind="model"),
+        Column("scenes_here"),
+        *(
+            Column(
+                f"{what}_{where}",
+                f"{what}, {where.replace('_', ' ')}",
+                digits=digits,
+                optional=True,
+            )
+            for where in ("here", "all_suites")
+            for what, digits in (("bias", 4), ("scatter", 2))
+        ),
+    ]
     x_axis, y_axis = (
         Axis(f"peak |θ|/α by {of}", log=True, limits=ends)
         for of in (styles[run.reference].label, "the model")
@@ -483,24 +478,7 @@ def accuracy(run: Run) -> list[Block]:
             note="Peak rotation of the blocks that stand. Grey: equal. Coloured: the bias; dotted:"
             " two standard deviations.",
         ),
-        Table(
-            "accuracy",
-            [
-                Column("model", kind="model"),
-                Column("scenes_here"),
-                *(
-                    Column(
-                        f"{what}_{where}",
-                        f"{what}, {where.replace('_', ' ')}",
-                        digits=digits,
-                        optional=True,
-                    )
-                    for where in ("here", "all_suites")
-                    for what, digits in (("bias", 4), ("scatter", 2))
-                ),
-            ],
-            rows,
-        ),
+        Table("accuracy", columns, rows),
     ]
 
 

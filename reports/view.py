@@ -171,7 +171,8 @@ class SceneView(View):
         NaN outside them and where there is no such column.
         """
         times = np.asarray(history.channels["t"], dtype=float)
-        values = np.asarray(history.channels.get(name, np.full(len(times), math.nan)), dtype=float)
+        unknown = np.full(len(times), math.nan)
+        values = np.asarray(history.channels.get(name, unknown), dtype=float)
         inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
         return np.where(inside, np.interp(self.t, times, values), math.nan)
 
@@ -419,8 +420,9 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         numbered = chain([base], (f"{base}-{n}" for n in count(2)))
-        slugs[name] = next(one for one in numbered if one.lower() not in taken)
-        taken.add(slugs[name].lower())
+        slug = next(one for one in numbered if one.lower() not in taken)
+        taken.add(slug.lower())
+        slugs[name] = slug
     return slugs
 
 

@@ -83,10 +83,11 @@ def history_figure(history: History) -> Figure:
     """Rotation, slip of the pivot (mm) and events over time (s)."""
     figure = NotebookFigure(figsize=(7.0, 4.2), layout="constrained")
     rotation, slip, tracks = figure.subplots(3, 1, sharex=True, height_ratios=(3, 2, 1))
+    time = history.channels["t"]
     rotation_lines(rotation, [history], [INK])
     rotation.set_title(f"{history.name}, {history.model}: {history.fate}")
     if "slip" in history.channels:
-        slip.plot(history.channels["t"], 1e3 * history.channels["slip"], color=INK, linewidth=0.9)
+        slip.plot(time, 1e3 * history.channels["slip"], color=INK, linewidth=0.9)
     slip.set_ylabel("slip of the\npivot, mm")
     slip.grid(color=SHADE, linewidth=0.5)
     kinds = [kind for kind in TRACKS if any(event.kind == kind for event in history.event_list)]
@@ -147,7 +148,8 @@ def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
     Acceleration is in g, velocity in m/s, both over time in s. Spectral acceleration, in g at
     5 % damping, is over the period in s.
     """
-    figure = NotebookFigure(figsize=(9.0, 1.9 * len(recordings) + 0.4), layout="constrained")
+    size = 9.0, 1.9 * len(recordings) + 0.4
+    figure = NotebookFigure(figsize=size, layout="constrained")
     for (name, record), (acceleration, velocity, spectrum) in zip(
         recordings,
         figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)),

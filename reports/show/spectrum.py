@@ -112,7 +112,8 @@ def figure(plot: Plot) -> Figure:
     """
     data = plot.data
     panels = data["panels"]
-    pulse, width = (data["pulse"], PAGE / 1.6) if len(panels) == 1 else (None, PAGE)
+    alone = len(panels) == 1
+    pulse, width = (data["pulse"], PAGE / 1.6) if alone else (None, PAGE)
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
     handles, columns = _legend(data)
@@ -130,14 +131,8 @@ def figure(plot: Plot) -> Figure:
         for panel, place in zip(panels, places, strict=True):
             row, high, column = panel["place"]
             axes = figure.add_axes(place)
-            _paint(
-                axes,
-                np.array(list(panel["outcomes"])).reshape(len(y), len(x)),
-                x,
-                y,
-                free=panel["free"],
-                law=panel.get("law", ()),
-            )
+            letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
+            _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
             # Where panels are two grid rows high, column 0 holds the panel without a wall, midway
@@ -193,14 +188,10 @@ def _units(axes: Any, data: Any) -> None:
     """Add axes with the frequency (Hz) and the peak acceleration (g) of the pulses."""
     hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
     g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
-    axes.secondary_xaxis(
-        "top",
-        functions=(lambda x: x * hertz, lambda x: x / hertz),
-        xlabel="frequency of the pulse, Hz",
-    )
-    axes.secondary_yaxis(
-        "right", functions=(lambda y: y * g, lambda y: y / g), ylabel="peak acceleration, g"
-    )
+    frequency = (lambda x: x * hertz, lambda x: x / hertz)
+    axes.secondary_xaxis("top", functions=frequency, xlabel="frequency of the pulse, Hz")
+    acceleration = (lambda y: y * g, lambda y: y / g)
+    axes.secondary_yaxis("right", functions=acceleration, ylabel="peak acceleration, g")
 
 
 def outcome_key(panels: Any) -> dict[str, str]:
@@ -252,8 +243,6 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
         "panels": panels,
     }
     for what, content in (("Nodes", data), ("Histories", plot.played)):
-        write_whole(
-            folder / f"{plot.name}.{what.lower()}.js",
-            script_text(f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]", content),
-        )
+        place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
+        write_whole(folder / f"{plot.name}.{what.lower()}.js", script_text(place, content))
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]

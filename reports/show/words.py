@@ -84,7 +84,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         )
         if value
     ]
-    facts = (
+    facts = [
         (
             "block",
             f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α ="
@@ -101,7 +101,7 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
             f"{number(scene.duration)} s, a row each {number(1e3 * scene.output_step)} ms",
         ),
         ("starts at", ", ".join(starts)),
-    )
+    ]
     return [fact for fact in facts if fact[1]]
 
 
@@ -114,13 +114,16 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
         f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
         f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
     )
+    gyration = number(math.sqrt(block.gyration_squared))
     return [
-        (
-            "mass's centre",
-            f"{place}; radius of gyration {number(math.sqrt(block.gyration_squared))} m",
-        ),
+        ("mass's centre", f"{place}; radius of gyration {gyration} m"),
         ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
     ]
+
+
+def scene_html(scene: Scene) -> str:
+    """The table of a scene in a notebook."""
+    return html_table(scene.name, scene_facts(scene))
 
 
 def history_html(history: History) -> str:
@@ -139,13 +142,11 @@ def history_html(history: History) -> str:
         "settings": ", ".join(f"{key} {value}" for key, value in history.settings.items()),
         "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",
     }
-    return html_table(
-        f"{history.name}, {history.model}",
-        [
-            *((name, said) for name, said in facts.items() if said),
-            *(("note", note) for note in history.notes),
-        ],
-    )
+    rows = [
+        *((name, said) for name, said in facts.items() if said),
+        *(("note", note) for note in history.notes),
+    ]
+    return html_table(f"{history.name}, {history.model}", rows)
 
 
 def discrepancy_html(found: Discrepancy) -> str:
@@ -165,16 +166,14 @@ def spectrum_html(spectrum: Spectrum) -> str:
         f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %"
         for side in (SAFE, LEFT, RIGHT)
     )
-    return html_table(
-        f"Overturning spectrum: {spectrum.scene.name}",
-        [
-            *zip(("safe", "overturned left", "overturned right"), shares, strict=True),
-            ("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"),
-            ("undecided", str(len(spectrum.undecided))),
-            # What the scene's own base motion is, and what follows from it, does not count.
-            *takewhile(lambda fact: fact[0] != "base", scene_facts(spectrum.scene)),
-        ],
-    )
+    facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
+    facts += [
+        ("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"),
+        ("undecided", str(len(spectrum.undecided))),
+    ]
+    # What the scene's own base motion is, and what follows from it, does not count.
+    facts += takewhile(lambda fact: fact[0] != "base", scene_facts(spectrum.scene))
+    return html_table(f"Overturning spectrum: {spectrum.scene.name}", facts)
 
 
 _POWER = re.compile(r"(?<![\w.])([+-]?\d+(?:\.\d+)?)e([+-]?\d+)(?![\w.]\w)")

@@ -196,9 +196,8 @@ def playing(
     title: str, models: Iterable[tuple[str, Mapping[str, Any]]]
 ) -> AbstractContextManager[OnProgress]:
     """Progress of `models` (family, settings) that play; it says if one may compile first."""
-    return progress(
-        f"{title}, may compile first" if any(compiles(*one) for one in models) else title
-    )
+    slow = any(compiles(*one) for one in models)
+    return progress(f"{title}, may compile first" if slow else title)
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
@@ -269,7 +268,8 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
                 f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
                 "--set",
             )
-        found[model].update([setting_of(rest)])
+        key, value = setting_of(rest)
+        found[model][key] = value
     return found
 
 
@@ -305,18 +305,12 @@ def report_file(text: str) -> str:
     Returns its path, "" where it cannot be written.
     """
     try:
-        with tempfile.NamedTemporaryFile(
-            "w",
-            encoding="utf-8",
-            errors="backslashreplace",
-            prefix="rockcheck-fault-",
-            suffix=".txt",
-            delete=False,
-        ) as stream:
+        handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
+        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
             stream.write(text)
     except OSError:
         return ""
-    return stream.name
+    return path
 
 
 def usable_folder(folder: Path, *parts: str) -> Path:

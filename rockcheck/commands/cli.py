@@ -32,15 +32,12 @@ from rockcheck.validation.suite.results import FAULT
 COMMANDS = {
     "scenes": ("simulate.scenes", "rockcheck scenes"),
     "new": ("simulate.new", "rockcheck new bookcase.toml"),
-    "record": (
-        "simulate.record",
-        "rockcheck record station.V2 --read component=1 --plot station.png",
-    ),
+    "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate",
         "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
     ),
-    "compare": ("validate.compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
+    "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("validate.accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
     "assess": ("studies.assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),

@@ -1,26 +1,24 @@
 """`rockcheck scenes`, `new` and `simulate`: what there is, a scene file, one history.
 
-`rockcheck record` says how a file of a recorded ground motion was read. And `rockcheck warm`
-compiles the models' code ahead, in several processes, so that a user waits for no compiler.
+And `rockcheck warm`: compiles the models' code ahead, in several processes, so that a user waits
+for no compiler.
 """
 
 import os
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 import typer
 
 from rockcheck.commands import (
     AllowCodeOption,
     JobsOption,
-    PlotOption,
     answer,
     check_file,
     console,
@@ -31,7 +29,6 @@ from rockcheck.commands import (
     save_figure,
     scene_names,
     setting_of,
-    tell_left_out,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene, named_scenes
@@ -39,8 +36,6 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import announcing, listening, one_run
-from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
-from rockcheck.scenes.recordings.sets import Odd, files_of, record_path
 from rockcheck.scenes.writing import write_new
 from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.execute.models import (
@@ -54,31 +49,7 @@ from rockcheck.validation.execute.models import (
 )
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
-from rockcheck.validation.finding import Column, Finding, Table, Text, text
-from rockcheck.validation.suite.motions import RecordSet
-
-ReadOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--read",
-        metavar="KEY=VALUE",
-        help="What a file does not say of itself, or which part of it is wanted; repeatable. unit:"
-        f" {', '.join(UNITS)}; time_step, s; column: that of the accelerations, its number"
-        " from 1, or its name; header_lines to skip; decimal: . or ,; component: its number from 1,"
-        " or its name.",
-    ),
-]
-RecordsArgument = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="[RECORDS]...",
-        help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
-    ),
-]
-
-#: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the
-#: largest.
-_PARTS, _MARKS = 60, " ▁▂▃▄▅▆▇█"
+from rockcheck.validation.finding import Column, Finding, Table, text
 
 
 def scenes() -> None:
@@ -221,131 +192,6 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
         return History.load(Path(folder) / f"history{TABLE}")
-
-
-def record(
-    files: Annotated[
-        list[str],
-        typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".'),
-    ],
-    read: ReadOption = None,
-    plot: PlotOption = None,
-) -> None:
-    """Show what files of recorded ground motions hold.
-
-    Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a
-    file does not say is given by --read. --plot draws acceleration, velocity and Sa(T).
-    """
-    if plot is not None:
-        check_file(plot, "--plot")
-    reading = Reading(**dict(setting_of(word, "--read") for word in read or ()))
-    asked = files_of(files)
-    found, faults = _components(asked, reading)
-    values = [_values(path, record) for path, record in found]
-    for (path, record), value in zip(found, values, strict=True):
-        _show(path, record, value)
-    if plot is not None and found:
-        from rockcheck.reports.show.drawing import recordings_figure
-
-        save_figure(
-            recordings_figure(
-                [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-            ),
-            plot,
-        )
-    if found:
-        answer(values[0] if len(values) == 1 else {"records": values})
-    if faults:
-        tell_left_out(faults[1:])
-        more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
-        raise InputError(f"{faults[0]}{more}")
-
-
-def _components(
-    files: Iterable[Path], reading: Reading
-) -> tuple[list[tuple[Path, Recording]], list[Odd]]:
-    found: list[tuple[Path, Recording]] = []
-    faults: list[Odd] = []
-    for path in files:
-        try:
-            found += [(path, one) for one in read_components(path, reading)]
-        except InputError as error:
-            faults.append(Odd(error))
-    return found, faults
-
-
-def _values(path: Path, record: Recording) -> dict[str, Any]:
-    return {
-        "file": path,
-        "format": record.form,
-        "component": record.component,
-        "samples": len(record.samples),
-        "step_s": record.time_step,
-        "duration_s": record.time_step * (len(record.samples) - 1),
-        "unit": record.unit,
-        "pga_g": intensity.peak_acceleration(record),
-        "pgv_m_s": intensity.peak_velocity(record),
-        "arias_m_s": intensity.arias(record),
-        "sa_g": {
-            f"{period:g}": intensity.spectral_acceleration(record, period)
-            for period in intensity.PERIODS
-        },
-        "notes": record.notes,
-    }
-
-
-def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
-    from rockcheck.reports.document import show
-
-    rows = [
-        ("format", f"{value['format']}, unit {value['unit']}"),
-        (
-            "samples",
-            f"{value['samples']} every {value['step_s']:.6g} s, {value['duration_s']:.6g} s",
-        ),
-        ("PGA", f"{value['pga_g']:.4g} g"),
-        ("PGV", f"{value['pgv_m_s']:.4g} m/s"),
-        ("Arias", f"{value['arias_m_s']:.4g} m/s"),
-        ("Sa(T), 5 %", ", ".join(f"{at} s: {sa:.3g} g" for at, sa in value["sa_g"].items())),
-        ("|a|", _picture(record)),
-        *(("note", printable(note, 200)) for note in record.notes),
-    ]
-    title = f"{path}, {record.component}" if record.component else str(path)
-    show(
-        Finding(
-            "record",
-            title,
-            "",
-            [Text(title), Table("record", [text("record"), text("value", " ")], rows)],
-        ),
-        console(),
-    )
-
-
-def _picture(record: Recording) -> str:
-    """The largest acceleration in each part of the motion, as bars."""
-    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
-    peaks = np.array([np.max(part) for part in parts])
-    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
-    return "".join(_MARKS[level] for level in levels)
-
-
-def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
-    """The records, and how they are read. Raises `InputError`."""
-    given = dict(setting_of(word, "--read") for word in read)
-    if not records:
-        if given:
-            raise InputError("needs records", "--read")
-        return []
-    scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
-    return [
-        RecordSet(
-            files=tuple(str(record_path(word, Path()).absolute()) for word in records),
-            scale=scale,
-            vertical=vertical,
-            **{name: value for name, value in Reading(**given) if value is not None},
-        )
-    ]
 
 
 def _begin(*names: str) -> None:

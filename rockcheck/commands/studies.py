@@ -31,7 +31,7 @@ from rockcheck.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.simulate import ReadOption, RecordsArgument, record_sets
+from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import Scene
 from rockcheck.scenes.errors import InputError, NotInstalled, one_of, printable, unknown_name
@@ -145,9 +145,8 @@ def assess(
     if tried.gaps is not None:
         clear, sides, changed = gaps_of(tried.gaps, given.scene)
         given = UncertainScene(changed, given.spreads, given.correlation)
-    cases, left_out = under_records(
-        {given.scene.name: given}, record_sets(records or (), read or ()), Path()
-    )
+    sets = record_sets(records or (), read or ())
+    cases, left_out = under_records({given.scene.name: given}, sets, Path())
     check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
@@ -325,15 +324,9 @@ def spectrum(
         panels = (Panel(name_of(scene.name.replace(" ", "-")), scene.name, scene),)
     # Beside a wall a block hops, which the pivot of the paper's figures forbids.
     hops = what not in PAPER and panels[0].wall is not None
+    given = dict(setting_of(one) for one in settings or [])
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
-    request = Request(
-        grid.size,
-        grid.frequencies,
-        grid.amplitudes,
-        name,
-        dict(setting_of(one) for one in settings or []),
-        grid.refine,
-    )
+    request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
         if name != "ebm":
             raise InputError(
@@ -477,11 +470,8 @@ def conformance(
             raise InputError("does not go with --histories", "--tune")
         _tune(names, tune, given, played)
     setup = given.pop("settings", None)
-    players = [
-        named(name, kind, given)
-        for name in names
-        for kind in (("best", "default") if setup == "both" else (setup,))
-    ]
+    kinds = ("best", "default") if setup == "both" else (setup,)
+    players = [named(name, kind, given) for name in names for kind in kinds]
     players += [written(folder) for folder in folders]
     studied(Conformance(tuple(players)), played)
 
@@ -504,10 +494,8 @@ def _tune(
     settings = WANTED.keys() - {"restitution"}
     if unknown := given.keys() - settings:
         raise unknown_name("setting", min(unknown), settings)
-    studied(
-        Tuning(tuple(Tune(name, restitution, **given) for name in engines)),
-        replace(played, out=played.out / "tuned"),
-    )
+    wanted = tuple(Tune(name, restitution, **given) for name in engines)
+    studied(Tuning(wanted), replace(played, out=played.out / "tuned"))
 
 
 def _export(folder: Path) -> None:

@@ -1,12 +1,11 @@
 """`rockcheck validate`: the main job; `accept`: its figures become the expected ones.
 
-And `rockcheck report`: a finished run rendered again, or one of its figures for a paper; and
-`rockcheck compare`: any two histories, or two finished runs.
+And `rockcheck report`: a finished run rendered again, or one of its figures for a paper.
 """
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +18,6 @@ from rockcheck.commands import (
     ALL,
     AllowCodeOption,
     Played,
-    PlotOption,
     answer,
     check_file,
     chosen_models,
@@ -28,28 +26,17 @@ from rockcheck.commands import (
     model_names,
     playing,
     progress,
-    save_figure,
-    scene_names,
     tell_left_out,
     tell_missing,
     told,
     usable_folder,
 )
-from rockcheck.commands.simulate import ReadOption, record_sets
-from rockcheck.scenes import History, InputError, Scene, load_scene
-from rockcheck.scenes.errors import printable
-from rockcheck.validation.discrepancy.compare import (
-    Discrepancy,
-    compare as compare_histories,
-    motion_of,
-)
-from rockcheck.validation.discrepancy.figures import value_words
-from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
-from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
+from rockcheck.commands.record import ReadOption, record_sets
+from rockcheck.scenes.errors import InputError, printable
+from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance
-from rockcheck.validation.suite.across import difference, moment_of, remember, trend_of
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite.across import moment_of, remember, trend_of
+from rockcheck.validation.suite.results import Run, Strict
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import (
     Suite,
@@ -148,47 +135,32 @@ def run(
     asked = _scene if is_scene(what) else _suite
     for option, given in (("--strict", strict), ("--history", history)):
         if given and asked is _scene:
-            raise InputError(
-                f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
-            )
+            said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
+            raise InputError(said, option)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
+    how: Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document, site
 
-    finished = play(
-        suite,
-        folder,
-        played,
-        force=force,
-        strict="both" if strict == "both" else strict is not None,
-    )
+    finished = play(suite, folder, played, force=force, strict=how)
     page = site.keep(finished, folder)
     document.show(finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
-        trend = trend_of(
-            remember(history, moment_of(finished, Path(finished.tolerances_file).parent))
-        )
+        moment = moment_of(finished, Path(finished.tolerances_file).parent)
+        trend = trend_of(remember(history, moment))
         document.show(trend, console())
         if report:
-            console().print(
-                f"trend: {document.publish(trend, usable_folder(folder, TREND))}", soft_wrap=True
-            )
+            where = document.publish(trend, usable_folder(folder, TREND))
+            console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
-            page = site.write_site(
-                folder,
-                jobs=played.jobs or os.cpu_count() or 1,
-                afresh=False,
-                on_progress=on_progress,
-            )
+            jobs = played.jobs or os.cpu_count() or 1
+            page = site.write_site(folder, jobs=jobs, afresh=False, on_progress=on_progress)
     else:
         site.remove_site(folder)
     console().print(f"report: {page}", soft_wrap=True)
-    answer(
-        summary(finished)
-        | ({} if suite.judged else {"left_out": suite.left_out})
-        | {"report": page}
-    )
+    more = {} if suite.judged else {"left_out": suite.left_out}
+    answer(summary(finished) | more | {"report": page})
     raise typer.Exit(finished.exit_code)
 
 
@@ -208,12 +180,8 @@ def _scene(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[Suite, Path]:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
-    suite = scene_suite(
-        name,
-        chosen_models(of_scene.models, of_scene.set or ()),
-        records=sets,
-        allow_code=allow_code,
-    )
+    chosen = chosen_models(of_scene.models, of_scene.set or ())
+    suite = scene_suite(name, chosen, records=sets, allow_code=allow_code)
     folder = usable_folder(out)
     if of_scene.models == ALL:
         tell_missing()
@@ -235,7 +203,8 @@ def _scene(
 
 def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
     """Run a suite with a progress bar on stderr."""
-    with playing(suite.name, ((one.family, one.settings) for one in suite.models.values())) as told:
+    models = ((one.family, one.settings) for one in suite.models.values())
+    with playing(suite.name, models) as told:
         how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
         return run_suite(suite, folder, **how)
 
@@ -347,145 +316,3 @@ def report(
         )
     console().print(f"report: {index}", soft_wrap=True)
     answer({"report": index})
-
-
-#: Value of --align without a time.
-BEST = "best"
-
-
-def compare(
-    reference: Annotated[
-        Path,
-        typer.Argument(
-            metavar="A", help="History of the reference, CSV; or a finished run's folder."
-        ),
-    ],
-    candidate: Annotated[
-        Path,
-        typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder."),
-    ],
-    align: Annotated[
-        str | None,
-        typer.Option(
-            "--align",
-            metavar="[SECONDS]",
-            help="Shift the candidate in time, by SECONDS, else to where the rotations agree best.",
-        ),
-    ] = None,
-    until: Annotated[
-        float | None,
-        typer.Option("--until", help="End of the window, s (default: the whole common time)."),
-    ] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            "--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names
-        ),
-    ] = None,
-    plot: PlotOption = None,
-) -> None:
-    """Compare two histories, or two finished runs.
-
-    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict
-    or a cell changed.
-
-    Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
-    time_ms, x_mm, ...). --plot draws both rotations and their difference.
-    """
-    from rockcheck.reports import document
-
-    if reference.is_dir() or reference.suffix == ".json":
-        from rockcheck.validation.studies.conformance import study
-
-        if study.wrote(reference):
-            told(study.changes(reference, candidate))
-    if reference.is_dir() or candidate.is_dir():
-        told(difference(Run.load(reference), Run.load(candidate)))
-    if plot is not None:
-        check_file(plot, "--plot")
-    what = load_scene(scene) if scene else None
-    try:
-        offset = 0.0 if align == BEST else float(align or 0.0)
-    except ValueError:
-        raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
-    given, other = read_measured(reference), read_measured(candidate)
-    shift = time_shift(given, other) if align == BEST else offset
-    found = compare_histories(given, shifted(other, shift), until=until, scene=what)
-    finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
-    document.show(finding, console())
-    if plot is not None:
-        save_figure(found.plot(), plot)
-    answer(finding.as_dict())
-
-
-def _finding(
-    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
-) -> Finding:
-    motions = {role: motion_of(history, scene) for role, history in histories.items()}
-    rows = [
-        [
-            figure.label,
-            value_words(figure.value, yes_no=DIFFERENCES[figure.measure].yes_no),
-            "" if DIFFERENCES[figure.measure].yes_no else figure.unit,
-            figure.note,
-        ]
-        for figure in found.figures
-    ]
-    models = f"{found.candidate} against {found.reference}"
-
-    notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
-    blocks: list[Block] = [
-        Text(headline(found)),
-        Text(
-            facts=[
-                (role, ", ".join(said)) for role, one in motions.items() if (said := one.words())
-            ]
-        ),
-        Text(f"{models}, {found.start:g} to {found.end:g} s"),
-        Table(
-            "comparison",
-            [text("measure"), Column("value"), text("unit"), text("note", " ")],
-            rows,
-        ),
-        Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
-        Text(f"not the whole time: {found.gap}" if found.gap else ""),
-        Text(items=notes, verdict="changed"),
-    ]
-    return Finding(
-        "comparison",
-        models,
-        "",
-        blocks,
-        {
-            "reference": found.reference,
-            "candidate": found.candidate,
-            "start": found.start,
-            "end": found.end,
-            "shift": shift,
-            "gap": found.gap,
-            "headline": headline(found),
-            "motion": {role: motion.model_dump() for role, motion in motions.items()},
-            "notes": {role: history.notes for role, history in histories.items()},
-            "figures": [
-                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
-                for f in found.figures
-            ],
-        },
-    )
-
-
-def headline(found: Discrepancy) -> str:
-    """The comparison in one sentence: whether outcomes agree, and how far rotations differ.
-
-    The difference is an RMS value.
-    """
-    assert found.histories is not None
-    reference, candidate = (history.fate for history in found.histories)
-    fate = (
-        f"same outcome, {candidate}"
-        if found["outcome_agrees"] == 1.0
-        else f"outcomes differ, {candidate} against {reference}"
-    )
-    rms = found.figure("theta_rms")
-    apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
-    return f"{fate}{apart}"

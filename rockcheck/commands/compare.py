@@ -1,0 +1,163 @@
+"""`rockcheck compare`: any two histories, or two finished runs."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from rockcheck.commands import (
+    PlotOption,
+    answer,
+    check_file,
+    console,
+    save_figure,
+    scene_names,
+    told,
+)
+from rockcheck.scenes import History, InputError, Scene, load_scene
+from rockcheck.scenes.errors import printable
+from rockcheck.validation.discrepancy.compare import Discrepancy, compare, motion_of
+from rockcheck.validation.discrepancy.figures import value_words
+from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
+from rockcheck.validation.discrepancy.measures import DIFFERENCES
+from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
+from rockcheck.validation.suite.across import difference
+from rockcheck.validation.suite.results import Run
+
+#: Value of --align without a time.
+BEST = "best"
+
+
+def run(
+    reference: Annotated[
+        Path,
+        typer.Argument(
+            metavar="A", help="History of the reference, CSV; or a finished run's folder."
+        ),
+    ],
+    candidate: Annotated[
+        Path,
+        typer.Argument(metavar="B", help="History of the candidate, CSV; or a later run's folder."),
+    ],
+    align: Annotated[
+        str | None,
+        typer.Option(
+            "--align",
+            metavar="[SECONDS]",
+            help="Shift the candidate in time, by SECONDS, else to where the rotations agree best.",
+        ),
+    ] = None,
+    until: Annotated[
+        float | None,
+        typer.Option("--until", help="End of the window, s (default: the whole common time)."),
+    ] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(
+            "--scene", help="Scene of both: its block and gravity.", autocompletion=scene_names
+        ),
+    ] = None,
+    plot: PlotOption = None,
+) -> None:
+    """Compare two histories, or two finished runs.
+
+    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict
+    or a cell changed.
+
+    Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
+    time_ms, x_mm, ...). --plot draws both rotations and their difference.
+    """
+    from rockcheck.reports import document
+
+    if reference.is_dir() or reference.suffix == ".json":
+        from rockcheck.validation.studies.conformance import study
+
+        if study.wrote(reference):
+            told(study.changes(reference, candidate))
+    if reference.is_dir() or candidate.is_dir():
+        told(difference(Run.load(reference), Run.load(candidate)))
+    if plot is not None:
+        check_file(plot, "--plot")
+    what = load_scene(scene) if scene else None
+    try:
+        offset = 0.0 if align == BEST else float(align or 0.0)
+    except ValueError:
+        raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
+    given, other = read_measured(reference), read_measured(candidate)
+    shift = time_shift(given, other) if align == BEST else offset
+    found = compare(given, shifted(other, shift), until=until, scene=what)
+    finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
+    document.show(finding, console())
+    if plot is not None:
+        save_figure(found.plot(), plot)
+    answer(finding.as_dict())
+
+
+def _finding(
+    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
+) -> Finding:
+    motions = {role: motion_of(history, scene) for role, history in histories.items()}
+    rows = [
+        [
+            figure.label,
+            value_words(figure.value, yes_no=DIFFERENCES[figure.measure].yes_no),
+            "" if DIFFERENCES[figure.measure].yes_no else figure.unit,
+            figure.note,
+        ]
+        for figure in found.figures
+    ]
+    models = f"{found.candidate} against {found.reference}"
+    words = {role: motion.words() for role, motion in motions.items()}
+    notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
+    blocks: list[Block] = [
+        Text(headline(found)),
+        Text(facts=[(role, ", ".join(said)) for role, said in words.items() if said]),
+        Text(f"{models}, {found.start:g} to {found.end:g} s"),
+        Table(
+            "comparison",
+            [text("measure"), Column("value"), text("unit"), text("note", " ")],
+            rows,
+        ),
+        Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
+        Text(f"not the whole time: {found.gap}" if found.gap else ""),
+        Text(items=notes, verdict="changed"),
+    ]
+    return Finding(
+        "comparison",
+        models,
+        "",
+        blocks,
+        {
+            "reference": found.reference,
+            "candidate": found.candidate,
+            "start": found.start,
+            "end": found.end,
+            "shift": shift,
+            "gap": found.gap,
+            "headline": headline(found),
+            "motion": {role: motion.model_dump() for role, motion in motions.items()},
+            "notes": {role: history.notes for role, history in histories.items()},
+            "figures": [
+                {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}
+                for f in found.figures
+            ],
+        },
+    )
+
+
+def headline(found: Discrepancy) -> str:
+    """The comparison in one sentence: whether outcomes agree, and how far rotations differ.
+
+    The difference is an RMS value.
+    """
+    assert found.histories is not None
+    reference, candidate = (history.fate for history in found.histories)
+    fate = (
+        f"same outcome, {candidate}"
+        if found["outcome_agrees"] == 1.0
+        else f"outcomes differ, {candidate} against {reference}"
+    )
+    rms = found.figure("theta_rms")
+    apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
+    return f"{fate}{apart}"
