@@ -50,13 +50,11 @@ PRINTED, FEW = 25, 40
 
 #: Studies of other commands that may stand beside a run.
 STUDIES = (
-    ("Convergence", "convergence/index.html"),
+    ("Assessment", "assess/index.html"),
     ("Benchmark", "benchmark/index.html"),
     ("Stress", "stress/index.html"),
     ("Conformance", "conformance/index.html"),
     ("Overturning spectra", "spectrum/index.html"),
-    ("Incremental dynamic analysis", "ida/index.html"),
-    ("Fragility", "fragility/index.html"),
     ("Trend", "trend/index.html"),
 )
 

@@ -2,6 +2,7 @@
 are reproducible."""
 
 import html
+import inspect
 import re
 from dataclasses import replace
 
@@ -9,9 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rockcheck.commands import OUT, studies
 from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.show.words import number
-from rockcheck.reports.site import PAGES, write_site
+from rockcheck.reports.site import PAGES, STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, use, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History
@@ -293,3 +295,10 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
         curve.y, [np.mean((sample.peaks <= peak) & ~sample.fallen) for peak in curve.x], atol=1e-12
     )
     assert np.max(np.abs(below.series[0].y)) == pytest.approx(figures["ks_distance"], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["assess", "benchmark", "conformance", "spectrum", "stress"])
+def test_the_front_page_links_what_other_commands_write_beside_a_run(name):
+    given = inspect.signature(getattr(studies, name)).parameters
+    out = given["out"].default if "out" in given else given["played"].default.out
+    assert f"{out.relative_to(OUT)}/index.html" in dict(STUDIES).values()
