@@ -22,7 +22,7 @@ has not (ROCK, LEAN).
 
 import math
 
-from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
+from rockcheck.ebm.core import contacts, coulomb, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, note
@@ -89,9 +89,6 @@ def after_event(block, base, run):
     flat = motion.theta == 0.0 and motion.w == 0.0
     stands = flat and (motion.vx == 0.0 or which == Guard.SLIP)
     begins = stands or math.isnan(state.zeta)
-    if stands:
-        # As the push of the floor ends, friction fails: what moves in between is rounding.
-        state.t = ground.weightless_at(base.vertical, state.t)
     state.winds = not begins
     coulomb.select(block, base, run)
     slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
@@ -115,16 +112,14 @@ def _share(block, run):
 
 @inner_kernel
 def _turn(run):
-    """The pivot slips back, or z comes to the sense of slip: from then on the pivot loads.
+    """The pivot slips back, or begins to load as z comes to the sense of slip.
 
     At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
     """
-    state, mode = run.state, run.state.mode
+    state = run.state
     modes.slacken(state)
-    if state.guard == Guard.LOADS:
-        state.zeta = 0.0
-        return
-    yielded = not state.winds
-    state.winds, mode.slip = True, -mode.slip
-    if yielded:
-        note(run, Event.STICKS, state.before)
+    if state.guard == Guard.SLIP:
+        yielded = not state.winds
+        state.winds, state.mode.slip = True, -state.mode.slip
+        if yielded:
+            note(run, Event.STICKS, state.before)

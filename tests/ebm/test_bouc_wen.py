@@ -2,6 +2,7 @@
 model and its own limits."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from rockcheck.scenes import (
 )
 from rockcheck.scenes.scene import PAPER_BLOCK
 
+FAULTS = Path(__file__).parents[1] / "data" / "found_faults"
 G = 9.81
 
 
@@ -154,7 +156,7 @@ def test_a_block_that_leans_on_the_wall_stays():
             duration=3.0,
         )
     )
-    assert set(history.channels["mode"]) == {"lean"}
+    assert (set(history.channels["mode"]), history.cost.rules) == ({"lean"}, {})
     assert history.channels["theta"] == pytest.approx(tilt, abs=1e-4)
 
 
@@ -220,3 +222,12 @@ def test_a_block_slides_as_with_coulombs_friction_without_a_turn(scene, moves, a
     assert np.max(np.abs(exact.channels["x"])) > moves
     np.testing.assert_allclose(smooth.channels["x"], exact.channels["x"], rtol=0.0, atol=apart)
     assert (smooth.peak_rotation, smooth.cost.rules) == (0.0, {})
+    assert [event.kind for event in smooth.event_list] == [event.kind for event in exact.event_list]
+
+
+def test_a_slide_that_is_rounding_does_not_choose_the_side_to_which_a_block_tips():
+    scene = load_scene(FAULTS / "rests-but-for-rounding-as-gravity-vanishes.toml")
+    assert [one.peak_rotation for one in (EventBasedModel().simulate(scene), bouc_wen(scene))] == [
+        0.0,
+        0.0,
+    ]
