@@ -22,7 +22,7 @@ has not (ROCK, LEAN).
 
 import math
 
-from rockcheck.ebm.core import contacts, coulomb, guards, modes, series
+from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, note
@@ -90,6 +90,9 @@ def after_event(block, base, run):
     stands = flat and (motion.vx == 0.0 or which == Guard.SLIP)
     begins = stands or math.isnan(state.zeta)
     state.winds = not begins
+    if stands:
+        # As the push of the floor ends, friction fails: what moves in between is rounding.
+        state.t = ground.weightless_at(base.vertical, state.t)
     coulomb.select(block, base, run)
     slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
     if begins and not (slides and which == Guard.SLIP):

@@ -194,6 +194,16 @@ def _soon(g, t):
 
 
 @inner_kernel
+def weightless_at(g, t):
+    """The time at which vertical base motion begins to fall away with more than 1 g.
+
+    Only if it does so between t and soon after t; else t.
+    """
+    now, after = 1.0 + acceleration(g, t), 1.0 + acceleration_after(g, t)
+    return t + (_soon(g, t) - t) * now / (now - after) if now > 0.0 > after else t
+
+
+@inner_kernel
 def _root_of_square(a, b, c, branch):
     """One root of a q^2 + b q + c; -1 where it is none."""
     if a == 0.0:
