@@ -27,6 +27,7 @@ __all__ = [
     "pack_pulses",
     "play_ensemble",
     "run_batch",
+    "run_decided",
 ]
 Floats = NDArray[np.float64]
 #: Runs of a batch, and scenes of an ensemble, that a thread takes at once.
@@ -118,6 +119,22 @@ def run_batch(
         why = FAILURES[int(outcomes.ending[first])]
         raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
     return outcomes
+
+
+def run_decided(
+    packed: Packed,
+    model: EventBasedModel,
+    *,
+    jobs: int | None = None,
+    on_progress: OnProgress = unheard,
+) -> Outcomes:
+    """`run_batch` until all is decided; a run that fails is made once more by `model.finer()`."""
+    found = run_batch(packed, model, strict=False, jobs=jobs, on_progress=on_progress)
+    if (again := found.failed).any():
+        finer = run_batch(Packed(rows=packed.part(again)), model.finer(), strict=False, jobs=jobs)
+        for mine, better in zip(vars(found).values(), vars(finer).values(), strict=True):
+            mine[again] = better
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)

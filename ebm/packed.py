@@ -35,7 +35,7 @@ class Packed:
     def __len__(self) -> int:
         return len(self.rows.durations)
 
-    def part(self, part: slice) -> Rows:
+    def part(self, part: slice | NDArray[np.bool_]) -> Rows:
         """Some of the runs. The samples stay those of all."""
         rows = self.rows
         return Rows(

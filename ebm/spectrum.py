@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rockcheck.ebm.model import FINEST, EventBasedModel
+from rockcheck.ebm.model import EventBasedModel
 from rockcheck.scenes import Block, InputError, Record, Scene
 from rockcheck.scenes.base import Shown
 from rockcheck.scenes.errors import check_kind
@@ -172,14 +172,9 @@ def play_nodes(
     """
     from rockcheck.ebm import batch
 
-    sides, failed = np.zeros(len(amplitude_ratios), np.int8), np.ones(len(amplitude_ratios), bool)
-    finer = model.model_copy(update={"tolerance": max(1e-2 * model.tolerance, FINEST)})
-    for player, told in ((model, on_progress), (finer, unheard)):
-        if failed.any():
-            packed = _packed(scene, amplitude_ratios[failed], frequency_ratios[failed], player)
-            found = batch.run_batch(packed, player, jobs=jobs, on_progress=told, strict=False)
-            sides[failed], failed[failed] = found.side, found.failed
-    return sides, failed
+    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
+    found = batch.run_decided(packed, model, jobs=jobs, on_progress=on_progress)
+    return found.side, found.failed
 
 
 def _packed(

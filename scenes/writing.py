@@ -1,4 +1,4 @@
-"""Writing: files that are complete or untouched, tables as CSV, values as JSON."""
+"""Writing: files that are complete or untouched; tables as CSV, values as JSON, cases as JUnit."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from rockcheck.scenes.errors import InputError, inert, printable
 
@@ -164,6 +164,27 @@ def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str
     return "\n".join(
         "| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines
     )
+
+
+#: A case of JUnit: place, name, what came of it ("" for a pass), reason, verdict, and time (s).
+Case = tuple[str, str, Literal["", "failed", "error", "skipped"], str, str, float | None]
+
+
+def junit_text(name: str, suites: Iterable[tuple[str, Iterable[Case]]]) -> str:
+    """JUnit XML: suites by their names, and their cases."""
+    from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
+
+    kinds = {"failed": Failure, "error": Error, "skipped": Skipped}
+    document = JUnitXml(inert(name))  # XML allows no control characters
+    for title, cases in suites:
+        suite = TestSuite(inert(title))
+        for place, what, found, reason, verdict, seconds in cases:
+            case = TestCase(inert(what), inert(place), seconds)
+            case.result = [kinds[found](inert(reason), verdict)] if found else []
+            suite.append(case)  # `add_testcase` and `add_testsuite` search all added before
+        document.append(suite)
+    document.update_statistics()
+    return bytes(document.tostring()).decode() + "\n"
 
 
 def finite(value: Any) -> Any:

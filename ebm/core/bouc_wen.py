@@ -93,7 +93,7 @@ def after_event(block, base, run):
     if stands:
         # As the push of the floor ends, friction fails: what moves in between is rounding.
         state.t = ground.weightless_at(base.vertical, state.t)
-    coulomb.select(block, base, run)
+    coulomb.follow(block, base, run)
     slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
     if begins and not (slides and which == Guard.SLIP):
         state.zeta = _share(block, run)

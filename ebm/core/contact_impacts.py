@@ -43,6 +43,7 @@ WORK = 20
 _SETS = np.array(
     [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in CONTACT_SETS]
 )
+_LARGEST_FIRST = np.argsort(-_SETS[:, 0], kind="stable")
 # By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
 _WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
 for _bits in range(1 << CONTACTS):
@@ -126,12 +127,6 @@ def contact_rows(b, sense, phi, rows):
 @inner_kernel
 def _dot(row, v):
     return row[0] * v[0] + row[1] * v[1] + row[2] * v[2]
-
-
-@inner_kernel
-def _mass_dot(spin, row, column):
-    """Row times inverse mass times column: unit mass, moment of inertia 1/spin."""
-    return row[0] * column[0] + row[1] * column[1] + spin * row[2] * column[2]
 
 
 @inner_kernel
@@ -435,7 +430,7 @@ def contact_impact(block, impact, state, work):
         # Impacts that alternate between floor and wall without end become plastic.
         plastic = 2 * number >= _MOST_STAGES
         if not _approaches(block, impact, stage, plastic, rounding):
-            _close(block.spin, stage, impact)
+            _close(block, stage, impact)
             return found
         _choose(Law.MOREAU if plastic else block.law, impact, stage, number, rounding)
         before = kinetic_energy(block.spin, v)
@@ -487,37 +482,20 @@ def _strike_without_gain(block, stage, v, before):
 
 
 @called_kernel
-def _close(spin, stage, impact):
+def _close(block, stage, impact):
     """Closes the contacts that part more slowly than `resting`.
 
-    The velocity is projected onto them, mass-orthogonally.
+    They strike without rebound and without friction: as many as have a solution, the floor's first.
     """
-    rows, v = stage.rows, impact.v
-    members, count = stage.lam, 0
+    v = impact.v
     for j in range(CONTACTS):
-        slow = abs(_dot(rows[j], v)) < impact.resting
-        if impact.touching[j] != 0.0 and count < 3 and slow:
-            members[count] = j
-            count += 1
-    while count > 0 and not _project(spin, stage, v, count):
-        count -= 1
-
-
-@inner_kernel
-def _project(spin, stage, v, count):
-    """Takes the rates of the first `count` contacts in `lam` out of the velocity.
-
-    False where their rows are parallel.
-    """
-    rows, system, members = stage.rows, stage.system, stage.lam
-    for i in range(count):
-        row = rows[int(members[i])]
-        for j in range(count):
-            system[i, j] = _mass_dot(spin, row, rows[int(members[j])])
-        system[i, count] = -_dot(row, v)
-    if not solve(system, count):
-        return False
-    for i in range(count):
-        for k in range(3):
-            v[k] += (spin if k == 2 else 1.0) * rows[int(members[i]), k] * system[i, count]
-    return True
+        slow = abs(_dot(stage.rows[j], v)) < impact.resting
+        stage.taking[j] = 1.0 if impact.touching[j] != 0.0 and slow else 0.0
+        stage.target[j] = 0.0
+    others = ~_bits_of(stage.taking)
+    for number in _LARGEST_FIRST:
+        inside = _SETS[number, 4] & others == 0
+        if inside and _try_set(block, stage, v, number, Friction.FREE):
+            for k in range(3):
+                v[k] = stage.trial[k]
+            return

@@ -7,7 +7,7 @@ How to add a law of friction: a module beside this one, with the same doors.
 - `locate`: `tau` and `guard`. `fill_guards`, then `drop` for the cone and slip guards that the law
   has not, then `first_event`.
 - `advance`: the law's own variable at the end of the step; a field of STATE, set by `march.begin`.
-- `after_event`, at the start, after an impact and after a guard: the mode that follows (`select`),
+- `after_event`, at the start, after an impact and after a guard: the mode that follows (`follow`),
   and the event (`tell`).
 
 Friction that is known with the motion stands in `motion.friction` and `motion.flat_series`; what a
@@ -84,13 +84,13 @@ def after_event(block, base, run):
     """Selects the mode that follows, and notes the event unless the mode goes on."""
     state = run.state
     if not state.known:
-        select(block, base, run)
+        follow(block, base, run)
     state.known = False
     tell(run, state.event)
 
 
 @inner_kernel
-def select(block, base, run):
+def follow(block, base, run):
     """Selects the mode that follows, and names the event: UNTOLD where the mode goes on."""
     state, ended = run.state, code_of(run.state.mode)
     if state.guard > Guard.FAR_GAP:

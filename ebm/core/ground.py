@@ -141,21 +141,15 @@ def fill_series(g, t, sign, n, a, row):
     if g.form.kind == Shape.GAUSSIAN:
         _fill_gaussian(g, t, sign, n, a, row)
         return
+    value, rate = _with_rate(g, t)
     for k in range(n + 1):
         a[row, k] = 0.0
-    if g.form.kind == Shape.SINE and t < g.form.quiet:
-        a[row, 0] = sign * g.form.c0 * math.sin(g.form.rate * t)
-        if n > 0:
-            a[row, 1] = sign * g.form.c0 * g.form.rate * math.cos(g.form.rate * t)
+    a[row, 0] = sign * value
+    if n > 0:
+        a[row, 1] = sign * rate
+    if g.form.kind == Shape.SINE:
         for k in range(2, n + 1):
             a[row, k] = -g.form.rate * g.form.rate * a[row, k - 2] / (k * (k - 1))
-    elif g.form.kind == Shape.SAMPLED:
-        i = interval(g, t)
-        if i + 1 < g.samples.size:
-            rise = g.samples[i + 1] - g.samples[i]
-            a[row, 0] = sign * (g.samples[i] + (t / g.form.step - i) * rise)
-            if n > 0:
-                a[row, 1] = sign * rise / g.form.step
 
 
 @inner_kernel

@@ -2,13 +2,11 @@
 
 import math
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
-from junitparser import Error, Failure, JUnitXml, Skipped, TestCase, TestSuite
-
-from rockcheck.scenes.errors import inert, printable
-from rockcheck.scenes.writing import markdown_table
+from rockcheck.scenes.errors import printable
+from rockcheck.scenes.writing import Case, junit_text, markdown_table
 from rockcheck.validation.discrepancy.figures import Figure, value_words
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, text
 from rockcheck.validation.suite.results import (
@@ -314,53 +312,32 @@ def junit(run: Run) -> str:
     installed, are failures only in a strict run; a better figure only if the run is strict both
     ways. A check that is not defined is skipped.
     """
-    document = JUnitXml(f"rockcheck {inert(run.suite)}")  # XML allows no control characters
-    suites = [
+    suites: list[tuple[str, list[Case]]] = [
         (scene, [case for cell in cells.values() for case in _cases(cell, run.strict)])
         for scene, cells in run.by_scene().items()
     ]
-    faults = [_case("tolerances", fault, Failure, fault) for fault in run.faults]
-    for name, cases in [*suites, *([("tolerances", faults)] if faults else [])]:
-        suite = TestSuite(inert(name))
-        suite.extend(cases)
-        document.append(suite)  # `add_testsuite` searches all suites added before
-    document.update_statistics()
-    return bytes(document.tostring()).decode() + "\n"
+    faults: list[Case] = [("tolerances", fault, "failed", fault, "", None) for fault in run.faults]
+    return junit_text(
+        f"rockcheck {run.suite}", [*suites, *([("tolerances", faults)] if faults else [])]
+    )
 
 
-def _cases(cell: Cell, strict: Strict) -> Iterator[TestCase]:
+def _cases(cell: Cell, strict: Strict) -> Iterator[Case]:
     place = f"{cell.scene}.{cell.model}"
-    ways = {
-        "failed": Error,
-        "absent": Failure if strict else Skipped,
-        "unavailable": Skipped,
+    came: Mapping[str, Any] = {
+        "failed": "error",
+        "absent": "failed" if strict else "skipped",
+        "unavailable": "skipped",
     }
-    ran = _case(place, "runs", ways.get(cell.status), cell.reason)
-    ran.time = 0.0 if cell.read_back else cell.cost.worker_seconds
-    yield ran
+    seconds = 0.0 if cell.read_back else cell.cost.worker_seconds
+    yield place, "runs", came.get(cell.status, ""), cell.reason, "", seconds
     if cell.numerical is not None:
-        yield _case(
-            place,
-            "converged",
-            None if cell.converged else Skipped,
-            "; ".join(cell.numerical.reasons),
-        )
+        reasons = "; ".join(cell.numerical.reasons)
+        yield place, "converged", "" if cell.converged else "skipped", reasons, "", None
     for check in cell.checks:
-        failure = Failure if check.fails(strict) else None
-        result = Skipped if check.verdict == "not defined" else failure
-        yield _case(place, check.figure.title, result, check.reason, check.verdict)
-
-
-def _case(
-    place: str,
-    name: str,
-    result: type[Failure | Error | Skipped] | None,
-    reason: str,
-    verdict: str = "",
-) -> TestCase:
-    case = TestCase(inert(name), inert(place))
-    case.result = [] if result is None else [result(inert(reason), verdict)]
-    return case
+        wrong = "failed" if check.fails(strict) else ""
+        found: Any = "skipped" if check.verdict == "not defined" else wrong
+        yield place, check.figure.title, found, check.reason, check.verdict, None
 
 
 def markdown(run: Run) -> str:

@@ -57,12 +57,10 @@ def play(scenes: Sequence[Scene], player: Any) -> Runs:
     Raises `InputError` where the model cannot play one of them.
     """
     if compiled(player):
-        found = _batch(scenes, player, strict=False, jobs=1)
+        from rockcheck.ebm.batch import pack, run_decided
+
+        found = run_decided(pack(scenes, player), player, jobs=1)
         side, peak, failed = found.side, found.peak, found.failed
-        if failed.any():
-            again = [scene for scene, fault in zip(scenes, failed, strict=True) if fault]
-            finer = _batch(again, player.finer(), strict=False, jobs=1)
-            side[failed], peak[failed], failed[failed] = finer.side, finer.peak, finer.failed
     else:
         rows = [_one(scene, player) for scene in scenes]
         side, peak, failed = (np.array(column) for column in zip(*rows, strict=True))
@@ -72,12 +70,6 @@ def play(scenes: Sequence[Scene], player: Any) -> Runs:
         failed=failed.tolist(),
         figures={"peak_rotation": rotations.tolist()},
     )
-
-
-def _batch(scenes: Sequence[Scene], model: EventBasedModel, **how: Any) -> Any:
-    from rockcheck.ebm.batch import pack, run_batch
-
-    return run_batch(pack(scenes, model), model, **how)
 
 
 def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
@@ -371,9 +363,11 @@ def sensitivities(
     """
     from scipy.stats import sobol_indices
 
+    from rockcheck.ebm.batch import pack, run_batch
+
     def peak_and_fall(points: Floats) -> Floats:
         scenes = [given.at(row) for row in points.T]
-        found = _batch(scenes, model, until_decided=False)
+        found = run_batch(pack(scenes, model), model, until_decided=False)
         alphas = np.array([scene.block.alpha for scene in scenes])
         return np.array([np.minimum(found.peak / alphas, 1.0), found.side != 0], dtype=float)
 
