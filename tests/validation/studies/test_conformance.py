@@ -257,6 +257,7 @@ def test_another_program_takes_part_by_files(exported, histories, tmp_path, told
         len(PHENOMENA),
     )
     (exported / "coast.csv").unlink()
+    (exported / "engine.toml").write_text('engine = "bell\\u0007"\n')  # which XML does not allow
     (card,) = told(*words, code=1)["cards"]
     assert [row["id"] for row in card["phenomena"] if row["verdict"] == "error"] == ["RC-05"]
 
