@@ -37,9 +37,9 @@ def _candidates() -> np.ndarray:
 
     A pushing floor comes before a pulling one: where friction jams (Painleve), both may fit, and
     what pulls may grow without bound. Then more contacts come first, and sticking before slipping.
-    Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or left,
-    2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses are
-    relative to that of `tips_first`.
+    Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or
+    left, 2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses
+    are relative to that of `tips_first`.
     """
     stands = [
         (Family.FLAT, 1, Pivot.STICK, 0, pull, walls, 0)
