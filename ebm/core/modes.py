@@ -13,7 +13,6 @@ goes on with a *slack*: the noise that its guards are allowed. Each further such
 instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
 
-import itertools
 import math
 from typing import NamedTuple
 
@@ -35,8 +34,7 @@ SOON = 1e-6
 def _candidates() -> np.ndarray:
     """All modes in the order of trial.
 
-    A pushing floor comes before a pulling one: where friction jams (Painleve), both may fit, and
-    what pulls may grow without bound. Then more contacts come first, and sticking before slipping.
+    More contacts come first, sticking before slipping, a pushing floor before a pulling one.
     Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or
     left, 2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses
     are relative to that of `tips_first`.
@@ -51,12 +49,13 @@ def _candidates() -> np.ndarray:
     rows = [*stands, (Family.TILT, 1, Pivot.STICK, 0, 1, 0, 1)]
     for family, sense in ((Family.FLAT, 1), (Family.TILT, 1), (Family.TILT, -1)):
         pivot = ((Pivot.STICK, 0), (Pivot.SLIPPING, -1), (Pivot.SLIPPING, 1))
-        for pull, walls in itertools.product((1, -1), (3, 1, 2, 0)):
-            off = [(Pivot.OFF, 0)] * (pull > 0)
-            rows += [
-                (family, sense, floor, slip, pull, walls, 0)
-                for floor, slip in (*pivot[family == Family.FLAT :], *off)
-            ]
+        for walls in (3, 1, 2, 0):
+            for pull in (1, -1):
+                rows += [
+                    (family, sense, floor, slip, pull, walls, 0)
+                    for floor, slip in pivot[family == Family.FLAT :]
+                ]
+            rows.append((family, sense, Pivot.OFF, 0, 1, walls, 0))
     return np.array(rows)
 
 

@@ -359,7 +359,7 @@ def _contact_rows(acting, a):
 def _contact_series(block, state, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term; returns the order.
 
-    The matrix of the unknown forces is the same for each term.
+    The matrix of the unknown forces is the same for each term. P is NaN where none is to begin.
     """
     mode = state.mode
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
@@ -408,6 +408,9 @@ def _contact_series(block, state, order, enough, reach, a):
         if small == 3:
             order = i
             break
+    # Beyond Painleve's limit an approach is answered by less push: such a motion does not begin.
+    if not a[Row.INVERSE, 0] > 0.0:
+        a[Row.P, 0] = np.nan
     i = order
     a[Row.OMEGA, i] = 0.0
     a[Row.P, i] = a[Row.P, i - 1] = a[Row.Q, i] = a[Row.Q, i - 1] = a[Row.NA, i] = a[
