@@ -402,8 +402,7 @@ def contact_impact(block, impact, state, work):
     """All stages of an `Impact`; returns what came of it, a Found.
 
     `work` is scratch, such as that of the root search: `WORK` rows. The state gathers the normal
-    impulses of floor and walls, counts the stages that added energy and keeps the largest relative
-    gain.
+    impulses, counts the stages that added energy and keeps the largest relative gain.
     """
     v, touching, rows = impact.v, impact.touching, work[:7]
     # The impulses and velocities of a trial stand below the system.
@@ -456,10 +455,7 @@ def contact_impact(block, impact, state, work):
 def _end_stage(stage, v, state):
     """Gathers the impulses of a stage, and makes its velocities those of the block."""
     for j in range(CONTACTS):
-        if j <= Contact.OTHER:
-            state.floor_impulse += stage.part[j]
-        else:
-            state.wall_impulse += stage.part[j]
+        state.impulse += stage.part[j]
     for k in range(3):
         v[k] = stage.after[k]
 

@@ -90,7 +90,7 @@ def begin(block, base, run):
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
     state.quiet_from = quiet_from(base, state.tolerance_rad)
     state.steps = state.events = state.wall_impacts = state.rows = state.gains = 0
-    state.largest_gain = state.floor_impulse = state.wall_impulse = 0.0
+    state.largest_gain = state.impulse = 0.0
     state.rules[:] = 0
     state.winds = state.known = False
     state.began = state.place = 0.0
@@ -133,10 +133,10 @@ def resolve(block, base, run):
     state.event = Event.UNTOLD
     modes.leave(state, KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
-        state.floor_impulse = state.wall_impulse = 0.0
+        state.impulse = 0.0
         resting = settle.settling_speed(state)
         state.event, state.known = strike(block, base, run, resting)
-        if state.floor_impulse + state.wall_impulse > 0.0:
+        if state.impulse > 0.0:
             modes.forget(state)  # a new motion: all modes may be tried again
         elif block.unilateral:
             state.event = Event.UNTOLD  # a block in flight passes theta = 0

@@ -409,7 +409,7 @@ def _contact_series(block, state, order, enough, reach, a):
             order = i
             break
     # Beyond Painleve's limit an approach is answered by less push: such a motion does not begin.
-    if not a[Row.INVERSE, 0] > 0.0:
+    if floor and not a[Row.INVERSE, 0] > 0.0:
         a[Row.P, 0] = np.nan
     i = order
     a[Row.OMEGA, i] = 0.0

@@ -107,9 +107,8 @@ STATE = record(
     counted="i8",
     full="i8",
     at_once="i8",
-    # Impulses of the last impact.
-    floor_impulse="f8",
-    wall_impulse="f8",
+    # Normal impulse of the last impact, of all contacts together.
+    impulse="f8",
     # Bouc-Wen friction: its variable z, and whether that winds, the pivot not having yielded.
     zeta="f8",
     winds="?",
@@ -240,4 +239,4 @@ def note(run, event, before):
         strikes = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
         log[count, 0], log[count, 1], log[count, 2] = state.t, event, before
         log[count, 3] = 0 if event == Event.SETTLED else mode_code(state)
-        log[count, 4] = state.floor_impulse + state.wall_impulse if strikes else 0.0
+        log[count, 4] = state.impulse if strikes else 0.0

@@ -132,7 +132,7 @@ def _floor_impact(block, state, resting):
     S1, c = mode.sense, block.height
     s1, s2 = side_of(block, S1).arm, side_of(block, -S1).arm
     if on_wall(mode):  # from LADDER: every contact plastic, flush rest
-        state.floor_impulse = abs(motion.vy)
+        state.impulse = abs(motion.vy)
         contacts.stop(motion)
         return False
     if contacts.wall_gap(block, motion, -S1) < contacts.CLOSED:
@@ -140,14 +140,14 @@ def _floor_impact(block, state, resting):
         # is silent).
         state.rules[Rule.FLUSH_LANDING] += 1
         e = block.e_right if S1 > 0 else block.e_left
-        state.floor_impulse = (1.0 + e) * s1 * abs(w1)
+        state.impulse = (1.0 + e) * s1 * abs(w1)
         motion.w = -e * w1 if e * abs(w1) > resting else 0.0
         motion.vx = (-e * v1 if S1 * v1 > 0.0 else v1) - c * motion.w
         motion.vy = S1 * s1 * motion.w
         return False
     mu_s = block.mu_s if not block.no_slip else np.inf
     form, w2, v2, p = impacts.floor_impact(block, S1, w1, v1, mu_s, block.mu_k)
-    state.floor_impulse = p
+    state.impulse = p
     motion.w, motion.vx, motion.vy = w2, v2 - c * w2, -S1 * s2 * w2
     if form == Landing.HELD_FAST and abs(w2) > SETTLE:
         place(mode, Family.TILT, -S1, Pivot.STICK, 0)
@@ -165,13 +165,13 @@ def _wall_impact(block, state, tip, resting):
     # Wedged: between both walls at once nothing rebounds.
     if contacts.between_walls(block, motion) or on_wall(mode):
         state.rules[Rule.WEDGED] += 1
-        state.wall_impulse = abs(motion.vx)
+        state.impulse = abs(motion.vx)
         contacts.stop(motion)
         return False
     left = tip if mode.family == Family.FLAT else (mode.sense > 0) == tip
     e = block.e_left if left else block.e_right
     if mode.family == Family.FLAT:
-        state.wall_impulse = (1.0 + e) * abs(motion.vx)
+        state.impulse = (1.0 + e) * abs(motion.vx)
         motion.vx = -e * motion.vx if e * abs(motion.vx) > resting else 0.0
         return False
     return _corner_impact(block, state, 1.0 if tip else -1.0, e, resting)
@@ -196,7 +196,7 @@ def _corner_impact(block, state, sw, e, resting):
     before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / block.spin
     corner = impacts.Corner(1.0, sw, s, c, sw * cp, side.share, block.spin)
     branch, w2, xdot2, n, p, v2 = impacts.wall_impact(block, corner, e, w1, xdot1)
-    state.floor_impulse, state.wall_impulse = abs(p), n
+    state.impulse = abs(p) + n
     count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / block.spin, state)
     C = corner.C
     stays = e == 0.0 and branch != Branch.B_STICK and branch != Branch.E_SLIP

@@ -158,5 +158,5 @@ def test_nothing_rebounds_between_two_walls(gap, leans):
     mode = {"family": Family.TILT if leans else Family.FLAT, "sense": 1, "tip": leans}
     state = run_at([0.0, math.cos(0.4), 0.1 * leans, -0.3, 0.1, 0.2], **mode).state
     assert not strike._wall_impact(b, state, False, 1e-9)
-    assert (state.rules[Rule.WEDGED], state.rules.sum(), state.wall_impulse) == (1, 1, 0.3)
+    assert (state.rules[Rule.WEDGED], state.rules.sum(), state.impulse) == (1, 1, 0.3)
     assert six(state.motion)[3:].tolist() == [0.0, 0.0, 0.0]
