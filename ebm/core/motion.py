@@ -331,7 +331,9 @@ def _wall_arms(side, s, c):
 def _contact_rows(acting, a):
     """Writes constraint rows, force columns (xi, y, moment) and the inverse of their matrix.
 
-    They are those at the start of the step. Returns their number.
+    They are those at the start of the step. Returns their number. Beyond Painleve's limit, where
+    the floor answers an approach with less push, the inverse is NaN, and with it the motion: it
+    does not begin.
     """
     s, c, kappa = a[Row.SIN, 0], a[Row.COS, 0], acting.kappa
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
@@ -352,6 +354,8 @@ def _contact_rows(acting, a):
             a[row, j] = a[i, 0] * a[column, 0] + a[i, 1] * a[column, 1]
             a[row, j] += acting.spin * a[i, 2] * a[column, 2]
     inverse_of(a, Row.MATRIX, Row.INVERSE, n)
+    if acting.floor and not a[Row.INVERSE, 0] > 0.0:
+        a[Row.INVERSE, 0] = np.nan
     return n
 
 
@@ -359,7 +363,7 @@ def _contact_rows(acting, a):
 def _contact_series(block, state, order, enough, reach, a):
     """Newton-Euler with the mode's constraints, solved term by term; returns the order.
 
-    The matrix of the unknown forces is the same for each term. P is NaN where none is to begin.
+    The matrix of the unknown forces is the same for each term.
     """
     mode = state.mode
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
@@ -408,9 +412,6 @@ def _contact_series(block, state, order, enough, reach, a):
         if small == 3:
             order = i
             break
-    # Beyond Painleve's limit an approach is answered by less push: such a motion does not begin.
-    if floor and not a[Row.INVERSE, 0] > 0.0:
-        a[Row.P, 0] = np.nan
     i = order
     a[Row.OMEGA, i] = 0.0
     a[Row.P, i] = a[Row.P, i - 1] = a[Row.Q, i] = a[Row.Q, i - 1] = a[Row.NA, i] = a[
