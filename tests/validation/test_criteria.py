@@ -98,6 +98,8 @@ def test_a_sine_overturns_without_impact_from_its_integral_on(ratio, amplitude, 
     pulse = factor * amplitude * np.sin(ratio * times)
     assert criteria.overturns_without_impact(times, pulse) is falls
     assert not criteria.overturns_without_impact(times, 0.9 * pulse / np.max(pulse))
+    # Two samples: it begins between them, where (1 - 1/k) (1 + k exp(2/k - 2)) = 1 in the limit.
+    assert criteria.overturns_without_impact([0.0, 2.0], [0.0, 2.3430686875 * factor]) is falls
 
 
 @pytest.mark.parametrize(("duration", "peak"), [(1.2, 1.0), (1.5, 9.0)])
