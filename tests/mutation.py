@@ -3,11 +3,10 @@ and runs the tests that should fail.
 
 A sample of all faults that the operators below can make, drawn with a seed: comparisons that
 include their limit or do not, signs, products for quotients, `and` for `or`, negated conditions,
-changed numbers. Each is planted in a copy of the packages, which is interpreted
-(NUMBA_DISABLE_JIT=1), but for the files that are `compiled`. Faults that survive are printed with
-file and line. Files, tests and the faults that nothing can notice are in data/mutation.toml.
-Arguments: `--sample N` faults a file, `--seed N`, `--file NAME` (repeatable), and after `--` what
-pytest is given, too.
+changed numbers. Each is planted in a copy of the packages of its own, and as many are tried at a
+time as there are cores. Faults that survive are printed with file and line. Files, tests and the
+faults that nothing can notice are in data/mutation.toml. Arguments: `--sample N` faults a file,
+`--seed N`, `--file NAME` (repeatable), and after `--` what pytest is given, too.
 """
 
 import ast
@@ -20,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Annotated
 
@@ -28,7 +28,6 @@ import typer
 ROOT = Path(__file__).parents[1]
 #: Where faults are planted, the tests that should notice them, and faults that nothing can notice.
 DATA = tomllib.loads((ROOT / "tests" / "data" / "mutation.toml").read_text(encoding="utf-8"))
-COMPILED = {target["file"] for target in DATA["target"] if "compiled" in target}
 #: What hangs is noticed: after so long in the processor, or in twenty times that by the clock,
 #: which a busy machine does not reach.
 SECONDS = 180
@@ -116,41 +115,33 @@ def is_told(one: dict[str, str], fault: tuple[int, str, str], lines: list[str]) 
     return one["fault"] == text and one["part"] in (around or lines[line - 1])
 
 
-def pytest_configure() -> None:
-    """As a plugin, before tests are imported: what is compiled is that of the plain sources here,
-    which no fault changes."""
-    from rockcheck.scenes import compiled
+def survives(name: str, source: str, arguments: list[str], cache: str) -> bool:
+    """Whether all tests pass with this source; what hangs is noticed.
 
-    kept = compiled._cache_folder
-    compiled._cache_folder = lambda package: kept(ROOT / package.name)  # type: ignore[assignment]
-
-
-def survives(tree: Path, name: str, source: str, arguments: list[str]) -> bool:
-    """Whether all tests pass with this source; what hangs is noticed."""
-    path = tree / "rockcheck" / name
-    plain = path.read_text(encoding="utf-8")
-    path.write_text(source, encoding="utf-8")
+    `cache` keeps what is compiled, by the content of its package."""
     words = ["-x", "-q", "-p", "no:cacheprovider", "-m", "not slow and not browser", *arguments]
-    plugin = ["-p", "mutation"] if name in COMPILED else []
-    environment = {
-        "PYTHONPATH": os.pathsep.join((str(tree), str(ROOT / "tests"))),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "NUMBA_DISABLE_JIT": str(int(name not in COMPILED)),
-    }
-    try:
-        return not subprocess.run(
-            [sys.executable, "-P", "-m", "pytest", *plugin, *words],
-            cwd=ROOT,
-            env=os.environ | environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=20 * SECONDS,
-            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
-        ).returncode
-    except subprocess.TimeoutExpired:
-        return False
-    finally:
-        path.write_text(plain, encoding="utf-8")
+    with tempfile.TemporaryDirectory() as tree:
+        shutil.copytree(
+            ROOT / "rockcheck", f"{tree}/rockcheck", ignore=shutil.ignore_patterns("__pycache__")
+        )
+        Path(tree, "rockcheck", name).write_text(source, encoding="utf-8")
+        environment = {
+            "PYTHONPATH": tree,
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "NUMBA_CACHE_DIR": cache,
+        }
+        try:
+            return not subprocess.run(
+                [sys.executable, "-P", "-m", "pytest", *words],
+                cwd=ROOT,
+                env=os.environ | environment,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                timeout=20 * SECONDS,
+                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS)),
+            ).returncode
+        except subprocess.TimeoutExpired:
+            return False
 
 
 def main(
@@ -161,14 +152,11 @@ def main(
 ) -> None:
     """Plants, runs, counts; exit 1 where fewer than 95 of 100 are noticed."""
     killed = total = 0
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(
-            ROOT / "rockcheck", f"{folder}/rockcheck", ignore=shutil.ignore_patterns("__pycache__")
-        )
-        for target in DATA["target"]:
-            name, tests = target["file"], [*target["tests"], *(pytest or ())]
+    with tempfile.TemporaryDirectory() as cache, ThreadPoolExecutor(os.cpu_count()) as workers:
+        for name, target in ((name, one) for one in DATA["target"] for name in one["files"]):
             if file and not any(part in name for part in file):
                 continue
+            tests = [*target["tests"], *(pytest or ())]
             source = (ROOT / name).read_text(encoding="utf-8")
             lines = source.splitlines()
             listed = Plant()
@@ -177,24 +165,31 @@ def main(
             for one in equivalent:
                 if not any(is_told(one, fault, lines) for fault in listed.found):
                     sys.exit(f"{name}: mutation.toml tells of a fault that is none: {one['fault']}")
-            if not survives(Path(folder), name, source, tests):
+            if not survives(name, source, tests, cache):
                 sys.exit(f"{name}: its tests fail without a fault")
             possible = range(len(listed.found))
             chosen = random.Random(f"{seed} {name}").sample(possible, min(sample, len(possible)))
-            judged = noticed = 0
-            for index in sorted(chosen):
-                if any(is_told(one, listed.found[index], lines) for one in equivalent):
-                    continue
-                fault = ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))
-                lives = survives(Path(folder), name, ast.unparse(fault), tests)
-                judged += 1
-                noticed += not lives
-                if lives:
+            lives = {
+                index: workers.submit(
+                    survives,
+                    name,
+                    ast.unparse(ast.fix_missing_locations(Plant(index).visit(ast.parse(source)))),
+                    tests,
+                    cache,
+                )
+                for index in sorted(chosen)
+                if not any(is_told(one, listed.found[index], lines) for one in equivalent)
+            }
+            for index, answer in lives.items():
+                if answer.result():
                     line, text, around = listed.found[index]
                     within = f"  in  {around}" * bool(around)
                     print(f"survives  {name}:{line}  {text}{within}", flush=True)
-            print(f"{name}: {noticed} of {judged} noticed ({len(possible)} possible)", flush=True)
-            killed, total = killed + noticed, total + judged
+            noticed = sum(not answer.result() for answer in lives.values())
+            print(
+                f"{name}: {noticed} of {len(lives)} noticed ({len(possible)} possible)", flush=True
+            )
+            killed, total = killed + noticed, total + len(lives)
     print(f"{killed} of {total} noticed, {100.0 * killed / max(total, 1):.0f} %")
     sys.exit(killed < 0.95 * total)
 
