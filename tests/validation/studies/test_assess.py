@@ -159,11 +159,14 @@ def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loo
     )
 
 
-@pytest.mark.parametrize(("before", "speed"), [(None, 0.4), (0.15, 0.3)])
-def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, speed):
+@pytest.mark.parametrize(
+    ("before", "at", "speed"), [(None, 0.3, 0.4), (0.15, 0.3, 0.3), (None, 0.05, 0.1)]
+)
+def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, at, speed):
     """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between
-    the rows has changed the speed, so the last one stands. The wall is on the left."""
-    events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (0.3, "wall impact")) if t]
+    the rows has changed the speed, so the last one stands, as does the first row's where there is
+    no other. The wall is on the left."""
+    events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (at, "wall impact")) if t]
     history = made(
         [0.0] * 4, t=0.1 * np.arange(4), x_dot=np.array([-0.1, -0.2, -0.3, 0.2]), events=events
     )

@@ -234,9 +234,11 @@ def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
     out = tmp_path / "out"
     done.save(out)
     assert (Run.load(out), done.exit_code) == (done, 0)
-    assert set(json.loads((out / "run.json").read_text())) == set(
+    text = (out / "run.json").read_text()
+    assert set(json.loads(text)) == set(
         json.loads((out / "run.schema.json").read_text())["properties"]
     )
+    assert text.count('\n{"scene":') == len(done.cells), "a line a cell"
     assert not list(out.glob("**/*.part"))
 
 

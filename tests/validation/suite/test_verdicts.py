@@ -14,11 +14,13 @@ from rockcheck.validation.suite.tables import (
     junit,
     markdown,
     shown,
+    summary,
     verdict_table,
 )
 from rockcheck.validation.suite.tolerances import Tolerance, judge
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
+EXACT = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
 LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
 
 
@@ -213,6 +215,11 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
     runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
     assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
     assert (runs[0].words == "not judged") == (not more.get("judged", True))
+    told = [one.get("verdict") for one in summary(runs[0])["cells"]]
+    assert told == [
+        one.verdict if "judged" not in more and (one.checks or one.reason) else None
+        for one in cells
+    ]
 
 
 FORM = check(0.9, kind="model form")
@@ -235,6 +242,12 @@ ALONE = check(0.9, "x_rms", against="")
             (cell("a", "m", check(0.9, "theta_peak"), check(None, "x_rms")),),
             True,
             "| a |  | ❌ theta_peak 9.00e-01 / 0.5 |",
+        ),
+        # Of a measure that is yes or no there is no distance.
+        (
+            (cell("a", "m", check(0.0, "outcome_agrees", EXACT), check(1.0, "outcome_agrees")),),
+            True,
+            "| a |  | ❌ outcome_agrees no |",
         ),
         # Outcomes where nothing is judged, but of a cell without a history that it failed.
         (
