@@ -106,7 +106,7 @@ def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None)
         number(check.expected),
         "fell" if figure.of_a_fall else f"{number(figure.value, 4)} {unit(figure.unit)}",
         number(check.limit),
-        use(check),
+        used(check),
         Mark(check.reason or figure.note, more=check.why),
     ]
 
@@ -131,22 +131,7 @@ def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
         for cell, check in run.checks()
         if check.weighs != "pass" and check.words != "no tolerance yet"
     ]
-    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -use(pair[1])))
-
-
-def use(check: Check) -> float:
-    """How much of its limit a check uses: above 1 only where it is out.
-
-    Infinite where that cannot be said.
-    """
-    if check.verdict != "fail":
-        return min(1.0, used(check))
-    value, limit = check.figure.value, check.limit
-    if value is None or not limit:
-        return math.inf
-    if check.ideal is None:
-        return limit / value if value > 0.0 else math.inf
-    return abs(value - check.ideal) / limit
+    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])))
 
 
 def times_table(run: Run) -> Table:
@@ -343,7 +328,7 @@ def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, An
         "apart": [
             (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
         ],
-        "changed": sorted(changed, key=lambda pair: -use(pair[1])),
+        "changed": sorted(changed, key=lambda pair: -used(pair[1])),
         "judged": len(accepted),
     }
 
@@ -379,8 +364,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
     differs = len({_side(outcome_of(one)) for one in done}) > 1
-    nearest = max(cell.checks, key=use, default=None)
-    used = use(nearest) if nearest else 0.0
+    nearest = max(cell.checks, key=used, default=None)
     return {
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
@@ -391,7 +375,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
         "apart": differs,
         "why_apart": why_apart(cell) if differs else "",
         "nearest": nearest,
-        "used": used if cell.status == "done" else math.inf,
+        "used": math.inf if cell.status != "done" else used(nearest) if nearest else 0.0,
     }
 
 

@@ -2,7 +2,6 @@
 
 import base64
 import json
-import math
 import re
 import zlib
 from dataclasses import replace
@@ -22,7 +21,6 @@ from rockcheck.reports.tables import (
     glance,
     matrix,
     times_table,
-    use,
     why_apart,
 )
 from rockcheck.reports.view import FALL, scene_views, slugs_of
@@ -30,7 +28,7 @@ from rockcheck.scenes import Block, Event, Floor, Record, Scene, Sine, Wall, loa
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
 from rockcheck.validation.discrepancy.figures import Figure, Pair
 from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.suite.results import Check, Run
+from rockcheck.validation.suite.results import Run
 
 
 def payload_of(site, slug):
@@ -236,22 +234,6 @@ def test_run_times_are_ratios_to_the_reference(run):
     times = {row[0]: row[1] for row in times_table(run).rows}
     # 0.01 s (1 + 10 delay): 1.005 and 1.01 of the reference in the two scenes that the model played
     assert (times["ebm-unilateral"], times["cm"]) == pytest.approx((1.0, (1.005 * 1.01) ** 0.5))
-
-
-@pytest.mark.parametrize(
-    ("value", "more", "used"),
-    [
-        (5.0, {}, 2.5),
-        (5.0, {"ideal": 4.0}, 0.5),
-        (8.0, {"ideal": None, "limit": 12.0}, 1.5),
-        (None, {}, math.inf),
-        (1.0, {"limit": None}, math.inf),
-    ],
-)
-def test_how_much_of_its_limit_a_check_uses(value, more, used):
-    figure = Figure(measure="m", label="m", unit="1", value=value)
-    about = {"kind": "numerical", "verdict": "fail", "ideal": 0.0, "limit": 2.0}
-    assert use(Check(figure=figure, **about | more)) == used
 
 
 def contrast(first, second):

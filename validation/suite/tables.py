@@ -244,23 +244,27 @@ def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
 
 
 def used(check: Check) -> float:
-    """Share of its limit that a check uses, 0 to 1 within it; infinite if it fails or has none.
+    """Share of its limit that a check uses: above 1 only where it is out.
 
-    0 for a check that is not defined or of a yes-or-no measure, and for a better figure whose limit
-    lies around the outdated expected value.
+    Infinite where that cannot be said. 0 for a check that is not defined, of a yes-or-no measure,
+    and for a better figure whose limit lies around the outdated expected value.
     """
-    value, limit = check.figure.value, check.limit
+    value, limit, fails = check.figure.value, check.limit, check.verdict == "fail"
     if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
         return 0.0
-    if check.verdict == "fail" or value is None or limit is None:
+    if value is None or limit is None or check.gap:
         return math.inf
-    if check.figure.measure in YES_NO:
-        return 0.0
+    if not limit or check.figure.measure in YES_NO:
+        return math.inf if fails else 0.0
+    part = _part(check, value, limit)
+    return part if fails else min(1.0, part)
+
+
+def _part(check: Check, value: float, limit: float) -> float:
     if check.ideal is None:  # an "at least" measure: the needed share of the value
-        return limit / value if value > 0.0 else 0.0
-    measure = MEASURES.get(check.figure.measure)
-    floor = 0.0 if measure is None or measure.role == "error" else check.floor
-    return apart(value, check.ideal, floor) / limit if limit > 0.0 else 0.0
+        return limit / value if value > 0.0 else math.inf
+    role = getattr(MEASURES.get(check.figure.measure), "role", "error")
+    return apart(value, check.ideal, 0.0 if role == "error" else check.floor) / limit
 
 
 def share(check: Check) -> str:
@@ -392,8 +396,12 @@ def _entry(cell: Cell | None, judged: bool) -> str:
     if not judged and cell.status == "done":
         return _plain(cell.fate)
     numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
-    worst_of = share(max(numerical, key=used)) if numerical else ""
+    worst_of = share(max(numerical, key=_known_and_bad)) if numerical else ""
     return f"{MARKS[cell.verdict]} {_plain(worst_of)}{sure}".strip()
+
+
+def _known_and_bad(check: Check) -> tuple[bool, bool, float]:
+    return check.verdict == "fail", check.figure.value is not None, used(check)
 
 
 def _plain(text: str) -> str:

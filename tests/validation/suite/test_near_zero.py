@@ -164,7 +164,7 @@ def test_the_rule(measure, line, more, values):
 @pytest.mark.parametrize(
     ("measure", "line", "shares"),
     [
-        ("theta_rms", {"limit": 0.5}, {0.125: 0.25, 0.0: 0.0, 0.75: math.inf, math.nan: math.inf}),
+        ("theta_rms", {"limit": 0.5}, {0.125: 0.25, 0.0: 0.0, 0.75: 1.5}),
         ("peak_ratio", {"limit": 0.5}, {1.125: 0.25, 0.875: 0.25, 1.5: 1.0}),
         # Nearer to the reference's, which does not slip, is better, whatever its limit says.
         (
@@ -173,9 +173,10 @@ def test_the_rule(measure, line, more, values):
             {0.625: 0.5, 0.375: 0.0, 0.5: 0.0},
         ),
         # Of an "at least" measure the share of the value that is needed.
-        ("events_agree_until", {"limit": 8.0}, {8.0: 1.0, 16.0: 0.5, 7.0: math.inf}),
+        ("events_agree_until", {"limit": 8.0}, {8.0: 1.0, 16.0: 0.5, 5.0: 1.6, 0.0: math.inf}),
         ("outcome_agrees", {"expected": 1.0, "limit": 0.0}, {1.0: 0.0, 0.0: math.inf}),
         ("theta_rms", None, {0.125: math.inf}),
+        ("theta_rms", {"limit": 0.0}, {0.0: 0.0, 0.125: math.inf}),
     ],
 )
 def test_the_share_of_its_limit_that_a_figure_uses(measure, line, shares):
