@@ -162,7 +162,7 @@ def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
 
 
 def _order(changes: Sequence[float]) -> float | None:
-    ratio = changes[-1] / changes[0] if changes[0] > 0.0 else 0.0
+    ratio = changes[-1] / changes[0] if changes[0] else 1.0
     return math.log2(ratio - 1.0) if ratio > 1.0 else None
 
 

@@ -11,14 +11,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
-from rockcheck.scenes import History, InputError, ModelFailure, Scene, kinematics
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.files import UncertainScene
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.discrepancy.measures import CONFIDENCE
@@ -26,9 +25,6 @@ from rockcheck.validation.discrepancy.measures import CONFIDENCE
 Floats = NDArray[np.float64]
 #: Median and dispersion where no lognormal curve fits.
 NO_FIT = math.nan, math.nan
-#: Time (s) added after the base's motion while the outcome is open; and the share of the energy of
-#: tipping over below which the outcome is decided: a hundredth is left for the model's own error.
-SETTLE, ENOUGH = 6.0, 0.99
 
 
 class Runs(Stored):
@@ -50,61 +46,21 @@ class Runs(Stored):
         )
 
 
-def play(scenes: Sequence[Scene], player: Any) -> Runs:
-    """Play scenes with a model until outcome and peak are certain, whatever their durations.
+def play(scenes: Sequence[Scene], model: EventBasedModel) -> Runs:
+    """Play scenes until outcome and peak are certain, whatever their durations.
 
-    A run of the event-based model that fails is made once more at a hundredth of the tolerance.
-    Raises `InputError` where the model cannot play one of them.
+    A run that fails is made once more at a hundredth of the tolerance. Raises `InputError` where
+    the model cannot play one of them.
     """
-    if compiled(player):
-        from rockcheck.ebm.batch import pack, run_decided
+    from rockcheck.ebm.batch import pack, run_decided
 
-        found = run_decided(pack(scenes, player), player, jobs=1)
-        side, peak, failed = found.side, found.peak, found.failed
-    else:
-        rows = [_one(scene, player) for scene in scenes]
-        side, peak, failed = (np.array(column) for column in zip(*rows, strict=True))
-    rotations = peak / np.array([scene.block.alpha for scene in scenes])
+    found = run_decided(pack(scenes, model), model, jobs=1)
+    rotations = found.peak / np.array([scene.block.alpha for scene in scenes])
     return Runs(
-        side=side.tolist(),
-        failed=failed.tolist(),
+        side=found.side.tolist(),
+        failed=found.failed.tolist(),
         figures={"peak_rotation": rotations.tolist()},
     )
-
-
-def _one(scene: Scene, player: Any) -> tuple[int, float, bool]:
-    try:
-        history = decided(scene, player)
-    except ModelFailure:
-        return SAFE, 0.0, True
-    sides = {"overturned left": LEFT, "overturned right": RIGHT}
-    return sides.get(history.outcome, SAFE), history.peak_rotation, False
-
-
-def decided(scene: Scene, player: Any) -> History:
-    """The history of a scene until its outcome is certain, whatever its duration.
-
-    A block that has not tipped past its balance when the base comes to rest, and has too little
-    energy left to do so, is safe. Any other run is made again, `SETTLE` s longer; a block that then
-    stands is safe.
-    """
-    quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
-    needed = scene.gravity * (scene.block.radius - scene.block.weaker_pivot.height)
-    for settle in (0.0, SETTLE):  # few rows: only the outcome is needed
-        history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
-        theta, y, *rates = (
-            history.channels[name][-1] for name in ("theta", "y", "x_dot", "y_dot", "theta_dot")
-        )
-        energy = kinematics.energy(scene.block, scene.gravity, y, theta, *rates)
-        weak = energy < ENOUGH * needed and abs(theta) < scene.block.alpha
-        if weak or history.outcome.startswith("overturned"):
-            break
-    return history
-
-
-def compiled(player: object) -> TypeGuard[EventBasedModel]:
-    """Whether the model plays whole batches compiled."""
-    return isinstance(player, EventBasedModel) and player.decides
 
 
 @dataclass(frozen=True)

@@ -99,6 +99,9 @@ def test_the_run_at_3h_tells_convergence_from_chance(at, u_num):
     found = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]))["peak_rotation"]
     missed = 0.5 * BOOKCASE.output_step**2 / 8.0  # of the top of a sine, by its rows
     assert found.u_num == pytest.approx(math.hypot(u_num, missed), rel=1e-3)
+    rising = BOOKCASE.replace(duration=1.0)  # its last row is the peak
+    early = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]), rising)["peak_rotation"]
+    assert early.u_num == pytest.approx(u_num * math.sin(1.0), rel=1e-9)
 
 
 def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
@@ -155,14 +158,26 @@ def test_a_last_slip_that_all_runs_share_is_as_sure_as_its_history(factor, slid,
     )
 
 
-@pytest.mark.parametrize(("late", "u_num"), [(0, 0.0), (1, 1.25 * 3.0), (-1, 1.25 * 3.0)])
+@pytest.mark.parametrize(
+    ("late", "u_num"),
+    [
+        ((0, 0, 0), 0.0),
+        ((1, 2, 3), 1.25 * 3.0),
+        ((-1, -2, -3), 1.25 * 3.0),
+        ((9, 0, 0), 3.0 * 9.0),
+        ((10, 0, 0), math.nan),  # by 0.107/p
+    ],
+)
 def test_the_time_of_a_fall_is_that_of_its_changes_and_of_a_row(late, u_num):
+    rows = dict(enumerate((0, *late), 1))
     found = judged(
-        Made(lambda h: 1.0, falls=lambda h: True, rows=lambda h: 600 + late * round(h / 1e-3))
+        Made(lambda h: 1.0, falls=lambda h: True, rows=lambda h: 600 + rows[round(h / 1e-3)])
     )
     assert set(found) == {"theta_rms", "end_time", "outcome"}
-    assert found["end_time"].u_num == pytest.approx(
-        math.hypot(u_num, 1.0) * BOOKCASE.output_step, rel=1e-9
+    assert found["end_time"].u_num == (
+        None
+        if math.isnan(u_num)
+        else pytest.approx(math.hypot(u_num, 1.0) * BOOKCASE.output_step, rel=1e-9)
     )
 
 

@@ -192,17 +192,21 @@ def test_figures_of_three_records():
     assert plots["histories"].y.limits == pytest.approx((-0.005, 0.105))
 
 
-@pytest.mark.parametrize(("samples", "hits", "sd"), [(0, 1, []), (4, 2, [0.0354])])
-def test_draws_count_in_the_place_of_the_runs_as_they_are(samples, hits, sd):
+@pytest.mark.parametrize(
+    ("samples", "hits", "low", "sd"), [(0, 1, 0.0945, []), (4, 2, 0.0369, [0.0354])]
+)
+def test_draws_count_in_the_place_of_the_runs_as_they_are(samples, hits, low, sd):
     """Four draws each: the peaks of a stray by 0.05 about 0.2, those of c are all 1, fallen or
-    not. What is uncertain and not drawn is told."""
+    not. The interval is Wilson's for two runs, and for three: so many as the records part. What is
+    uncertain and not drawn is told."""
     drawn = {
         "a": [ran("moving", peak) for peak in (0.15, 0.25, 0.25, 0.15)],
         "c": [ran("moving", 1.0)] * 2 + [ran("overturned left")] * 2,
     }
     drawn = drawn if samples else {}
     found = found_of("ac", sure(0.5), samples, drawn=drawn, at_gaps={}, free=[], others={}, sure={})
-    assert found.data["overturning"]["count"] == hits
+    told = found.data["overturning"]
+    assert (told["count"], told["low"]) == (hits, pytest.approx(low, abs=1e-4))
     shares = rows_of(found, "contributions")["contributions"]
     assert [row[2] for row in shares if row[0] == "inputs"] == sd
     notes = [line for block in found.blocks if isinstance(block, Text) for line in block.items]

@@ -13,7 +13,6 @@ from rockcheck import (
     EventBasedModel,
     Floor,
     InputError,
-    ModelFailure,
     Record,
     Rest,
     Ricker,
@@ -27,13 +26,14 @@ from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.population.answers import Assessment
 from rockcheck.validation.studies.population.study import (
+    A_RUN,
     MEASURES,
     PULSES,
     fragility,
     ida,
     measure_of,
 )
-from rockcheck.validation.uncertainty.population import curve_of, fit_lognormal, play
+from rockcheck.validation.uncertainty.population import curve_of, fit_lognormal
 
 SCENE = Scene(
     name="rack",
@@ -104,6 +104,9 @@ def test_a_run_is_the_record_at_that_intensity(lines):
             [name, sign, level, math.nan if fell else peak, int(fell)], nan_ok=True
         )
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
+    (plot,) = (plot for plot in found.plots() if plot.name == "lines")
+    labels = ["H1", "H1, reversed", "H2", "H2, reversed", "H3", "H3, reversed"]
+    assert [one.label for one in plot.panels[0].series[:6]] == labels
 
 
 def test_a_share_of_the_motions_stays_below_its_quantile(lines):
@@ -129,7 +132,7 @@ def test_a_capacity_is_exceeded_not_met(lines):
     ]
 
 
-@pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5"])
+@pytest.mark.parametrize("measure", [*MEASURES, "sa:0.5", "sa:0.001"])
 def test_every_measure_takes_out_the_record_s_own_size(measure):
     study = ida(SCENE, [("once", motion(1.0)), ("twice", motion(2.0))], LEVELS, measure=measure)
     (_, _, once), (_, _, twice) = study.motions
@@ -168,27 +171,6 @@ def test_what_failed_says_nothing_and_ends_the_command_so():
 # Playing
 
 
-def test_another_model_plays_until_the_outcome_is_certain():
-    fair = EventBasedModel(pivot="unilateral", tolerance=1e-8)
-
-    class Slow:
-        def simulate(self, scene):
-            if scene.excitation.scale > 3.0:
-                raise ModelFailure("too much")
-            return fair.simulate(scene)
-
-    record = Record.from_samples(motion(2.5).samples, 0.02)
-    scenes = [
-        SCENE.replace(walls=(), excitation=record.scaled(f), duration=0.1)
-        for f in (0.1, 2.0, -2.0, 4.0)
-    ]
-    slow, fast = play(scenes, Slow()), play(scenes, fair)
-    assert slow.side[:3] == fast.side[:3] == (0, fast.side[1], -fast.side[1])
-    assert fast.side[1] != 0
-    assert slow.failed == (False, False, False, True)
-    assert math.isnan(slow.peaks[3])
-
-
 def test_a_task_depends_on_all_that_its_runs_do():
     key = ida(SCENE, MOTIONS, LEVELS).batches[0].key
     others = [
@@ -199,6 +181,12 @@ def test_a_task_depends_on_all_that_its_runs_do():
     ]
     assert key not in {study.batches[0].key for study in others}
     assert ida(SCENE, MOTIONS, LEVELS, capacities=[0.3]).batches[0].key == key
+
+
+@pytest.mark.parametrize(("motions", "where"), [(3, "here"), (3000, "worker")])
+def test_what_takes_long_is_played_in_processes(motions, where):
+    task = ida(SCENE, (MOTIONS * 1000)[:motions], LEVELS).batches[0]
+    assert (task.where, task.expected) == (where, pytest.approx(2 * len(LEVELS) * A_RUN))
 
 
 # Fragility

@@ -6,11 +6,21 @@ import io
 import itertools
 import json
 from collections import Counter
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from rockcheck import Block, ContinuousModel, Ricker, Scene, Spectrum, Wall, overturning_spectrum
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    ModelFailure,
+    Ricker,
+    Scene,
+    Spectrum,
+    Wall,
+    overturning_spectrum,
+)
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.paper import Panel, paper_panels
@@ -111,6 +121,15 @@ def test_another_model_plays_in_processes(tmp_path):
     assert {task.where for task in study.tasks({})} == {"worker"}
     (found,) = outcomes(run(study, tmp_path, jobs=1)).values()
     assert found["outcomes"].tolist() == [[0, 0], [-1, 0]]
+
+
+def test_a_model_that_is_simulated_plays_until_the_outcome_is_certain(monkeypatch):
+    """As the pulses end the block turns away from rest, at 0.25, 0.99 and 1.73 alpha."""
+    scene, a = PANELS["figure-6-unobstructed"].scene, np.array([6.4, 6.54, 6.68])
+    (nodes,) = nodes_of(scene, a, np.full(3, 4.5), "cm", {})
+    assert nodes.play().letters == "SLL"
+    monkeypatch.setattr(ContinuousModel, "simulate", Mock(side_effect=ModelFailure("too much")))
+    assert nodes.play().letters == "UUU"
 
 
 def test_a_block_past_its_balance_is_not_safe_for_want_of_energy():

@@ -96,6 +96,7 @@ class Batch(OneScene):
 
     def play(self) -> Runs:
         """The runs."""
+        player: Any = build(self.model, dict(self.settings))
         across, upward = self.scene.excitation, self.scene.vertical
         return play(
             [
@@ -105,7 +106,7 @@ class Batch(OneScene):
                 )
                 for factor in self.factors
             ],
-            build(self.model, dict(self.settings)),
+            player,
         )
 
 

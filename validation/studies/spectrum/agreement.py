@@ -19,8 +19,7 @@ from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
 from rockcheck.validation.paper import Panel
-from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
-from rockcheck.validation.uncertainty.population import SETTLE
+from rockcheck.validation.studies.spectrum.tiles import SETTLE, Book, Request, letters_of
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
 #: The share of the nodes that a model plays, where it is not all. These engines draw no map: fewer

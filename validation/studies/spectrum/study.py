@@ -29,7 +29,6 @@ from rockcheck.validation.paper import (
 )
 from rockcheck.validation.studies.spectrum import agreement, tiles
 from rockcheck.validation.study import Study
-from rockcheck.validation.uncertainty.population import compiled
 
 Indices = NDArray[np.int64]
 #: Nodes an axis whose histories are kept, both ends of the axis among them.
@@ -148,7 +147,7 @@ class Spectra(Study):
         """All that follows from the nodes played; the book lists those still to be played."""
         spectra: dict[Panel, Spectrum] = {}
         motions: dict[Panel, tiles.Played] = {}
-        fast = compiled(build(self.request.model, self.request.settings))
+        fast = tiles.compiled(build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         for panel in self.panels:
             one = self._spectrum(book, panel)
