@@ -33,13 +33,13 @@ nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.
 INTERPRETED := tests/ebm/core/test_series.py tests/ebm/core/test_guards.py tests/ebm/core/test_selection.py tests/ebm/core/test_impact_laws.py tests/ebm/test_edges.py tests/ebm/core/test_rare_scenes.py::test_it_runs_and_contacts_hold \
 	tests/cm/test_contact.py
-coverage: $(VENV)/.ready ## branch coverage by folder, and the lines that no test runs; slow
+coverage: $(VENV)/.ready ## branch coverage, and the lines that no test runs; slow
 	mkdir -p build/coverage
 	$(BIN)/coverage erase
-	-$(BIN)/coverage run -m pytest -q -m "not slow" -n auto --dist loadfile # a test that fails is told; the table is made all the same
+	-$(BIN)/coverage run -m pytest -q -m "not slow" -n auto --dist loadfile # a test that fails is told; the report is made all the same
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -q -m "not slow and not browser" $(INTERPRETED)
 	$(BIN)/coverage combine --quiet
-	$(BIN)/python tests/coverage_table.py
+	$(BIN)/coverage report --sort=cover --skip-covered --show-missing --fail-under=90
 
 mutation: $(VENV)/.ready ## small faults planted in a sample of places: which ones no test notices
 	$(BIN)/python tests/mutation.py

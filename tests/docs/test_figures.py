@@ -16,7 +16,6 @@ from rockcheck.commands.simulate import new
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
-from rockcheck.validation.paper import kept_spectra
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.suite.suites import load_suite
 
@@ -195,12 +194,6 @@ def test_the_papers_floor_pulls_at_every_wall_impact():
     found = [one for scene in load_suite("walls").scenes.values() for one in floor_impulses(scene)]
     assert len(found) == 282
     assert max(found) < 0.0
-
-
-def test_the_kept_spectra():
-    spectra = kept_spectra()
-    assert (len(spectra), sum(one.outcomes.size for one in spectra)) == (28, 280_000)
-    assert not any(len(one.undecided) for one in spectra)
 
 
 def test_the_models_bias_and_scatter():
