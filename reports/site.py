@@ -13,7 +13,6 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import tomlkit
 from filelock import FileLock, Timeout
 
 from rockcheck.reports import tables
@@ -31,6 +30,7 @@ from rockcheck.reports.style import looks, save, save_as, stamp_in, stamp_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import InputError, Record, Scene, experience
 from rockcheck.scenes.errors import printable, unknown_name
+from rockcheck.scenes.files import scene_text, tables_of
 from rockcheck.scenes.progress import OnProgress, unheard
 from rockcheck.scenes.reading import MOST_BYTES, head_of, read_text
 from rockcheck.scenes.writing import made, no_link, script_text, write_whole
@@ -368,8 +368,7 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
 
     `load_scene` reads the file back to a scene that moves in the same way.
     """
-    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-    records = {}
+    tables, records = tables_of(scene), {}
     for key in ("excitation", "vertical"):
         excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
@@ -381,10 +380,6 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
             )
             write_whole(folder / name, "\n".join([*head, *rows, ""]))
             records[name] = ""
-        elif key in tables:
-            tables[key] = {"kind": excitation.kind} | tables[key]
-    text = tomlkit.dumps(
-        dict(sorted(tables.items(), key=lambda one: isinstance(one[1], dict | list)))
-    )
+    text = scene_text(tables)
     write_whole(folder / f"{slug}.toml", text)
     return {f"{slug}.toml": text, **records}

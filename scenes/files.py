@@ -119,6 +119,22 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
 
 
+def tables_of(scene: Scene) -> dict[str, Any]:
+    """All settings that differ from their defaults, as in a scene file."""
+    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    for key in {"excitation", "vertical"} & tables.keys():
+        tables[key] = {"kind": getattr(scene, key).kind} | tables[key]
+    return tables
+
+
+def scene_text(tables: Mapping[str, Any], remarks: str = "") -> str:
+    """A scene file of these tables that `load_scene` reads back to the bit, with remarks on top."""
+    import tomlkit
+
+    ordered = sorted(tables.items(), key=lambda one: isinstance(one[1], dict | list))
+    return "".join(f"# {line}\n" for line in remarks.splitlines()) + tomlkit.dumps(dict(ordered))
+
+
 class Spread(Frozen):
     """An uncertain number: its value and its distribution.
 

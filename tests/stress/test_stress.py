@@ -9,6 +9,7 @@ import numpy as np
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
 from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, load_scene
+from rockcheck.scenes.files import scene_text, tables_of
 from rockcheck.scenes.writing import made, write_whole
 from rockcheck.validation.execute.models import not_installed
 from rockcheck.validation.execute.pool import Failure
@@ -22,7 +23,6 @@ from rockcheck.validation.studies.stress.runs import (
     RunTotals,
     Shrinking,
     parts,
-    scene_text,
     shrink,
 )
 from rockcheck.validation.studies.stress.study import (
@@ -67,7 +67,7 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     left = (small.block.homogeneous, small.walls, small.vertical)
     assert left == (True, (Wall(side="right", gap=0.0, restitution=0.0),), Rest())
     assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
-    file = write_whole(tmp_path / "small.toml", scene_text(small, "a remark\nanother"))
+    file = write_whole(tmp_path / "small.toml", scene_text(tables_of(small), "a remark\nanother"))
     assert load_scene(file).replace(name=small.name) == small
 
 

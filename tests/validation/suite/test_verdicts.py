@@ -215,10 +215,8 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
     runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
     assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
     assert (runs[0].words == "not judged") == (not more.get("judged", True))
-    told = [one.get("verdict") for one in summary(runs[0])["cells"]]
-    assert told == [
-        one.verdict if "judged" not in more and (one.checks or one.reason) else None
-        for one in cells
+    assert [one.get("verdict") for one in summary(runs[0])["cells"]] == [
+        None if "judged" in more or not (one.checks or one.reason) else one.verdict for one in cells
     ]
 
 

@@ -15,12 +15,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import tomlkit
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
+from rockcheck.scenes.files import scene_text, tables_of
 from rockcheck.validation.execute.models import build, compiles
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import (
@@ -283,7 +283,7 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     A part is left out, a run or list is shorter, the scale is another; at last one number is zero
     or has fewer digits.
     """
-    tables = _tables(scene)
+    tables = tables_of(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     yield from (_with(tables, path) for path, _ in places)
     unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -309,14 +309,6 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     )
 
 
-def _tables(scene: Scene) -> dict[str, Any]:
-    """All settings that differ from their defaults, as in a scene file."""
-    tables: dict[str, Any] = scene.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
-    for key in {"excitation", "vertical"} & tables.keys():
-        tables[key] = {"kind": getattr(scene, key).kind} | tables[key]
-    return tables
-
-
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if path:
         yield path, part
@@ -338,21 +330,6 @@ def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
     else:
         del part[path[-1]]
     return changed
-
-
-def scene_text(scene: Scene, remarks: str) -> str:
-    """A scene file that `load_scene` reads back to the bit, with remarks on top.
-
-    Samples stand in the file itself.
-    """
-    # The name is the file's own. Plain values come before tables.
-    ordered = sorted(
-        ((key, value) for key, value in _tables(scene).items() if key != "name"),
-        key=lambda item: isinstance(item[1], dict | list),
-    )
-    return "".join(
-        [*(f"# {line}\n" for line in remarks.splitlines()), tomlkit.dumps(dict(ordered))]
-    )
 
 
 #: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
@@ -397,7 +374,9 @@ class Broken:
             remark,
             " ".join([f"rockcheck simulate {self.name} --model {model}", *options]),
         )
-        return scene_text(scene, "\n".join(filter(None, words)))
+        tables = tables_of(scene)
+        tables.pop("name", None)  # it is the file's own
+        return scene_text(tables, "\n".join(filter(None, words)))
 
 
 @dataclass(kw_only=True)
