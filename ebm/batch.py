@@ -13,16 +13,15 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import natural
 from rockcheck.ebm.core.names import FAILURES, Ending
-from rockcheck.ebm.core.state import FOUND, Records
+from rockcheck.ebm.core.state import FOUND, Records, Rows
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import Packed, pack, pack_pulses, play, sides_of, state_for
+from rockcheck.ebm.packed import pack, pack_pulses, play, sides_of, state_for
 from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import OnProgress, threads, unheard
 
 __all__ = [
     "Ensemble",
     "Outcomes",
-    "Packed",
     "pack",
     "pack_pulses",
     "play_ensemble",
@@ -72,7 +71,7 @@ class Outcomes:
 
 
 def run_batch(
-    packed: Packed,
+    packed: Rows,
     model: EventBasedModel,
     *,
     until_decided: bool = True,
@@ -90,12 +89,12 @@ def run_batch(
     only its `ending` says so.
     """
     refuse_undecided(model)
-    count, kept = len(packed), parts + 1 if parts and not until_decided else 0
+    count, kept = len(packed.durations), parts + 1 if parts and not until_decided else 0
     motion, modes = np.zeros((count, kept, 6)), np.zeros((count, kept), dtype=np.int8)
     log, found = np.empty((count, 0, 5)), np.empty(count, FOUND)
-    durations = np.full(count, 1e6) if until_decided else packed.rows.durations
+    durations = np.full(count, 1e6) if until_decided else packed.durations
     steps = durations / max(kept - 1, 1)
-    packed = packed.changed(durations=durations, output_steps=steps)
+    packed = packed._replace(durations=durations, output_steps=steps)
 
     def chunk(first: int) -> int:
         part = slice(first, min(first + _CHUNK, count))
@@ -122,7 +121,7 @@ def run_batch(
 
 
 def run_decided(
-    packed: Packed,
+    packed: Rows,
     model: EventBasedModel,
     *,
     jobs: int | None = None,
@@ -131,7 +130,7 @@ def run_decided(
     """`run_batch` until all is decided; a run that fails is made once more by `model.finer()`."""
     found = run_batch(packed, model, strict=False, jobs=jobs, on_progress=on_progress)
     if (again := found.failed).any():
-        finer = run_batch(Packed(rows=packed.part(again)), model.finer(), strict=False, jobs=jobs)
+        finer = run_batch(packed.part(again), model.finer(), strict=False, jobs=jobs)
         for mine, better in zip(vars(found).values(), vars(finer).values(), strict=True):
             mine[again] = better
     return found
@@ -167,7 +166,7 @@ def play_ensemble(
     step = max(first.output_step, first.duration / rows) if rows else first.duration
     t = first.replace(output_step=step).output_times if rows else np.empty(0)
     steps = np.array([step / natural.time_unit(scene) for scene in scenes])
-    packed = pack(scenes, model).changed(output_steps=steps)
+    packed = pack(scenes, model)._replace(output_steps=steps)
     found = np.empty(count, FOUND)
 
     def chunk(begin: int) -> Floats:

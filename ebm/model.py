@@ -132,7 +132,7 @@ class EventBasedModel(Frozen):
         )
         states, work = packed.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
-        ending, ready, seconds, cpu = self._played(given.rows, states, work, records, kept)
+        ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
         last: Any = kept[0].tolist()
         motion, t, _, _, steps, written, at_rest = last
         if ending in names.FAILURES:

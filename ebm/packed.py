@@ -7,7 +7,6 @@ known here by its settings only.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from rockcheck.ebm.core import block, march, names
 from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
-from rockcheck.scenes.progress import announce, is_one_run
+from rockcheck.scenes.progress import ONE_RUN, announce
 from rockcheck.scenes.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -26,34 +25,7 @@ Floats = NDArray[np.float64]
 _READY: dict[str, Callable[..., None]] = {}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Packed:
-    """Runs as compiled code is given them, one row each, natural units."""
-
-    rows: Rows
-
-    def __len__(self) -> int:
-        return len(self.rows.durations)
-
-    def part(self, part: slice | NDArray[np.bool_]) -> Rows:
-        """Some of the runs. The samples stay those of all."""
-        rows = self.rows
-        return Rows(
-            rows.settings[part],
-            rows.horizontal[part],
-            rows.vertical[part],
-            rows.starts[part],
-            rows.durations[part],
-            rows.output_steps[part],
-            rows.samples,
-        )
-
-    def changed(self, **columns: Any) -> Packed:
-        """The same runs with other `durations` or `output_steps`."""
-        return Packed(rows=self.rows._replace(**columns))
-
-
-def pack(scenes: Sequence[Scene], model: Any) -> Packed:
+def pack(scenes: Sequence[Scene], model: Any) -> Rows:
     """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
     for scene in scenes:
         model.check(scene)
@@ -62,7 +34,7 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
     forms = np.array([ground.form for ground in grounds], dtype=FORM)
     forms["first"] = np.cumsum(forms["count"]) - forms["count"]
     units = np.array([natural.time_unit(scene) for scene in scenes])
-    rows = Rows(
+    return Rows(
         settings=np.array([setting_for(scene, model) for scene in scenes], dtype=block.SETTING),
         horizontal=forms[::2].copy(),
         vertical=forms[1::2].copy(),
@@ -71,10 +43,9 @@ def pack(scenes: Sequence[Scene], model: Any) -> Packed:
         output_steps=np.array([scene.output_step for scene in scenes]) / units,
         samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
     )
-    return Packed(rows=rows)
 
 
-def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Packed:
+def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Rows:
     """Packs one scene under many pulses of its own kind.
 
     `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
@@ -95,16 +66,14 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
     still = natural.base_of(scene).vertical
-    return Packed(
-        rows=Rows(
-            settings=np.full(count, setting_for(scene, model), dtype=block.SETTING),
-            horizontal=horizontal,
-            vertical=np.full(count, still.form, dtype=FORM),
-            starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
-            durations=np.full(count, scene.duration / unit),
-            output_steps=np.full(count, scene.output_step / unit),
-            samples=still.samples,
-        )
+    return Rows(
+        settings=np.full(count, setting_for(scene, model), dtype=block.SETTING),
+        horizontal=horizontal,
+        vertical=np.full(count, still.form, dtype=FORM),
+        starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
+        durations=np.full(count, scene.duration / unit),
+        output_steps=np.full(count, scene.output_step / unit),
+        samples=still.samples,
     )
 
 
@@ -158,7 +127,7 @@ def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
     steps.
     """
     loop = march.LOOPS[model.friction]
-    if not is_one_run() or model.friction == "bouc-wen" or is_ready(loop, *given):
+    if not ONE_RUN.get() or model.friction == "bouc-wen" or is_ready(loop, *given):
         return None
     announce(
         f"{model.name} is not compiled for this machine yet: a short run is interpreted, with the"

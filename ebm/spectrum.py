@@ -18,7 +18,7 @@ from rockcheck.scenes.errors import check_kind
 from rockcheck.scenes.progress import OnProgress, unheard
 
 if TYPE_CHECKING:
-    from rockcheck.ebm.batch import Packed
+    from rockcheck.ebm.core.state import Rows
 
 Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
@@ -179,7 +179,7 @@ def play_nodes(
 
 def _packed(
     scene: Scene, amplitude_ratios: Floats, frequency_ratios: Floats, model: EventBasedModel
-) -> Packed:
+) -> Rows:
     from rockcheck.ebm import batch
 
     if scene.excitation.kind == "record":
@@ -230,7 +230,7 @@ def play_motions(
     made = cache(partial(node_scene, scene))
     played = [made(a if changing else 1.0, f) for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
-    packed = _packed(scene, amplitude_ratios, frequency_ratios, model).changed(durations=lengths)
+    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)._replace(durations=lengths)
     found = batch.run_batch(
         packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs
     )

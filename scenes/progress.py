@@ -12,12 +12,13 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
 Result = TypeVar("Result")
+Value = TypeVar("Value")
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
 
@@ -45,13 +46,18 @@ def tell(done: float, total: float, what: str = "") -> None:
 
 
 @contextmanager
-def listening(on_progress: OnProgress) -> Iterator[None]:
-    """Within this block `on_progress` receives what models `tell` in this thread."""
-    token = _listener.set(on_progress)
+def within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
+    """Within this block, in this thread, the variable has this value."""
+    token = variable.set(value)
     try:
         yield
     finally:
-        _listener.reset(token)
+        variable.reset(token)
+
+
+def listening(on_progress: OnProgress) -> AbstractContextManager[None]:
+    """Within this block `on_progress` receives what models `tell` in this thread."""
+    return within(_listener, on_progress)
 
 
 _announcer: Callable[[str], None] | None = None
@@ -88,22 +94,8 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
         announce_by(before)
 
 
-_one_run: ContextVar[bool] = ContextVar("one_run", default=False)
-
-
-@contextmanager
-def one_run() -> Iterator[None]:
-    """Within this block a short run does not wait for the compiler: nothing else will be played."""
-    token = _one_run.set(True)
-    try:
-        yield
-    finally:
-        _one_run.reset(token)
-
-
-def is_one_run() -> bool:
-    """Whether this thread is in a block of `one_run`."""
-    return _one_run.get()
+#: Whether a short run does not wait for the compiler: nothing else will be played.
+ONE_RUN: ContextVar[bool] = ContextVar("one_run", default=False)
 
 
 class _Runner:

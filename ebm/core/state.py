@@ -152,6 +152,10 @@ class Rows(NamedTuple):
     output_steps: Numbers
     samples: Numbers
 
+    def part(self, part: "slice | NDArray[np.bool_]") -> "Rows":
+        """Some of the runs. The samples stay those of all."""
+        return Rows._make([*(column[part] for column in self[:-1]), self.samples])
+
 
 class Records(NamedTuple):
     """Where a run writes: rows of states, their modes, the log of events.

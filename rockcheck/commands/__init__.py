@@ -32,7 +32,7 @@ from rich.progress import (
 from rockcheck.reports.style import ENDINGS, kind_of, save_as
 from rockcheck.scenes.errors import InputError, inert, printable
 from rockcheck.scenes.files import named_scenes
-from rockcheck.scenes.progress import OnProgress, announcing
+from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings.sets import Odd
 from rockcheck.scenes.writing import json_text, made
 from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
@@ -93,15 +93,11 @@ _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 @contextmanager
 def speaking(voice: Voice) -> Iterator[None]:
     """Within this block commands print in this voice."""
-    token = _voice.set(voice)
     say = (
         (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
     )
-    try:
-        with announcing(say):
-            yield
-    finally:
-        _voice.reset(token)
+    with within(_voice, voice), announcing(say):
+        yield
 
 
 class _Screen(Console):

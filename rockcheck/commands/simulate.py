@@ -35,7 +35,7 @@ from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scen
 from rockcheck.scenes.errors import printable
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.history import check_format
-from rockcheck.scenes.progress import announcing, listening, one_run
+from rockcheck.scenes.progress import ONE_RUN, announcing, listening, within
 from rockcheck.scenes.writing import write_new
 from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.execute.models import (
@@ -142,7 +142,11 @@ def run(
     for path in files:
         check_file(path, "--output", checks.get(path, kind_of))
     title = f"{what.name}, {model}"
-    with playing(title, [(model, given)]) as on_progress, listening(on_progress), one_run():
+    with (
+        playing(title, [(model, given)]) as on_progress,
+        listening(on_progress),
+        within(ONE_RUN, True),
+    ):
         history = simulate(what)
     try:
         for path in histories:

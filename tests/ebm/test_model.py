@@ -8,7 +8,7 @@ import pytest
 
 from rockcheck.ebm import EventBasedModel, packed
 from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall, load_scene
-from rockcheck.scenes.progress import one_run
+from rockcheck.scenes.progress import ONE_RUN, within
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 #: A scene with what is changed in it.
@@ -107,7 +107,7 @@ def test_a_single_short_run_does_not_wait_for_the_compiler(monkeypatch, settings
     monkeypatch.setattr(packed, "loop_of", compiled)
     monkeypatch.setattr(packed, "is_ready", lambda *given: False)
     monkeypatch.setattr("rockcheck.ebm.model._INTERPRETED", steps)
-    with one_run():
+    with within(ONE_RUN, True):
         found = model.simulate(scene)
     stiff = model.friction == "bouc-wen"
     assert interpreted.called != stiff

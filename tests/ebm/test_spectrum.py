@@ -104,7 +104,7 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
 
     def failing(packed, model, **rest):
         found = run(packed, model, **rest)
-        tolerances.append((len(packed), model.tolerance))
+        tolerances.append((len(packed.durations), model.tolerance))
         if len(tolerances) == 1:
             found.ending[1], found.side[1] = Ending.TOO_MANY_STEPS, 0
         return found

@@ -27,7 +27,7 @@ from rockcheck.scenes import (
     load_scene,
 )
 from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.progress import one_run
+from rockcheck.scenes.progress import ONE_RUN, within
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 CHOICES = Path(__file__).parents[2] / "data" / "modelling_choices"
@@ -284,7 +284,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
 
     monkeypatch.setattr(compiled._Inner, "__call__", watched)
     monkeypatch.setattr(packed, "is_ready", lambda *given: False)
-    with one_run():  # which is interpreted, before it is compiled
+    with within(ONE_RUN, True):  # which is interpreted, before it is compiled
         EventBasedModel(pivot="unilateral", tolerance=1e-8).simulate(SCENES["wedged"])
     assert len(seen) > 30
 

@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.batch import Packed, pack, pack_pulses, run_batch
+from rockcheck.ebm.batch import pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
+from rockcheck.ebm.core.state import Rows
 from rockcheck.ebm.spectrum import Floats
 from rockcheck.scenes import Floor, ModelFailure, Record, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
@@ -135,7 +136,7 @@ CASES = (
 )
 
 
-def packed_of(case: BatchCase, model: EventBasedModel, nodes: int) -> Packed:
+def packed_of(case: BatchCase, model: EventBasedModel, nodes: int) -> Rows:
     """The runs of a batch: `nodes` pulses along each axis of the grid, or `nodes` scales."""
     if case.scene is not None:
         return pack_pulses(case.scene, model, *grid(case.scene, nodes))
@@ -186,12 +187,14 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
             costs[tolerance].append((time.process_time() - began_cpu, time.perf_counter() - began))
     for tolerance, outcomes in found.items():
         error, one = np.abs(outcomes.peak - reference.peak), median(ones)
-        cpu, wall = (median(some) / len(packed) for some in zip(*costs[tolerance], strict=True))
+        cpu, wall = (
+            median(some) / len(packed.durations) for some in zip(*costs[tolerance], strict=True)
+        )
         rows.append(
             BatchTime(
                 case=case.name,
                 tolerance=tolerance,
-                runs=len(packed),
+                runs=len(packed.durations),
                 cpu=cpu,
                 wall=wall,
                 evaluations=cpu / one,
@@ -314,7 +317,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
         run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
-        return _timed(lambda _: run(), len(packed)), run
+        return _timed(lambda _: run(), len(packed.durations)), run
 
     sticky = PLAIN.replace(floor=Floor(friction=1.3))
     basis = batch(PLAIN)
