@@ -237,7 +237,7 @@ class ContinuousModel(Frozen):
             2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2
         )
         for wall in scene.walls:
-            if kinematics.wall_gap(scene, wall.side, x, tilt) < TOUCHING:
+            if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
                 surface = kernels.LEFT_WALL if wall.side == "left" else kernels.RIGHT_WALL
                 memory[2 * surface : 2 * surface + 2, kernels.LAST_CLOSED] = 0.0
         sunk = 0.0

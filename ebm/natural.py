@@ -5,7 +5,7 @@ that of its weaker pivot, and the compiled code follows its mass's centre, not t
 """
 
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,16 +23,8 @@ def time_unit(scene: Scene) -> float:
     return math.sqrt(scene.block.radius / scene.gravity)
 
 
-def setting_of(
-    scene: Scene,
-    *,
-    unilateral: bool,
-    no_slip: bool,
-    energy_cap: bool,
-    impacts: str = "moreau",
-    yields: float = 0.0,
-) -> np.record:
-    """Block, floor and walls of a scene in natural units."""
+def setting_of(scene: Scene, model: Any) -> np.record:
+    """Block, floor and walls of a scene in natural units, as the model's settings have them."""
     radius = scene.block.radius
     left, right = scene.wall("left"), scene.wall("right")
     side = side_of(scene.block, "left")
@@ -50,11 +42,11 @@ def setting_of(
         e_left=left.restitution if left else 0.0,
         e_right=right.restitution if right else 0.0,
         walls=bool(scene.walls),
-        no_slip=no_slip,
-        unilateral=unilateral,
-        energy_cap=energy_cap,
-        law=LAWS.index(impacts),
-        yields=yields,
+        no_slip=model.friction == "no-slip",
+        unilateral=model.pivot == "unilateral",
+        energy_cap=model.energy_cap,
+        law=LAWS.index(model.impacts),
+        yields=model.yield_displacement / radius,
     )
 
 

@@ -35,7 +35,9 @@ def pack(scenes: Sequence[Scene], model: Any) -> Rows:
     forms["first"] = np.cumsum(forms["count"]) - forms["count"]
     units = np.array([natural.time_unit(scene) for scene in scenes])
     return Rows(
-        settings=np.array([setting_for(scene, model) for scene in scenes], dtype=block.SETTING),
+        settings=np.array(
+            [natural.setting_of(scene, model) for scene in scenes], dtype=block.SETTING
+        ),
         horizontal=forms[::2].copy(),
         vertical=forms[1::2].copy(),
         starts=np.array([tuple(natural.state_of(scene).tolist()) for scene in scenes], MOTION),
@@ -67,25 +69,13 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     horizontal["quiet"] *= periods
     still = natural.base_of(scene).vertical
     return Rows(
-        settings=np.full(count, setting_for(scene, model), dtype=block.SETTING),
+        settings=np.full(count, natural.setting_of(scene, model), dtype=block.SETTING),
         horizontal=horizontal,
         vertical=np.full(count, still.form, dtype=FORM),
         starts=np.full(count, np.array(tuple(natural.state_of(scene)), dtype=MOTION)),
         durations=np.full(count, scene.duration / unit),
         output_steps=np.full(count, scene.output_step / unit),
         samples=still.samples,
-    )
-
-
-def setting_for(scene: Scene, model: Any) -> np.record:
-    """Block, floor and walls in natural units, as the model's settings have them."""
-    return natural.setting_of(
-        scene,
-        unilateral=model.pivot == "unilateral",
-        no_slip=model.friction == "no-slip",
-        energy_cap=model.energy_cap,
-        impacts=model.impacts,
-        yields=model.yield_displacement / scene.block.radius,
     )
 
 

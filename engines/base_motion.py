@@ -54,37 +54,23 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
     return velocity
 
 
-class BaseMotion:
-    """The base motion of a scene along both axes.
+def felt_acceleration(scene: Scene, edges: FloatArray) -> FloatArray:
+    """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).
 
-    `starts` are the times at which it may set a resting block in motion.
+    The steps lie between the times `edges`.
     """
-
-    def __init__(self, scene: Scene) -> None:
-        self.across, self.up = velocity_of(scene.excitation), velocity_of(scene.vertical)
-        self.gravity = scene.gravity
-        ends = [one.interval * np.arange(len(one.pieces) + 1) for one in (self.across, self.up)]
-        self.starts = _starts_of_motion(scene, np.unique(np.concatenate(ends)))
-
-    def velocity(self, t: float) -> tuple[float, float]:
-        """Velocity of the base to the right and up in m/s at the time `t` >= 0 in s."""
-        return velocity_at(t, *self.across), velocity_at(t, *self.up)
-
-    def felt_acceleration(self, edges: FloatArray) -> FloatArray:
-        """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).
-
-        The steps lie between the times `edges`.
-        """
-        gained = np.diff([self.velocity(t) for t in edges.tolist()], axis=0)
-        return -gained / np.diff(edges)[:, None] - np.array([0.0, self.gravity])
+    base = velocity_of(scene.excitation), velocity_of(scene.vertical)
+    gained = np.diff([[velocity_at(t, *one) for one in base] for t in edges.tolist()], axis=0)
+    return -gained / np.diff(edges)[:, None] - np.array([0.0, scene.gravity])
 
 
-def _starts_of_motion(scene: Scene, times: FloatArray) -> list[float]:
+def starts_of_motion(scene: Scene, *base: BaseVelocity) -> list[float]:
     """Sorted times at which a block at rest on the floor may start or stop to slide or tip, s.
 
     There |u| crosses mu (g + vg) or tan(alpha) (g + vg); accelerations are taken to be linear
-    between `times`.
+    between the ends of the pieces of `base`.
     """
+    times = np.unique([t for one in base for t in one.interval * np.arange(len(one.pieces) + 1)])
     pushing = np.abs(scene.excitation.acceleration(times))
     holding = scene.gravity + scene.vertical.acceleration(times)
     found = []

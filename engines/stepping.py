@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.base_motion import BaseMotion, velocity_at
+from rockcheck.engines.base_motion import starts_of_motion, velocity_at, velocity_of
 from rockcheck.engines.contacts import arm_of, contacts_of, gap_of, rate_of
 from rockcheck.scenes import Scene, kinematics
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -95,15 +95,14 @@ class March(NamedTuple):
 
 def course_of(scene: Scene, longest: float, short: float) -> Course:
     """Steps of at most `longest` s, and near events `short` times the usual."""
-    base = BaseMotion(scene)
+    base = velocity_of(scene.excitation), velocity_of(scene.vertical)
     moment = short / scene.frequency_parameter
     across, up = (
-        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last)
-        for one in (base.across, base.up)
+        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in base
     )
     return Course(
         corners=np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
-        starts=np.array([*base.starts, math.inf]),
+        starts=np.array([*starts_of_motion(scene, *base), math.inf]),
         across=across,
         up=up,
         end=float(scene.output_times[-1]),

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from rockcheck.engines.base_motion import BaseMotion, FloatArray
+from rockcheck.engines.base_motion import FloatArray, felt_acceleration
 from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
 from rockcheck.scenes.progress import tell
 
@@ -224,7 +224,7 @@ class FixedStep:
         count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
-        felt = BaseMotion(scene).felt_acceleration(times)
+        felt = felt_acceleration(scene, times)
         return partial(march_fixed, world, scene, times, felt)
 
 

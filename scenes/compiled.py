@@ -18,7 +18,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -412,9 +412,6 @@ def inner_kernel(function: Callable[..., Any], *, forceinline: bool = True) -> A
     )
 
 
-def called_kernel(function: Callable[..., Any]) -> Any:
-    """An inner kernel that is called, not inlined: for long code with several call sites.
-
-    Inlined, it would be compiled again at each of them.
-    """
-    return inner_kernel(function, forceinline=False)
+#: An inner kernel that is called, not inlined: for long code with several call sites. Inlined, it
+#: would be compiled again at each of them.
+called_kernel = partial(inner_kernel, forceinline=False)

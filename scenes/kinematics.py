@@ -7,12 +7,12 @@ need the centre of mass convert by `of_mass` and `of_box`; the two centres of a 
 are one.
 """
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from rockcheck.scenes.block import Block
-from rockcheck.scenes.scene import Scene
 
 #: Sign of each side in `clearance`: x is positive to the right.
 OUTWARD = {"left": 1.0, "right": -1.0}
@@ -55,12 +55,6 @@ def reach_rate(block: Block, side: str, theta: Any, x_dot: Any, theta_dot: Any) 
     )
 
 
-def wall_gap(scene: Scene, side: str, x: Any, theta: Any) -> Any:
-    """Clear distance between the block and the wall on `side`, m: negative is a penetration."""
-    wall = next(w for w in scene.walls if w.side == side)
-    return clearance(scene.block, side, wall.gap, x, theta)
-
-
 def top_corners(block: Block, x: Any, theta: Any) -> Any:
     """Horizontal places of the two top corners (2, ...), m."""
     b, h = block.half_width, block.half_height
@@ -80,9 +74,8 @@ def of_mass(block: Block, states: Any, sense: float = 1.0) -> Any:
     return np.stack([x + right, y + up, theta, x_dot - w * up, y_dot + w * right, w], axis=-1)
 
 
-def of_box(block: Block, states: Any) -> Any:
-    """States of the box's centre, from the centre of mass; (..., 6: x, y, theta and rates)."""
-    return of_mass(block, states, -1.0)
+#: States of the box's centre, from the centre of mass; (..., 6: x, y, theta and rates).
+of_box = partial(of_mass, sense=-1.0)
 
 
 def mass_motion(

@@ -95,7 +95,10 @@ def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]
     block = scene.block
     theta, sliding = channels["theta"], np.abs(channels["slip_rate"]) > 1e-3
     flat = (np.abs(theta) < 1e-4 * block.alpha) & (np.abs(channels["theta_dot"]) < 1e-3)
-    gaps = (kinematics.wall_gap(scene, wall.side, channels["x"], theta) for wall in scene.walls)
+    gaps = (
+        kinematics.clearance(scene.block, wall.side, wall.gap, channels["x"], theta)
+        for wall in scene.walls
+    )
     touching = np.any([np.zeros(len(theta), bool), *(gap < 1e-5 for gap in gaps)], axis=0)
     hop = kinematics.pivot_height(block, channels["y"], theta) > 1e-5
     return np.select(

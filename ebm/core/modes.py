@@ -26,9 +26,6 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
-#: Where a base acceleration is zero, its sign is read this much later (samples of a record may be
-#: much closer than AHEAD).
-SOON = 1e-6
 
 
 def _candidates() -> np.ndarray:

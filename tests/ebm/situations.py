@@ -12,7 +12,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from stepping import TILTED, block_of, run_at
 
-from rockcheck.ebm import natural
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import guards, modes, motion
 from rockcheck.ebm.core.names import Family, Guard, Pivot, Row, Rule
 from rockcheck.ebm.core.state import Run
@@ -115,12 +115,7 @@ class Core:
     """The core as these tests call it. Natural units: R, g, sqrt(R/g)."""
 
     def __init__(self, at: Situation, pivot: str, friction: str = "coulomb") -> None:
-        self.setting = natural.setting_of(
-            at.scene,
-            unilateral=pivot == "unilateral",
-            no_slip=friction == "no-slip",
-            energy_cap=False,
-        )
+        self.setting = natural.setting_of(at.scene, EventBasedModel(pivot=pivot, friction=friction))
         self.base = natural.base_of(at.scene)
 
     def select(self, state) -> Mode | None:

@@ -41,7 +41,7 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
     """The state after the compiled loop has played the scene, without rows."""
     states = state_for(model, model.most_steps)
     march.play(
-        pack([scene], model).rows,
+        pack([scene], model),
         states,
         work or workspace(),
         Records(*(part[None] for part in nothing())),
@@ -56,7 +56,7 @@ def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) ->
     assert np.all(np.isfinite([x, y, theta]))
     assert np.min(kinematics.pivot_height(scene.block, y, theta)) > -reach
     for wall in scene.walls:
-        assert np.min(kinematics.wall_gap(scene, wall.side, x, theta)) > -reach
+        assert np.min(kinematics.clearance(scene.block, wall.side, wall.gap, x, theta)) > -reach
 
 
 def row_of(coefficients: Sequence[float]) -> np.ndarray:
@@ -76,8 +76,8 @@ def block_of(alpha: float, radius: float = 1.0) -> Block:
 
 def setting_of(
     block: float | Block,
-    friction: float = 0.5,
-    restitution: float = 0.0,
+    mu: float = 0.5,
+    e: float = 0.0,
     walls: Sequence[Wall] = (),
     **how: Any,
 ) -> Any:
@@ -86,9 +86,9 @@ def setting_of(
         Scene(
             name="block",
             block=block if isinstance(block, Block) else block_of(block),
-            floor=Floor(friction=friction, restitution=restitution),
+            floor=Floor(friction=mu, restitution=e),
             walls=walls,
             duration=1.0,
         ),
-        **{"unilateral": True, "no_slip": False, "energy_cap": False} | how,
+        EventBasedModel(**{"pivot": "unilateral"} | how),
     )

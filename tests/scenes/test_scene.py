@@ -174,7 +174,8 @@ def test_a_tilt_may_touch_a_wall_but_not_enter_it(fault_of):
     # It may lean away from the wall as far.
     touching, _ = (scene(initial_rotation=one, walls=far) for one in (tilt, -tilt))
     x, _, theta, *_ = touching.initial_state
-    assert kinematics.wall_gap(touching, "left", x, theta) == pytest.approx(0.0, abs=1e-15)
+    left = kinematics.clearance(touching.block, "left", reach, x, theta)
+    assert left == pytest.approx(0.0, abs=1e-15)
     assert fault_of(scene, initial_rotation=tilt, walls=near).key == "initial_rotation"
 
 

@@ -321,7 +321,8 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
             continue
         rows = slice(max(row - 1, 0), row + 1)
         wall = min(
-            scene.walls, key=lambda w: kinematics.wall_gap(scene, w.side, x[row], theta[row])
+            scene.walls,
+            key=lambda w: kinematics.clearance(scene.block, w.side, w.gap, x[row], theta[row]),
         )
         rates = kinematics.reach_rate(
             scene.block, wall.side, theta[rows], x_dot[rows], theta_dot[rows]

@@ -302,7 +302,9 @@ def _deepest(motion: WindowedHistory) -> float:
     gaps, scene = [motion.heights()], motion.scene
     if scene is not None:
         place = motion.channel("x"), motion.channel("theta")
-        gaps += [kinematics.wall_gap(scene, wall.side, *place) for wall in scene.walls]
+        gaps += [
+            kinematics.clearance(scene.block, wall.side, wall.gap, *place) for wall in scene.walls
+        ]
     return float(np.maximum(np.max([-np.min(gap) for gap in gaps]), 0.0))
 
 

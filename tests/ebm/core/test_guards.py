@@ -21,7 +21,7 @@ from situations import (
 )
 from stepping import ROCKS, TILTED, run_at, setting_of
 
-from rockcheck.ebm import natural
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, ground, guards, modes, motion, series, steps
 from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
 from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
@@ -114,7 +114,7 @@ def test_series_obey_newton_and_euler_in_every_term(mode, vertical):
         vertical=vertical,
         duration=1.0,
     )
-    block = natural.setting_of(scene, unilateral=True, no_slip=False, energy_cap=False)
+    block = natural.setting_of(scene, EventBasedModel(pivot="unilateral"))
     for _ in range(20):
         side, w = int(rng.choice([-1, 1])), rng.uniform(-0.5, 0.5)
         phi, v = rng.uniform(0.0, 1.2) * PAPER_BLOCK.alpha, slip * rng.uniform(0.0, 1.0)
@@ -229,7 +229,7 @@ def test_series_begin_with_newton_and_euler(mode, case):
         scene = random_scene(rng).replace(
             walls=WALLS, excitation=Record.from_samples(np.full(3, rng.uniform(-3.0, 3.0)), 10.0)
         )
-        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        b = natural.setting_of(scene, EventBasedModel())
         unit, R = natural.time_unit(scene), scene.block.radius
         S, w = int(rng.choice([-1, 1])), 0.0 if mode == "lean" else rng.uniform(-1.0, 1.0)
         theta = S * rng.uniform(0.01, 0.9) * (b.left if S > 0 else b.right).alpha
@@ -270,7 +270,7 @@ def test_series_keep_the_corner_on_its_wall(case, friction):
     rng, order = np.random.default_rng(14), 8
     for _ in range(100):
         scene = random_scene(rng).replace(walls=WALLS)
-        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False, yields=0.1)
+        b = natural.setting_of(scene, EventBasedModel(yield_displacement=0.1 * scene.block.radius))
         S = int(rng.choice([-1, 1]))
         side = b.left if S > 0 else b.right
         theta, w = S * rng.uniform(0.1, 0.8) * side.alpha, S * rng.uniform(-0.3, 0.3)

@@ -124,7 +124,7 @@ def test_each_branch_of_the_wall_cascade(parting, lopsided):
     for corner, e, w1, xdot1, mu, no_slip in random_strikes(4000, parting, lopsided):
         S, Sw, s, c, C, share, spin = corner
         branch, w2, xdot2, n, p, v2 = impacts.wall_impact(
-            setting_of(0.4, mu, no_slip=no_slip), corner, e, w1, xdot1
+            setting_of(0.4, mu, friction="no-slip" if no_slip else "coulomb"), corner, e, w1, xdot1
         )
         seen[branch] += 1
         assert n >= 0.0

@@ -129,7 +129,7 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
     ]
     for _ in range(60):
         scene = random_scene(rng).replace(walls=walls)
-        b = natural.setting_of(scene, unilateral=False, no_slip=False, energy_cap=False)
+        b = natural.setting_of(scene, EventBasedModel())
         sense, tilt, w = int(rng.choice([-1, 1])), rng.uniform(0.2, 0.9), rng.uniform(-1.0, 1.0)
         block, wall = scene.block, sense * case
         theta = sense * tilt * block.pivot("left" if sense > 0 else "right").alpha
@@ -154,7 +154,7 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
 def test_nothing_rebounds_between_two_walls(gap, leans):
     """A block that leans on one wall as it strikes the other, and one that fills the room."""
     walls = tuple(Wall(side=side, gap=gap, restitution=0.9) for side in ("left", "right"))
-    b = setting_of(0.4, walls=walls, unilateral=False)
+    b = setting_of(0.4, walls=walls, pivot="bilateral")
     mode = {"family": Family.TILT if leans else Family.FLAT, "sense": 1, "tip": leans}
     state = run_at([0.0, math.cos(0.4), 0.1 * leans, -0.3, 0.1, 0.2], **mode).state
     assert not strike._wall_impact(b, state, False, 1e-9)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.engines.base_motion import BaseMotion
+from rockcheck.engines.base_motion import velocity_at, velocity_of
 from rockcheck.engines.steps import march_fixed
 from rockcheck.scenes import Floor, History, InputError, ModelFailure, Scene
 from rockcheck.scenes.errors import printable
@@ -470,6 +470,7 @@ def export(folder: Path) -> list[str]:
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
+            base = velocity_of(scene.excitation), velocity_of(scene.vertical)
             write_whole(
                 folder / f"{name}-base.csv",
                 table_text(
@@ -483,7 +484,7 @@ def export(folder: Path) -> list[str]:
                     np.column_stack(
                         [
                             t,
-                            list(map(BaseMotion(scene).velocity, t.tolist())),
+                            *([velocity_at(at, *one) for at in t.tolist()] for one in base),
                             *(one.acceleration(t) for one in (scene.excitation, scene.vertical)),
                         ]
                     ).tolist(),

@@ -158,7 +158,8 @@ class Motion:
         self.across, self.up = kinematics.mass_motion(block, *state)[1:]
         self.height: Floats = kinematics.pivot_height(block, channels["y"], theta) / self.radius
         self.gaps: dict[str, Floats] = {
-            wall.side: kinematics.wall_gap(scene, wall.side, channels["x"], theta) / self.radius
+            wall.side: kinematics.clearance(scene.block, wall.side, wall.gap, channels["x"], theta)
+            / self.radius
             for wall in scene.walls
         }
         self.deepest = max(float(np.max(-gap)) for gap in (self.height, *self.gaps.values()))
