@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -190,10 +190,7 @@ def _packed(
             ],
             model,
         )
-    periods = 2.0 * math.pi / (frequency_ratios * scene.frequency_parameter)
-    return batch.pack_pulses(
-        scene, model, amplitude_ratios * scene.gravity * scene.block.slope, periods
-    )
+    return batch.pack_pulses(scene, model, *node_pulse(scene, amplitude_ratios, frequency_ratios))
 
 
 @dataclass(frozen=True)
@@ -262,7 +259,7 @@ def node_scene(
             block=scene.block.scaled(float(frequency_ratio)),
             duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
         )
-    amplitude, period = node_pulse(scene, amplitude_ratio, frequency_ratio)
+    amplitude, period = node_pulse(scene, float(amplitude_ratio), float(frequency_ratio))
     pulse = type(scene.excitation)(
         **scene.excitation.model_dump() | {"amplitude": amplitude, "period": period}
     )
@@ -271,13 +268,13 @@ def node_scene(
     )
 
 
-def node_pulse(scene: Scene, amplitude_ratio: float, frequency_ratio: float) -> tuple[float, float]:
-    """Amplitude (m/s^2) and period (s) of the pulse of one node.
+def node_pulse(scene: Scene, amplitude_ratio: Any, frequency_ratio: Any) -> tuple[Any, Any]:
+    """Amplitude (m/s^2) and period (s) of the pulse of one node, or of many.
 
     They are a = A g tan(alpha) and T = 2 pi/(F p), with the frequency parameter p.
     """
-    amplitude = float(amplitude_ratio) * scene.gravity * scene.block.slope
-    return amplitude, 2.0 * math.pi / (float(frequency_ratio) * scene.frequency_parameter)
+    amplitude = amplitude_ratio * scene.gravity * scene.block.slope
+    return amplitude, 2.0 * math.pi / (frequency_ratio * scene.frequency_parameter)
 
 
 def check_excitation(scene: Scene) -> None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import gzip
-import io
 import json
 import os
 import re
 import stat
-import zipfile
 import zlib
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
@@ -16,7 +14,6 @@ from typing import IO, TYPE_CHECKING, Any, cast
 from rockcheck.scenes.errors import InputError, inert, printable
 
 if TYPE_CHECKING:
-    import numpy as np
     import pandas as pd
 
 #: Largest text file, bytes.
@@ -127,28 +124,6 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
             raise InputError(f"{printable(path)}: not a text file") from None
         text = content.decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def read_arrays(path: Path, most: int = MOST_BYTES) -> dict[str, np.ndarray]:
-    """The arrays of an NPZ file, by name.
-
-    Raises `InputError` where it is none, is not whole, is too large or holds objects.
-    """
-    import numpy as np
-
-    shown = printable(path)
-    with open_regular(path, most) as stream:
-        try:
-            with zipfile.ZipFile(io.BytesIO(stream.read(most))) as content:
-                if sum(entry.file_size for entry in content.infolist()) > most:
-                    raise InputError(f"{shown}: its arrays are larger than {most} bytes")
-            stream.seek(0)
-            with np.load(stream) as data:  # numpy unpickles nothing by default
-                return {name: data[name] for name in data.files}
-        except InputError:
-            raise
-        except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-            raise InputError(f"{shown}: not a whole file of arrays: {printable(error)}") from None
 
 
 #: First bytes of a file that gzip has compressed.

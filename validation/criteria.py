@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rockcheck.scenes import Record, Scene
-from rockcheck.scenes.block import Block
+from rockcheck.scenes.block import Block, Pivot
 from rockcheck.scenes.excitations import Excitation
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 
@@ -43,6 +43,20 @@ def overturning_velocity(block: Block, gravity: float) -> float:
     pivot = block.weaker_pivot
     energy = 2.0 * gravity * pivot.radius * (1.0 - math.cos(pivot.alpha))
     return math.sqrt(energy / pivot.share) / math.cos(pivot.alpha)
+
+
+def quarter_period(pivot: Pivot, gravity: float, tilt: float) -> float:
+    """Time (s) in which a block that rocks without a slip falls back from a tilt (rad) at rest.
+
+    The integral of dtheta over the angular velocity, from the energy, without small angles (Housner
+    1963 for small ones). theta = tilt - root^2 takes the singularity at the start away.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    root = 0.5 * math.sqrt(tilt) * (nodes + 1.0)
+    # cos(alpha - tilt) - cos(alpha - theta)
+    gap = 2.0 * np.sin(pivot.alpha - tilt + 0.5 * root**2) * np.sin(0.5 * root**2)
+    paces = 2.0 * root / (pivot.frequency_parameter(gravity) * np.sqrt(2.0 * gap))
+    return 0.5 * math.sqrt(tilt) * float(weights @ paces)
 
 
 def newmark_slip(velocity: float, acceleration: float, resistance: float) -> float:

@@ -105,17 +105,6 @@ def plain(cell: Any) -> Any:
     return cell.value if isinstance(cell, Mark) else cell
 
 
-def table_of(name: str, kind: type, records: Sequence[Any], **more: Any) -> Table:
-    """Records of one dataclass as a table for files, a column a field."""
-    fields = list(kind.__dataclass_fields__)  # type: ignore[attr-defined]
-    return Table(
-        name,
-        [Column(key) for key in fields],
-        [[getattr(record, key) for key in fields] for record in records],
-        **{"on": "file", **more},
-    )
-
-
 #: How a line of a panel is drawn.
 Style = Literal[
     "line",

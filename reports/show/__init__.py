@@ -9,7 +9,7 @@ from rockcheck.reports.show import words
 from rockcheck.reports.style import Figure
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.base import View
-from rockcheck.validation.discrepancy import Discrepancy
+from rockcheck.validation.discrepancy.compare import Discrepancy
 
 
 def _later(name: str) -> Callable[[Any], Figure]:

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.reports.style import SPARE, looks
-from rockcheck.scenes import History, InputError, Scene
+from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
-from rockcheck.validation.discrepancy import Discrepancy
+from rockcheck.validation.discrepancy.compare import Discrepancy
 from rockcheck.validation.discrepancy.figures import Pair
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
@@ -121,12 +121,7 @@ def rotation_lines(axes: Any, histories: list[History], colours: list[str]) -> N
 
 
 def discrepancy_figure(found: Discrepancy) -> Figure:
-    """Rotation of both histories, and candidate minus reference over the compared time.
-
-    Raises `InputError` if the comparison has not kept its histories.
-    """
-    if found.histories is None:
-        raise InputError("this comparison has not kept its histories")
+    """Rotation of both histories, and candidate minus reference over the compared time."""
     reference, candidate = found.histories
     style = looks([reference.model, candidate.model])
     mine, other = style[reference.model], style[candidate.model]

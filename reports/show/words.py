@@ -14,7 +14,7 @@ from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from rockcheck.reports.style import SUPERSCRIPTS, Look
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
 from rockcheck.scenes.errors import inert
-from rockcheck.validation.discrepancy import Discrepancy
+from rockcheck.validation.discrepancy.compare import Discrepancy
 from rockcheck.validation.discrepancy.figures import (
     IMPACTS,
     STANDARD_GRAVITY,

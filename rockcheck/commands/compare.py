@@ -151,7 +151,6 @@ def headline(found: Discrepancy) -> str:
 
     The difference is an RMS value.
     """
-    assert found.histories is not None
     reference, candidate = (history.fate for history in found.histories)
     fate = (
         f"same outcome, {candidate}"

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm import Spectrum
 from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
 from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.paper import paper_panels
 
 DATA = Path(__file__).parents[1] / "data"
 Row = dict[str, str]
@@ -25,6 +27,23 @@ BILATERAL = rows_of("ebm_ricker_cases.csv")
 UNILATERAL = rows_of("unilateral_ricker_cases.csv")
 #: The unilateral runs in which rigid bodies have one answer.
 UNAMBIGUOUS = [row for row in UNILATERAL if row["depends_on_rule"] == "0"]
+
+
+def kept_spectra() -> list[Spectrum]:
+    """The paper's 28 spectra as they were once computed, 100 x 100 nodes each."""
+    data = np.load(DATA / "paper_spectra.npz")
+    return [
+        Spectrum(
+            outcomes=data[panel.name],
+            frequency_ratios=data["frequency_ratios"],
+            amplitude_ratios=data["amplitude_ratios"],
+            evaluations=data[panel.name].size,
+            undecided=data[f"{panel.name}.undecided"],
+            scene=panel.scene,
+            model=None,
+        )
+        for panel in paper_panels()
+    ]
 
 
 def ricker(frequency: float, amplitude: float, block: Block = PAPER_BLOCK) -> Ricker:

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 import whole_runs
+from cases import kept_spectra
 from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
@@ -16,7 +17,7 @@ from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
 from rockcheck.scenes.reading import read_json
 from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
-from rockcheck.validation.paper import KEPT, Panel as Case, kept_spectra, paper_panels
+from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
 from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.agreement import (
     CANDIDATES,

@@ -9,7 +9,6 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import rockcheck
@@ -19,7 +18,6 @@ from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.reading import (
     head_of,
     open_regular,
-    read_arrays,
     read_bytes,
     read_json,
     read_table,
@@ -65,9 +63,7 @@ def test_a_folder_of_results_is_no_link(tmp_path, fault_of):
 
 
 @pytest.mark.needs("POSIX")
-@pytest.mark.parametrize(
-    "read", [open_regular, read_bytes, read_text, read_json, read_table, read_arrays]
-)
+@pytest.mark.parametrize("read", [open_regular, read_bytes, read_text, read_json, read_table])
 @pytest.mark.parametrize("trap", ["a link to a device", "a link to itself", "a pipe"])
 def test_what_is_no_file_is_not_opened(tmp_path, monkeypatch, trap, read, fault_of):
     path = tmp_path / "given"
@@ -322,19 +318,3 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, fault_of):
     (tmp_path / "a.toml").touch()
     os.truncate(tmp_path / "a.toml", 10_000_001)
     assert "larger than 10000000 bytes" in str(fault_of(read_toml, tmp_path / "a.toml"))
-
-
-def test_arrays_are_read_whole_without_objects_and_bounded(tmp_path, fault_of):
-    """What lies beside a spectrum may be anybody's: objects, which would be unpickled, half a file
-    and a bomb are one line each."""
-    path = tmp_path / "a.npz"
-    np.savez_compressed(path, x=np.arange(3.0), y=np.zeros(100_000))
-    assert read_arrays(path)["x"].tolist() == [0.0, 1.0, 2.0]
-    for spoil, said in (
-        (Path.touch, "arrays are larger than 10000 bytes"),
-        (lambda path: path.write_bytes(path.read_bytes()[:-60]), "not a whole file of arrays"),
-        (lambda path: np.savez(path, x=np.array([{"a": 1}])), "not a whole file of arrays"),
-        (Path.unlink, "cannot be read"),
-    ):
-        spoil(path)
-        assert said in str(fault_of(read_arrays, path, most=10_000))

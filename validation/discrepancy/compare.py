@@ -50,7 +50,7 @@ class Discrepancy(Shown):
     gap: str = ""
     fall: bool = False
     #: The reference's history and the candidate's.
-    histories: tuple[History, History] | None = field(default=None, repr=False, compare=False)
+    histories: tuple[History, History] = field(kw_only=True, repr=False, compare=False)
 
     def __getitem__(self, measure: str) -> float:
         """The value of a measure; NaN where it could not be computed."""

@@ -355,7 +355,6 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
 
 def _strong(impacts: Sequence[Event]) -> list[bool]:
     """Which impacts are not weak (`WEAK_IMPACT`) among those of their kind."""
-    most: dict[str, float] = {}
-    for event in impacts:
-        most[event.kind] = max(most.get(event.kind, 0.0), abs(event.impulse))
+    kinds = {event.kind for event in impacts}
+    most = {k: max(abs(event.impulse) for event in impacts if event.kind == k) for k in kinds}
     return [abs(event.impulse) >= WEAK_IMPACT * most[event.kind] for event in impacts]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rockcheck.scenes import Scene, kinematics
 from rockcheck.scenes.block import Pivot
+from rockcheck.validation.criteria import quarter_period
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
     Array,
@@ -425,26 +426,11 @@ def _bounce_height(motion: WindowedHistory) -> float:
 
 
 def _quarter_period(motion: WindowedHistory) -> float:
-    from scipy.integrate import quad
-
     scene = _scene(motion)
     pivot = _released(motion)[0]
-    tilt, alpha = abs(scene.initial_rotation), pivot.alpha
-    p = pivot.frequency_parameter(scene.gravity)
-
-    def pace(root: float) -> float:
-        # theta = theta_0 - root^2 takes the singularity at the start away.
-        theta = tilt - root**2
-        if root <= 0.0:
-            return 2.0 / (p * math.sqrt(2.0 * math.sin(alpha - tilt)))
-        # cos(alpha - theta_0) - cos(alpha - theta)
-        gap = 2.0 * math.sin(alpha - 0.5 * (tilt + theta)) * math.sin(0.5 * (tilt - theta))
-        return 2.0 * root / (p * math.sqrt(2.0 * gap))
-
-    quarter = quad(pace, 0.0, math.sqrt(tilt), epsabs=1e-13, epsrel=1e-13)[0]
     impacts = motion.events("floor impact")
     _need(bool(impacts), "a floor impact")
-    return impacts[0].t - quarter
+    return impacts[0].t - quarter_period(pivot, scene.gravity, abs(scene.initial_rotation))
 
 
 def _impact_ratio(motion: WindowedHistory) -> float:

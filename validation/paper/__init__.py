@@ -6,9 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-from rockcheck.ebm import Spectrum
 from rockcheck.scenes import Floor, Ricker, Scene, Wall
-from rockcheck.scenes.reading import read_arrays
 from rockcheck.scenes.scene import PAPER_BLOCK
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
@@ -72,20 +70,3 @@ def _panel(figure: int, place: tuple[float, float] | None) -> Panel:
         duration=1.0,
     )
     return Panel(scene.name, title, scene, figure)
-
-
-def kept_spectra() -> list[Spectrum]:
-    """The 28 spectra as they come with the package, 100 x 100 nodes each."""
-    data = read_arrays(KEPT / "grids.npz")
-    return [
-        Spectrum(
-            outcomes=data[panel.name],
-            frequency_ratios=data["frequency_ratios"],
-            amplitude_ratios=data["amplitude_ratios"],
-            evaluations=data[panel.name].size,
-            undecided=data[f"{panel.name}.undecided"],
-            scene=panel.scene,
-            model=None,
-        )
-        for panel in paper_panels()
-    ]

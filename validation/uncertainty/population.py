@@ -328,11 +328,8 @@ def sensitivities(
         return np.array([np.minimum(found.peak / alphas, 1.0), found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
-    how = {"func": peak_and_fall, "n": samples, "dists": laws}
-    try:
-        found = sobol_indices(**how, rng=np.random.default_rng(seed))
-    except TypeError:  # scipy before 1.15 calls it random_state
-        found = sobol_indices(**how, random_state=np.random.default_rng(seed))
+    chance = np.random.default_rng(seed)
+    found = sobol_indices(func=peak_and_fall, n=samples, dists=laws, rng=chance)
     # of one input scipy gives numbers in place of rows
     first, total = (np.reshape(some, (2, -1))[0] for some in (found.first_order, found.total_order))
     if not np.any(total):

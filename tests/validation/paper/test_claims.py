@@ -8,10 +8,11 @@ import math
 import numpy as np
 import pytest
 import whole_runs
+from cases import kept_spectra
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
-from rockcheck.validation.paper import kept_spectra, paper_panels
+from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
 from rockcheck.validation.studies.spectrum.tiles import nodes_of
 

@@ -20,6 +20,7 @@ from rockcheck.validation.criteria import (
     newmark_slip,
     overturning_velocity,
     overturns_without_impact,
+    quarter_period,
     rectangular_pulse_ratio,
 )
 
@@ -209,13 +210,7 @@ def housner(m: Motion) -> float:
 
 def period(m: Motion) -> float:
     """The quarter period, up to the first impact, over Housner's without small angles."""
-    alpha, p = SLENDER.alpha, SLENDER.frequency_parameter
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    # theta = tilt - root^2 takes the singularity at the start away.
-    root = 0.5 * math.sqrt(TILT) * (nodes + 1.0)
-    speed = np.sqrt(2.0 * (np.cos(alpha - TILT) - np.cos(alpha - TILT + root**2))) * p
-    quarter = 0.5 * math.sqrt(TILT) * float(np.sum(weights * 2.0 * root / speed))
-    return _when(m.t, -m.theta, 0.0) / quarter
+    return _when(m.t, -m.theta, 0.0) / quarter_period(SLENDER.weaker_pivot, G, TILT)
 
 
 def falls(m: Motion) -> float:

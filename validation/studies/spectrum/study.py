@@ -338,8 +338,7 @@ def _pulse(panel: Panel, request: tiles.Request) -> dict[str, Any] | None:
     if not isinstance(pulse, Ricker | Sine):
         return None
     f, a = request.frequencies, request.amplitudes
-    amplitudes = [node_pulse(panel.scene, one, f[0])[0] for one in a]
-    periods = [node_pulse(panel.scene, a[0], one)[1] for one in f]
+    amplitudes, periods = (some.tolist() for some in node_pulse(panel.scene, a, f))
     return {
         "amplitude": amplitudes,
         "period": periods,

@@ -31,7 +31,7 @@ from rockcheck.scenes.errors import printable
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, table_of, text
+from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, text
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
     CheckedRun,
@@ -465,7 +465,12 @@ def _runs(totals: Sequence[RunTotals]) -> Iterator[Table]:
         " its data by 1e-8 turns the block by 1e-6 rad. Energy is integrated in every tenth run.",
     )
     failures = [failure for one in totals for failure in one.failures]
-    yield table_of("failures", Broken, failures)
+    yield Table(
+        "failures",
+        [*map(Column, Broken.__dataclass_fields__)],
+        [[*vars(one).values()] for one in failures],
+        on="file",
+    )
     yield Table(
         "scenes",
         [

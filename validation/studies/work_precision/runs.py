@@ -19,6 +19,7 @@ import pandas as pd
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.ebm.spectrum import node_pulse
 from rockcheck.scenes import Floor, History, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.discrepancy.compare import compare
@@ -40,14 +41,6 @@ class SceneFamily:
     member: Callable[[int], Scene]
 
 
-def pulse_of(scene: Scene, frequency_ratio: Any, amplitude_ratio: Any) -> tuple[Any, Any]:
-    """Amplitude (m/s^2) and period (s) of pulses of omega_p = ratio p, a_p = ratio g tan alpha."""
-    return (
-        amplitude_ratio * scene.gravity * math.tan(scene.block.alpha),
-        2.0 * math.pi / (frequency_ratio * scene.frequency_parameter),
-    )
-
-
 def pulse(
     frequency_ratio: float,
     amplitude_ratio: float,
@@ -56,7 +49,7 @@ def pulse(
     walls: tuple[Wall, ...] = (),
     name: str = "pulse",
 ) -> Scene:
-    """A scene of 3 s under a Ricker pulse, see `pulse_of`."""
+    """A scene of 3 s under a Ricker pulse, see `node_pulse`."""
     still = Scene(
         name=name,
         block=PAPER_BLOCK,
@@ -65,7 +58,7 @@ def pulse(
         excitation=Rest(),
         duration=3.0,
     )
-    amplitude, period = pulse_of(still, frequency_ratio, amplitude_ratio)
+    amplitude, period = node_pulse(still, amplitude_ratio, frequency_ratio)
     return still.replace(excitation=Ricker(amplitude=amplitude, period=period))
 
 

@@ -24,7 +24,6 @@ from rockcheck.validation.finding import (
     Style,
     Table,
     Text,
-    table_of,
     text,
 )
 from rockcheck.validation.studies.work_precision import runs, timings
@@ -323,7 +322,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
     # The worst error is shown for engines only.
     yield _table("work-precision", points.drop(columns="rms_worst"), title="All settings", **how)
     yield _table("orders-and-ratios", trends)
-    yield table_of("runs", BenchmarkRun, samples)
+    yield _table("runs", pd.DataFrame(samples))
     yield Text(title="Left out", items=runs.LEFT_OUT, on="page")
 
 
@@ -428,7 +427,7 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         items=[*runs.exceptions_of(frame, orders)] or ["Nothing."],
     )
     yield _table("orders", orders)
-    yield table_of("wall-runs", BenchmarkRun, samples)
+    yield _table("wall-runs", pd.DataFrame(samples))
 
 
 def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
@@ -503,9 +502,7 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
         x=Axis("p95 error of the peak, rad", log=True),
         y=Axis("CPU μs a run, one core", log=True),
     )
-    yield table_of(
-        "batch-times", timings.BatchTime, times, title="All tolerances", on="page", folded=True
-    )
+    yield _table("batch-times", pd.DataFrame(times), title="All tolerances", on="page", folded=True)
 
 
 def _cold_starts(starts: Sequence[timings.ColdStart]) -> Iterator[Block]:

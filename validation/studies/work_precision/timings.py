@@ -26,12 +26,12 @@ from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.ebm.core.state import Rows
-from rockcheck.ebm.spectrum import Floats
+from rockcheck.ebm.spectrum import Floats, node_pulse
 from rockcheck.scenes import Floor, ModelFailure, Record, Scene, Wall, load_scene
 from rockcheck.scenes.compiled import kernel
 from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.execute.models import Model, build, not_installed
-from rockcheck.validation.studies.work_precision.runs import pulse, pulse_of
+from rockcheck.validation.studies.work_precision.runs import pulse
 
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
@@ -123,7 +123,7 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
     frequency, amplitude = np.meshgrid(
         np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes)
     )
-    return pulse_of(scene, frequency.ravel(), amplitude.ravel())
+    return node_pulse(scene, amplitude.ravel(), frequency.ravel())
 
 
 BESIDE = PLAIN.replace(walls=(Wall(side="left", gap=0.053),))
@@ -150,9 +150,8 @@ def batch_size(runs: int, threads: int) -> BatchSize:
     """Times a batch of `runs` random pulses on `threads` threads."""
     scene, model = PLAIN, EventBasedModel(tolerance=LEVEL)
     random = np.random.default_rng(1)
-    pulses = pulse_of(
-        scene, random.uniform(*FREQUENCY_RATIOS, runs), random.uniform(*AMPLITUDE_RATIOS, runs)
-    )
+    frequencies = random.uniform(*FREQUENCY_RATIOS, runs)
+    pulses = node_pulse(scene, random.uniform(*AMPLITUDE_RATIOS, runs), frequencies)
     cost = _timed(
         lambda _: run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=threads),
         runs,
