@@ -345,14 +345,12 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
 
     They are made in processes of their own where that is quicker.
     """
-    if sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW:
-        yield from map(pages.write, [*stamps, INDEX], [*stamps.values(), ""])
-        return
+    few = sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW
     calls = [
-        Call(_write_page, (pages.folder, pages.wanted, *one))
+        Call(pages.write, one) if few else Call(_write_page, (pages.folder, pages.wanted, *one))
         for one in (*stamps.items(), (INDEX, ""))
     ]
-    yield from side_by_side(calls, min(jobs, len(stamps)), least=2)
+    yield from side_by_side(calls, 1 if few else min(jobs, len(stamps)), least=2)
 
 
 def _belongings(page: Path) -> set[str]:

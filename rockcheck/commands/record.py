@@ -1,6 +1,6 @@
 """`rockcheck record`: how a file of a recorded ground motion was read."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,8 +17,8 @@ from rockcheck.commands import (
     tell_left_out,
 )
 from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity, read_components
-from rockcheck.scenes.recordings.sets import Odd, files_of, record_path
+from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity
+from rockcheck.scenes.recordings.sets import Odd, files_of, read_files, record_path
 from rockcheck.validation.finding import Finding, Table, Text, text
 from rockcheck.validation.suite.motions import RecordSet
 
@@ -63,7 +63,8 @@ def run(
         check_file(plot, "--plot")
     reading = Reading(**dict(setting_of(word, "--read") for word in read or ()))
     asked = files_of(files)
-    found, faults = _components(asked, reading)
+    known, faults = read_files(dict.fromkeys(asked, False), reading)
+    found = [(path, one) for path, components in known.items() for one in components]
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)
@@ -75,22 +76,9 @@ def run(
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
-        tell_left_out(faults[1:])
+        tell_left_out([*map(Odd, faults[1:])])
         more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
-
-
-def _components(
-    files: Iterable[Path], reading: Reading
-) -> tuple[list[tuple[Path, Recording]], list[Odd]]:
-    found: list[tuple[Path, Recording]] = []
-    faults: list[Odd] = []
-    for path in files:
-        try:
-            found += [(path, one) for one in read_components(path, reading)]
-        except InputError as error:
-            faults.append(Odd(error))
-    return found, faults
 
 
 def _values(path: Path, record: Recording) -> dict[str, Any]:

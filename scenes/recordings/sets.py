@@ -75,7 +75,9 @@ def motions_of(
     vertical.
     """
     motions: list[tuple[str, Recording]] = []
-    read, odd = _read(paths, reading)
+    read, faults = read_files(paths, reading)
+    if faults and not read:
+        raise faults[0]
     left_out: list[str] = []
     for path, components in read.items():
         for one in components:
@@ -86,13 +88,15 @@ def motions_of(
                 motions.append((name, one))
     if left_out and not motions:
         raise InputError(f"{left_out[0]}: a vertical component, and no horizontal one is given")
-    return motions, [*left_out, *odd]
+    return motions, [*left_out, *map(Odd, faults)]
 
 
-def _read(paths: Iterable[Path], reading: Reading) -> tuple[dict[Path, list[Recording]], list[Odd]]:
+def read_files(
+    paths: Iterable[Path], reading: Reading
+) -> tuple[dict[Path, list[Recording]], list[InputError]]:
     """The components of each file that can be read, and the faults of the others.
 
-    Raises `InputError` for a file that was named itself, or where no file can be read.
+    Raises `InputError` for a file that was named itself.
     """
     read: dict[Path, list[Recording]] = {}
     faults: list[InputError] = []
@@ -103,9 +107,7 @@ def _read(paths: Iterable[Path], reading: Reading) -> tuple[dict[Path, list[Reco
             if not isinstance(paths, Mapping) or paths[path]:
                 raise
             faults.append(error)
-    if faults and not read:
-        raise faults[0]
-    return read, [Odd(error) for error in faults]
+    return read, faults
 
 
 def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording]:
@@ -140,7 +142,7 @@ def _directions(
     paths: Iterable[Path], reading: Reading
 ) -> tuple[dict[Path, list[str]], dict[Path, list[Recording]]]:
     """The names of the motions of each file that holds any; the vertical components of each."""
-    read = _read(paths, reading)[0]
+    read = read_files(paths, reading)[0]
     upward = {
         path: [one for one in components if is_vertical(path, one)]
         for path, components in read.items()
