@@ -375,7 +375,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
         "apart": differs,
         "why_apart": why_apart(cell) if differs else "",
         "nearest": nearest,
-        "used": math.inf if cell.status != "done" else used(nearest) if nearest else 0.0,
+        "used": max(map(used, cell.checks), default=0.0) if cell.status == "done" else math.inf,
     }
 
 
