@@ -203,8 +203,6 @@ def test_the_models_bias_and_scatter():
 
 def test_counts_that_are_stated():
     assert sum(1 for _ in hostile.cases()) == 211
-    tables = (ROOT / "tests" / "data").glob("*_ricker_cases.csv")
-    assert sum(len(path.read_text().splitlines()) - 1 for path in tables) == 960
 
 
 def test_experience_is_learnt_from_a_run(tmp_path):

@@ -81,6 +81,13 @@ def test_guards_are_what_their_names_say(touch, pivot):
     )
 
 
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_the_inverse_of_a_matrix(n):
+    a = np.random.default_rng(n).normal(size=(6, 3))
+    motion.inverse_of(a, 0, 3, n)
+    assert a[3 : 3 + n, :n] == pytest.approx(np.linalg.inv(a[:n, :n]), rel=1e-9)
+
+
 def gaps(at: Situation, side: int, phi: float, xi: float) -> dict[str, float]:
     """Clear distance of the tip wall and the far wall from the nearest of the block's four corners,
     which are turned one by one."""
@@ -132,6 +139,7 @@ def test_series_obey_newton_and_euler_in_every_term(mode, vertical):
         )
         if floor == "stick":  # its place is sine and cosine but for a constant
             x, y = s, c
+        assert not np.any(run.a[[Row.P, Row.Q], series.ORDER - 1 : series.ORDER + 1])
         laws = [
             (s.deriv(), -w * c),
             (c.deriv(), w * s),

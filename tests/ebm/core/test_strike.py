@@ -150,6 +150,22 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
     assert 0 < gains < 60
 
 
+@pytest.mark.parametrize("slip", [0.3, -0.3])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_block_that_lands_flush_with_a_wall_is_thrown_back(sense, slip):
+    """By the wall toward which it would rock: its spin, and its slip where that is toward the
+    wall, too."""
+    side, c, w, e = "right" if sense > 0 else "left", math.cos(0.4), -0.2 * sense, 0.6
+    b = setting_of(0.4, walls=[Wall(side=side, gap=0.0, restitution=e)], pivot="bilateral")
+    state = run_at([0.0, c, 0.0, slip - c * w, 0.0, w], **ROCKS, sense=sense).state
+    assert not strike._floor_impact(b, state, 1e-9)
+    z, s = state.motion, math.sin(0.4)
+    slips = -e * slip if sense * slip > 0.0 else slip
+    assert (z.w, z.vx + c * z.w, z.vy, state.impulse) == pytest.approx(
+        (-e * w, slips, -sense * s * e * w, (1.0 + e) * s * 0.2)
+    )
+
+
 @pytest.mark.parametrize(("gap", "leans"), [(0.3, True), (0.0, False)])
 def test_nothing_rebounds_between_two_walls(gap, leans):
     """A block that leans on one wall as it strikes the other, and one that fills the room."""

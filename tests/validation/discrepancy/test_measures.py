@@ -253,8 +253,10 @@ def test_a_measured_history_may_lack_columns(made):
     by_name = found.table.set_index("measure")["value"]
     assert found["theta_rms"] == by_name["theta_rms"] == 0.0
     assert np.isnan([found["x_rms"], by_name["x_rms"]]).all()
-    units = [compare(*of).figure("theta_rms").unit for of in ((bare, bare), (bare, whole))]
-    assert units == ["rad", "alpha"]
+    assert [compare(bare, other).figure("theta_rms").unit for other in (bare, whole)] == [
+        "rad",
+        "alpha",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -15,15 +15,19 @@ from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 
 def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
-    motion = Motion(peak_rotation=peak, slip=slip, top_displacement=top, wall_speed=speed)
-    return Ran(outcome=outcome, motion=motion, slid=slip or 0.0, **more)
+    figures = {"peak_rotation": peak, "slip": slip, "top_displacement": top, "wall_speed": speed}
+    return Ran(outcome=outcome, motion=Motion(**figures), slid=slip or 0.0, **more)
 
 
 def sure(u_num, **more):
-    verdict = "not converged" if u_num is None else "converged"
-    about = {"name": "peak_rotation", "unit": "alpha", "value": 0.2, "verdict": verdict}
-    numerical = Numerical(method="by hand", quantities=(Quantity(u_num=u_num, **about),))
-    return Sure(numerical=numerical, **more)
+    peak = Quantity(
+        name="peak_rotation",
+        unit="alpha",
+        value=0.2,
+        u_num=u_num,
+        verdict="not converged" if u_num is None else "converged",
+    )
+    return Sure(numerical=Numerical(method="by hand", quantities=(peak,)), **more)
 
 
 RUNS = {
@@ -183,8 +187,10 @@ def test_figures_of_three_records():
         [pytest.approx(0.65), 0.4],
         [0.9, 0.4],
     ]
-    lines = plots["histories"].panels[0].series
-    assert [(one.label, one.x[-1], one.y[-1], one.y.count(None)) for one in lines] == [
+    assert [
+        (one.label, one.x[-1], one.y[-1], one.y.count(None))
+        for one in plots["histories"].panels[0].series
+    ] == [
         ("a", 4.0, pytest.approx(0.1), 0),
         ("b", 4.0, pytest.approx(0.1), 0),
         ("c", 4.0, None, 300),

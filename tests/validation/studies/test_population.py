@@ -105,8 +105,9 @@ def test_a_run_is_the_record_at_that_intensity(lines):
         )
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
     (plot,) = (plot for plot in found.plots() if plot.name == "lines")
-    labels = ["H1", "H1, reversed", "H2", "H2, reversed", "H3", "H3, reversed"]
-    assert [one.label for one in plot.panels[0].series[:6]] == labels
+    assert [one.label for one in plot.panels[0].series[:6]] == [
+        *("H1", "H1, reversed", "H2", "H2, reversed", "H3", "H3, reversed")
+    ]
 
 
 def test_a_share_of_the_motions_stays_below_its_quantile(lines):
@@ -268,6 +269,9 @@ def test_a_fitted_median_lies_inside_its_interval():
         np.nanquantile(medians, [0.025, 0.975]).tolist(), rel=0.2
     )
     assert curve.low < curve.median < curve.high
+    assert [point[4] for point in curve.points] == pytest.approx(
+        norm.cdf(np.log(LEVELS / curve.median) / curve.dispersion).tolist()
+    )
     assert math.isnan(curve_of("made", ~never, never, LEVELS, 200).low)
 
 
