@@ -35,6 +35,7 @@ _CHUNK, _SCENES = 256, 32
 _KEPT = {
     "peak": "peak",
     "t_end": "t",
+    "series": "steps",
     "ending": "ending",
     "at_rest": "at_rest",
     "written": "rows",
@@ -47,12 +48,13 @@ class Outcomes:
 
     `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta|
     in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t_end`
-    the time in sqrt(R/g) at which the run was decided.
+    the time in sqrt(R/g) at which the run was decided; `series` the number of Taylor expansions.
     """
 
     side: NDArray[np.int8]
     peak: Floats
     t_end: Floats
+    series: NDArray[np.int64]
     #: How each run ended, a key of `ebm.core.names.FAILURES` where it failed; and whether it then
     #: was at rest.
     ending: NDArray[np.int64]
