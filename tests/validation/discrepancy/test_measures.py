@@ -307,7 +307,7 @@ def test_the_event_based_model_meets_the_closed_forms_of_its_kind_of_scene(name)
 
 
 @pytest.mark.parametrize("name", ["sliding", "rebound"])
-@pytest.mark.parametrize(("friction", "duration"), [(0.2, 0.2), (0.0, 1.0)])
+@pytest.mark.parametrize(("friction", "duration"), [(0.2, 0.2), (0.2, 0.25), (0.0, 1.0)])
 def test_a_block_that_still_slides_has_no_place_where_it_stops(name, friction, duration):
     change = {"floor": Floor(friction=friction), "duration": duration}
     (figure,) = described(load_suite("engines").scenes[name].replace(**change), FORMS[name])
