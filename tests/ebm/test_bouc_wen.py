@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from cases import pulse_scene
 from scipy.integrate import solve_ivp
-from stepping import assert_contacts_hold
+from stepping import TILTED, assert_contacts_hold, run_at
 
 from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.core import bouc_wen as law
+from rockcheck.ebm.core.names import Pivot, Row
 from rockcheck.scenes import (
     Block,
     Floor,
@@ -158,6 +160,14 @@ def test_a_block_that_leans_on_the_wall_stays():
     )
     assert (set(history.channels["mode"]), history.cost.rules) == ({"lean"}, {})
     assert history.channels["theta"] == pytest.approx(tilt, abs=1e-4)
+
+
+@pytest.mark.parametrize(("z", "winds", "left"), [(0.9, True, 0.9), (1.0 - 1e-12, False, 1.0)])
+def test_a_pivot_has_yielded_where_z_has_come_to_one(z, winds, left):
+    run = run_at(**TILTED, sense=1, slip=1, pivot=Pivot.SLIPPING)
+    run.state.winds, run.state.order, run.a[Row.Z, :2] = True, 2, (z, 0.0)
+    law.advance(run)
+    assert (run.state.winds, run.state.zeta) == (winds, left)
 
 
 def test_beyond_painleve_the_sign_of_the_push_that_is_wrong_by_least_goes_on():

@@ -94,7 +94,7 @@ def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples(
     samples = np.array([0.0, 1.0, -0.5, 0.0])
     lines = np.interp(np.arange(12_001) / 4000, np.arange(4), samples)
     coarse, dense = (
-        [intensity.spectral_acceleration(record, period) for period in (1.0, 2.5)]
+        [intensity.spectral_acceleration(record, period) for period in (0.2, 1.0, 2.5)]
         for record in (
             Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV"),
             Recording(samples=lines, time_step=1e-3, unit="m/s2", form="CSV"),

@@ -160,9 +160,13 @@ def test_a_block_that_lands_flush_with_a_wall_is_thrown_back(sense, slip):
     state = run_at([0.0, c, 0.0, slip - c * w, 0.0, w], **ROCKS, sense=sense).state
     assert not strike._floor_impact(b, state, 1e-9)
     z, s = state.motion, math.sin(0.4)
-    slips = -e * slip if sense * slip > 0.0 else slip
     assert (z.w, z.vx + c * z.w, z.vy, state.impulse) == pytest.approx(
-        (-e * w, slips, -sense * s * e * w, (1.0 + e) * s * 0.2)
+        (
+            -e * w,
+            -e * slip if sense * slip > 0.0 else slip,
+            -sense * s * e * w,
+            (1.0 + e) * s * 0.2,
+        )
     )
 
 

@@ -99,8 +99,10 @@ def test_the_run_at_3h_tells_convergence_from_chance(at, u_num):
     found = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]))["peak_rotation"]
     missed = 0.5 * BOOKCASE.output_step**2 / 8.0  # of the top of a sine, by its rows
     assert found.u_num == pytest.approx(math.hypot(u_num, missed), rel=1e-3)
-    rising = BOOKCASE.replace(duration=1.0)  # its last row is the peak
-    early = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]), rising)["peak_rotation"]
+    # of a motion that ends as it rises the last row is the peak
+    early = judged(Made(lambda h: 1.0 + 2.0 * at[round(h / 1e-3)]), BOOKCASE.replace(duration=1.0))[
+        "peak_rotation"
+    ]
     assert early.u_num == pytest.approx(u_num * math.sin(1.0), rel=1e-9)
 
 

@@ -212,9 +212,10 @@ def test_draws_count_in_the_place_of_the_runs_as_they_are(samples, hits, low, sd
     }
     drawn = drawn if samples else {}
     found = found_of("ac", sure(0.5), samples, drawn=drawn, at_gaps={}, free=[], others={}, sure={})
-    told = found.data["overturning"]
-    assert (told["count"], told["low"]) == (hits, pytest.approx(low, abs=1e-4))
-    shares = rows_of(found, "contributions")["contributions"]
-    assert {source: known for source, _, known, _ in shares} == sd | {"records": 0.5657}
+    overturning = found.data["overturning"]
+    assert (overturning["count"], overturning["low"]) == (hits, pytest.approx(low, abs=1e-4))
+    assert {
+        source: size for source, _, size, _ in rows_of(found, "contributions")["contributions"]
+    } == sd | {"records": 0.5657}
     notes = [line for block in found.blocks if isinstance(block, Text) for line in block.items]
     assert any("floor.friction" in line for line in notes) == (not samples)

@@ -104,8 +104,7 @@ def test_a_run_is_the_record_at_that_intensity(lines):
             [name, sign, level, math.nan if fell else peak, int(fell)], nan_ok=True
         )
     assert 0 < np.sum(np.isinf(peaks)) < peaks.size
-    (plot,) = (plot for plot in found.plots() if plot.name == "lines")
-    assert [one.label for one in plot.panels[0].series[:6]] == [
+    assert [one.label for one in next(found.plots()).panels[0].series[:6]] == [
         *("H1", "H1, reversed", "H2", "H2, reversed", "H3", "H3, reversed")
     ]
 
