@@ -44,9 +44,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 #: Velocity of the block: vx, vy, w.
 Velocity = tuple[float, float, float]

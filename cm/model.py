@@ -9,16 +9,25 @@ from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 
 from rockcheck.cm import contact
-from rockcheck.scenes import Event, History, InputError, ModelFailure, Scene, kinematics
-from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import check_kind
-from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
-from rockcheck.scenes.history import Cost
-from rockcheck.scenes.observation import observe
+from rockcheck.scenes import (
+    Cost,
+    Event,
+    Floats,
+    Frozen,
+    History,
+    Positive,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    errors,
+    kinematics,
+    observation,
+)
 
 if TYPE_CHECKING:
     from rockcheck.cm import kernels
@@ -79,7 +88,7 @@ class ContinuousModel(Frozen):
     @model_validator(mode="after")
     def _one_stiffness(self) -> ContinuousModel:
         if self.stiffness is not None and "penetration" in self.model_fields_set:
-            raise InputError("cannot be given together with penetration", "stiffness")
+            raise errors.InputError("cannot be given together with penetration", "stiffness")
         return self
 
     def coarser(self, factor: float) -> Self:
@@ -111,16 +120,16 @@ class ContinuousModel(Frozen):
         Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step,
         absurd excitation) or asks for too many steps.
         """
-        check_kind(scene, Scene, "load_scene", "scene")
+        errors.check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
         from rockcheck.cm import kernels
-        from rockcheck.scenes.progress import interruptible
+        from rockcheck.scenes import progress
 
         times = scene.output_times
         parameters = self._parameters(scene)
         dt = parameters.time_step
         if times[-1] / dt > MOST_STEPS:
-            raise ModelFailure(
+            raise errors.ModelFailure(
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
@@ -139,17 +148,19 @@ class ContinuousModel(Frozen):
         advance = partial(kernels.advance, contacts, base, scene.output_step, state, events)
         advance(1, output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
-        strikes: list[NDArray[np.float64]] = []
+        strikes: list[Floats] = []
         row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
         while row < len(times) and ending == kernels.DONE:
             slab = partial(advance, row, output[row : row + rows_a_slab])
-            ending, rows, found, more_steps, more_sweeps, reached = interruptible(slab)
+            ending, rows, found, more_steps, more_sweeps, reached = progress.interruptible(slab)
             row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
             strikes.append(events[:found].copy())
             if steps > MOST_STEPS:
-                raise ModelFailure(f"cm: more than {MOST_STEPS:.3g} steps by {reached:.4g} s")
+                raise errors.ModelFailure(
+                    f"cm: more than {MOST_STEPS:.3g} steps by {reached:.4g} s"
+                )
         if ending == kernels.BLOWN_UP:
-            raise ModelFailure(
+            raise errors.ModelFailure(
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
                 f" with a step of {dt:.3g} s and a stiffness of {parameters.stiffness:.3g} 1/s^2"
             )
@@ -180,7 +191,7 @@ class ContinuousModel(Frozen):
             "time_step": dt,
             "damping_rule": self.damping_rule,
         }
-        return observe(
+        return observation.observe(
             scene,
             self.name,
             kinematics.of_box(scene.block, output[:row]),
@@ -218,9 +229,7 @@ class ContinuousModel(Frozen):
             time_step=self.time_step_in(scene),
         )
 
-    def _initial(
-        self, scene: Scene, parameters: kernels.Parameters
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _initial(self, scene: Scene, parameters: kernels.Parameters) -> tuple[Floats, Floats]:
         """State and contact memory at t = 0.
 
         A block on the floor starts sunk in by its weight, so that it does not bounce.
@@ -257,9 +266,7 @@ class ContinuousModel(Frozen):
         return np.array((*placed, 0.0, math.inf, 0.0, energy, gross)), memory
 
 
-def _samples(
-    excitation: Rest | Ricker | Sine | Record, duration: float
-) -> tuple[NDArray[np.float64], float]:
+def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[Floats, float]:
     """Samples (m/s^2) of the excitation, linear in between, and their number a second.
 
     A record keeps its samples.
@@ -282,7 +289,7 @@ def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
     events = model.simulate(scene).event_list
     first = next((event for event in events if event.kind.endswith("impact")), None)
     if first is None:
-        raise InputError(f"nothing strikes in scene {scene.name!r}")
+        raise errors.InputError(f"nothing strikes in scene {scene.name!r}")
     contact_time = 1.0 / math.sqrt(model.stiffness_in(scene))
     sample = max(0.05 * contact_time, first.t / 2e6)
     history = model.simulate(
@@ -299,9 +306,7 @@ def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
     return float(max(np.max(struck[onset:]), 0.0) / -struck[onset])
 
 
-def _contacts(
-    scene: Scene, history: History, kind: str
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _contacts(scene: Scene, history: History, kind: str) -> Iterator[tuple[Floats, Floats]]:
     """Gap (m) and rate (m/s) of every corner that may meet the floor, or a wall."""
     c, block = history.channels, scene.block
     sin, cos, w = np.sin(c["theta"]), np.cos(c["theta"]), c["theta_dot"]

@@ -16,8 +16,7 @@ from rockcheck.ebm.core.names import FAILURES, Ending
 from rockcheck.ebm.core.state import FOUND, Records, Rows
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.packed import pack, pack_pulses, play, sides_of, state_for
-from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
-from rockcheck.scenes.progress import OnProgress, threads, unheard
+from rockcheck.scenes import Floats, InputError, ModelFailure, Scene, kinematics, progress
 
 __all__ = [
     "Ensemble",
@@ -28,7 +27,6 @@ __all__ = [
     "run_batch",
     "run_decided",
 ]
-Floats = NDArray[np.float64]
 #: Runs of a batch, and scenes of an ensemble, that a thread takes at once.
 _CHUNK, _SCENES = 256, 32
 #: The fields of a FOUND, by their names in `Outcomes`.
@@ -78,7 +76,7 @@ def run_batch(
     parts: int = 0,
     strict: bool = True,
     jobs: int | None = None,
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
 ) -> Outcomes:
     """Runs every row; with `until_decided` until outcome and peak are certain.
 
@@ -103,7 +101,7 @@ def run_batch(
         play(model, packed.part(part), state, records, found[part])
         return part.stop - part.start
 
-    with threads(jobs) as pool:
+    with progress.threads(jobs) as pool:
         done = 0
         for rows in pool.map(chunk, range(0, count, _CHUNK)):
             done += rows
@@ -125,7 +123,7 @@ def run_decided(
     model: EventBasedModel,
     *,
     jobs: int | None = None,
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
 ) -> Outcomes:
     """`run_batch` until all is decided; a run that fails is made once more by `model.finer()`."""
     found = run_batch(packed, model, strict=False, jobs=jobs, on_progress=on_progress)
@@ -180,7 +178,7 @@ def play_ensemble(
         lasts = np.arange(len(t)) >= some["rows"][:, None]
         return np.where(lasts, some["motion"]["theta"][:, None], records.out[:, :, 2])
 
-    with threads(jobs) as pool:
+    with progress.threads(jobs) as pool:
         theta = np.concatenate(list(pool.map(chunk, range(0, count, _SCENES))))
     motion, ending = np.array(found["motion"].tolist()), found["ending"]
     failed = np.isin(ending, tuple(FAILURES))

@@ -8,8 +8,7 @@ import numpy as np
 
 from rockcheck.ebm.core.names import RULE_NAMES, Rule
 from rockcheck.ebm.model import EventBasedModel, ImpactLaw
-from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.scene import Scene
+from rockcheck.scenes import InputError, Scene
 
 #: The relative disturbance, and the separation (alpha) up to which two histories still count as the
 #: same.

@@ -9,11 +9,7 @@ import numpy as np
 from pydantic import Field, Strict
 
 from rockcheck.ebm.core import names
-from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import InputError, ModelFailure, check_kind
-from rockcheck.scenes.history import Cost, Event, History
-from rockcheck.scenes.observation import observe
-from rockcheck.scenes.scene import Scene
+from rockcheck.scenes import Cost, Event, Frozen, History, Positive, Scene, errors, observation
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -70,7 +66,7 @@ class EventBasedModel(Frozen):
 
     def check(self, scene: Scene) -> None:
         """Raises `InputError` where the scene asks for physics that this model excludes."""
-        check_kind(scene, Scene, "load_scene", "scene")
+        errors.check_kind(scene, Scene, "load_scene", "scene")
         floor, height, speed = scene.floor, scene.initial_height, scene.initial_velocity
         bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
         refusals = (
@@ -112,7 +108,7 @@ class EventBasedModel(Frozen):
         )
         for refused, reason, key in refusals:
             if refused:
-                raise InputError(reason, key)
+                raise errors.InputError(reason, key)
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid.
@@ -136,7 +132,9 @@ class EventBasedModel(Frozen):
         last: Any = kept[0].tolist()
         motion, t, _, _, steps, written, at_rest = last
         if ending in names.FAILURES:
-            raise ModelFailure(f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s")
+            raise errors.ModelFailure(
+                f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s"
+            )
         found, (out, modes, log) = states[0], (rows[0] for rows in records)
         rows = max(written, 1)
         speed = scene.block.radius / unit
@@ -168,7 +166,7 @@ class EventBasedModel(Frozen):
         outcome = "at rest" if at_rest else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"
-        history = observe(
+        history = observation.observe(
             scene,
             self.name,
             natural.to_si(scene, out[:rows]),
@@ -189,7 +187,7 @@ class EventBasedModel(Frozen):
     def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
         from rockcheck.ebm import packed
-        from rockcheck.scenes.progress import interruptible
+        from rockcheck.scenes import progress
 
         runs = rows, states, *work
         # What is compiled or loaded is so before the clock starts. A run of few steps is played
@@ -211,7 +209,7 @@ class EventBasedModel(Frozen):
             if loop is slow:
                 loop = packed.loop_of(self, *runs)
                 ready, cpu = time.perf_counter(), time.process_time()
-            ending = interruptible(partial(play, self.most_steps))
+            ending = progress.interruptible(partial(play, self.most_steps))
         return ending, ready, time.perf_counter() - ready, time.process_time() - cpu
 
 

@@ -8,14 +8,12 @@ import math
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import LAWS
 from rockcheck.ebm.core.state import Base
-from rockcheck.scenes import kinematics
-from rockcheck.scenes.scene import Block, Scene
+from rockcheck.scenes import Block, Floats, Scene, kinematics
 
 
 def time_unit(scene: Scene) -> float:
@@ -85,7 +83,7 @@ def base_of(scene: Scene) -> Base:
     return Base(sideways, ground_of(scene.vertical, scene.gravity, unit))
 
 
-def state_of(scene: Scene) -> NDArray[np.float64]:
+def state_of(scene: Scene) -> Floats:
     """The initial state in natural units, on its contacts to the rounding of the compiled code."""
     block, radius, unit = scene.block, scene.block.radius, time_unit(scene)
     x, y, theta, vx, vy, w = kinematics.of_mass(block, scene.initial_state)
@@ -103,7 +101,7 @@ def state_of(scene: Scene) -> NDArray[np.float64]:
     return state
 
 
-def to_si(scene: Scene, states: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_si(scene: Scene, states: Floats) -> Floats:
     """States of the mass's centre in natural units as states of the box's centre in SI.
 
     `states` is n x 6: x, y, theta and their rates.

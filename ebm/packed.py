@@ -16,11 +16,9 @@ from rockcheck.ebm import natural
 from rockcheck.ebm.core import block, march, names
 from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
+from rockcheck.scenes import Floats, Scene, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
-from rockcheck.scenes.progress import ONE_RUN, announce
-from rockcheck.scenes.scene import Scene
 
-Floats = NDArray[np.float64]
 #: The event loops that are compiled, by a model's friction.
 _READY: dict[str, Callable[..., None]] = {}
 
@@ -117,9 +115,9 @@ def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
     steps.
     """
     loop = march.LOOPS[model.friction]
-    if not ONE_RUN.get() or model.friction == "bouc-wen" or is_ready(loop, *given):
+    if not progress.ONE_RUN.get() or model.friction == "bouc-wen" or is_ready(loop, *given):
         return None
-    announce(
+    progress.announce(
         f"{model.name} is not compiled for this machine yet: a short run is interpreted, with the"
         " same figures (`rockcheck warm` compiles)"
     )

@@ -12,15 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes import Block, InputError, Record, Scene
-from rockcheck.scenes.base import Shown
-from rockcheck.scenes.errors import check_kind
-from rockcheck.scenes.progress import OnProgress, unheard
+from rockcheck.scenes import Block, Floats, InputError, Record, Scene, Shown, errors, progress
 
 if TYPE_CHECKING:
     from rockcheck.ebm.core.state import Rows
 
-Floats = NDArray[np.float64]
 MOST_NODES = 50_000_000
 #: Tolerance (alpha) of the model that plays a spectrum by default: far too small to move a boundary
 #: by a node.
@@ -89,7 +85,7 @@ def overturning_spectrum(
     model: EventBasedModel | None = None,
     refine: bool = False,
     jobs: int | None = None,
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
     play: Player | None = None,
 ) -> Spectrum:
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
@@ -112,7 +108,7 @@ def overturning_spectrum(
             f"{len(frequencies)} x {len(amplitudes)} nodes are more than {MOST_NODES}",
             "frequency_ratios",
         )
-    check_kind(scene, Scene, "load_scene", "scene")
+    errors.check_kind(scene, Scene, "load_scene", "scene")
     check_excitation(scene)
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
@@ -163,7 +159,7 @@ def play_nodes(
     *,
     model: EventBasedModel,
     jobs: int | None = None,
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
 ) -> Nodes:
     """Outcomes at nodes of a spectrum: sides (-1, 0, +1), and whether the run failed.
 
@@ -351,7 +347,7 @@ def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:
     return i[:, None] & j
 
 
-def _axis(values: ArrayLike, key: str) -> NDArray[np.float64]:
+def _axis(values: ArrayLike, key: str) -> Floats:
     try:
         axis = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -5,8 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rockcheck.scenes import Record, Rest, Scene
-from rockcheck.scenes.excitations import FloatArray, Ricker, Sine
+from rockcheck.scenes import Floats, Record, Rest, Ricker, Scene, Sine
 
 SAMPLES_A_PERIOD = 1000  # of a pulse: a cubic spline through them is good to 1e-11 of its amplitude
 
@@ -54,7 +53,7 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
     return velocity
 
 
-def felt_acceleration(scene: Scene, edges: FloatArray) -> FloatArray:
+def felt_acceleration(scene: Scene, edges: Floats) -> Floats:
     """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).
 
     The steps lie between the times `edges`.

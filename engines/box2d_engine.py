@@ -3,9 +3,8 @@
 import math
 from typing import ClassVar, Literal
 
-from rockcheck.engines.contacts import surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import State, World
 from rockcheck.scenes import Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -15,7 +14,7 @@ SUBSTEPS = 4  # of each step, as Box2D's manual has them
 STIFFNESS, DAMPING, PUSH, THRESHOLD = 0.25, 10.0, 3.0, 1e-3
 
 
-class _Box2DWorld(World):
+class _Box2DWorld(steps.World):
     """A world with a box, floor and walls, and Box2D's default parameters."""
 
     def __init__(self, scene: Scene) -> None:
@@ -23,7 +22,7 @@ class _Box2DWorld(World):
 
         self.world = pyb2d3.World(gravity=(0.0, 0.0))
         # Of two frictions the geometric mean counts, of two restitutions the larger.
-        for face in surfaces_of(scene):
+        for face in contacts.surfaces_of(scene):
             slab = self.world.create_static_body(position=face.behind(SLAB))
             width, _, height = face.extent(SLAB, REACH)
             stuff = pyb2d3.surface_material(friction=face.friction, restitution=face.restitution)
@@ -48,7 +47,7 @@ class _Box2DWorld(World):
         self.world.gravity = felt
         self.world.step(dt, SUBSTEPS)
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         body = self.body
         (x, y), (vx, vy), turned = body.position, body.linear_velocity, body.rotation
         # The body's own angle is an approximation.

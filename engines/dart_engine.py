@@ -5,9 +5,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rockcheck.engines.contacts import surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.steps import AdaptiveStep, State, World
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls
@@ -20,7 +19,7 @@ NATURAL_SPEED = 30.0
 SWEEPS, TOLERANCE = 100, 1e-8
 
 
-class _DartWorld(World):
+class _DartWorld(steps.World):
     """A planar box, floor and walls, with DART's default parameters.
 
     `scale`: lengths in this world per length in the scene.
@@ -47,7 +46,7 @@ class _DartWorld(World):
             dx, dz = scale * np.array(scene.block.offset)
             body.getShapeNode(0).setRelativeTranslation([-dx, 0.0, -dz])
         self.world.addSkeleton(self.block)
-        for surface in surfaces_of(scene):
+        for surface in contacts.surfaces_of(scene):
             slab = dartpy.dynamics.Skeleton(surface.surface)
             joint, body = slab.createWeldJointAndBodyNodePair()
             x, z = surface.behind(SLAB)
@@ -79,7 +78,7 @@ class _DartWorld(World):
         self.world.setGravity([scale * felt[0], 0.0, scale * felt[1]])
         self.world.step()
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         pose, velocity = (
             self.block.getPositions() / self.scale,
             self.block.getVelocities() / self.scale,
@@ -115,12 +114,12 @@ class Dart(Engine):
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
 
-    def rigid_world(self, scene: Scene) -> World:
+    def rigid_world(self, scene: Scene) -> steps.World:
         """The scene as DART holds it, in units in which even slow contacts bounce."""
         scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
-        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, AdaptiveStep))
+        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, steps.AdaptiveStep))
 
-    def stock_world(self, scene: Scene) -> World:
+    def stock_world(self, scene: Scene) -> steps.World:
         """The scene as DART holds it: a box among boxes."""
         return _DartWorld(scene)
 

@@ -7,11 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rockcheck.engines import steps
 from rockcheck.engines.contacts import corners_of, surfaces_of
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import State, World
-from rockcheck.scenes import Floor, ModelFailure, Scene
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes import Floor, ModelFailure, Scene, printable
 
 CORNER_RADIUS = 1e-5  # of the block's radius
 STIFFNESS = 2e8  # of each of two bodies in contact, N/m for a block of 1 kg and R = 1 m
@@ -23,7 +22,7 @@ IMPACT_STEPS = 40  # in which an impact can bounce
 SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 
 
-class _DrakeWorld(World):
+class _DrakeWorld(steps.World):
     """A plant with a planar box, floor and walls, with Drake's default parameters.
 
     The plant is made when the step's length is known.
@@ -51,8 +50,8 @@ class _DrakeWorld(World):
         except RuntimeError as error:  # its solver has not converged
             raise ModelFailure(f"Drake: {printable(error, 200)}") from None
 
-    def state(self) -> State:
-        state: State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
+    def state(self) -> steps.State:
+        state: steps.State = tuple(self.plant.GetPositionsAndVelocities(self.context).tolist())
         return state
 
     def ready(self, dt: float) -> None:
@@ -180,7 +179,9 @@ class Drake(Engine):
     fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
     worlds: ClassVar[Worlds] = (_RigidDrakeWorld, _DrakeWorld)
 
-    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+    def tuned_world(
+        self, scene: Scene, parameters: Mapping[str, float], step: float
+    ) -> steps.World:
         """Corners on slabs, so soft that an impact lasts for some steps.
 
         `restitution` is Hunt and Crossley's dissipation.

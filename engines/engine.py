@@ -11,13 +11,20 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import field_validator, model_validator
 
-from rockcheck.engines.contacts import rebounds
-from rockcheck.engines.events import events_of
+from rockcheck.engines import contacts, events
 from rockcheck.engines.steps import AdaptiveStep, FixedStep, World, at_output_times, in_units_of
-from rockcheck.scenes import Cost, Floor, History, InputError, Scene, kinematics
-from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import NotInstalled, check_kind, printable
-from rockcheck.scenes.observation import observe
+from rockcheck.scenes import (
+    Cost,
+    Floor,
+    Frozen,
+    History,
+    Positive,
+    Scene,
+    errors,
+    kinematics,
+    observation,
+    printable,
+)
 
 MOST_STEPS = 5_000_000
 #: The step of an engine that cannot step adaptively, where none is given, s.
@@ -84,14 +91,16 @@ class Engine(Frozen):
             and 0.0 < value < math.inf
         ):
             return float(value)
-        raise InputError(f'{printable(value)} is not allowed: give a step above 0 s, or "adaptive"')
+        raise errors.InputError(
+            f'{printable(value)} is not allowed: give a step above 0 s, or "adaptive"'
+        )
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
         stock = self.settings == "default"
         if self.time_step == "adaptive" and (stock or self.fixed_because):
             why = ' with settings = "default":' if stock else f": {self.fixed_because};"
-            raise InputError(f'"adaptive" is not allowed{why} give a step in s', "time_step")
+            raise errors.InputError(f'"adaptive" is not allowed{why} give a step in s', "time_step")
         return self
 
     @property
@@ -165,7 +174,7 @@ class Engine(Frozen):
             "the engine has one friction coefficient:"
             f" kinetic {kinetic:g} is used for static {static:g}": static != kinetic,
             f"{self.name} has no coefficient of restitution with these settings; that of the"
-            " scene is not used": "restitution" in self.lacks() and rebounds(scene),
+            " scene is not used": "restitution" in self.lacks() and contacts.rebounds(scene),
         }
         return [note for note, applies in notes.items() if applies]
 
@@ -177,11 +186,11 @@ class Engine(Frozen):
         is missing, `ModelFailure` if the motion blows up or its events do not end.
         """
         if not self.installed():
-            raise NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
-        check_kind(scene, Scene, "load_scene", "scene")
+            raise errors.NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
+        errors.check_kind(scene, Scene, "load_scene", "scene")
         steps = self.steps
         if scene.duration / steps.largest > MOST_STEPS:
-            raise InputError(
+            raise errors.InputError(
                 f"{steps.largest:g} is not allowed: {scene.duration:g} s would need more than"
                 f" {MOST_STEPS} steps",
                 steps.knobs[0],
@@ -201,11 +210,11 @@ class Engine(Frozen):
                 steps=len(states) - 1,
             )
         states[:, [0, 1, 3, 4]] *= unit
-        return observe(
+        return observation.observe(
             scene,
             self.name,
             kinematics.of_box(scene.block, at_output_times(scene, times, states)),
-            events=events_of(scene, times, states, unit * felt),
+            events=events.events_of(scene, times, states, unit * felt),
             cost=cost,
             settings=self.model_dump(),
             notes=self.notes(scene),

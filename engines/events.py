@@ -6,10 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.contacts import Contact, arm_of, contacts_of, gap_of, rate_of
-from rockcheck.engines.steps import LYING, FloatArray
-from rockcheck.scenes import Event, Scene, kinematics
-from rockcheck.scenes.observation import STATE, modes_of
+from rockcheck.engines import contacts, steps
+from rockcheck.scenes import Event, Floats, Scene, kinematics, observation
 
 Flags = NDArray[np.bool_]
 #: Time (s), kind, the step end where it is told, impulse per unit mass (m/s).
@@ -25,7 +23,7 @@ SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 
 
-def events_of(scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray) -> list[Event]:
+def events_of(scene: Scene, t: Floats, states: Floats, felt: Floats) -> list[Event]:
     """Events in order of time.
 
     `t` (n) and `states` (n, 6) are those of the mass's centre at step ends, `felt` (n-1 or more, 2)
@@ -39,7 +37,7 @@ def events_of(scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray)
     motion = _Motion(scene, t, states, felt)
     found = [event for contact in motion.contacts for event in motion.at_contact(contact)]
     found += motion.at_floor()
-    if abs(states[-1, 2]) >= LYING:
+    if abs(states[-1, 2]) >= steps.LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
         side = "left" if states[-1, 2] > 0 else "right"
         end = t[-2] + min(part, 1.0) * (t[-1] - t[-2])
@@ -63,22 +61,22 @@ def events_of(scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray)
 class _Motion:
     """The states at all step ends, and what can be told from them."""
 
-    def __init__(self, scene: Scene, t: FloatArray, states: FloatArray, felt: FloatArray) -> None:
+    def __init__(self, scene: Scene, t: Floats, states: Floats, felt: Floats) -> None:
         self.scene, self.t, self.states, self.felt = scene, t, states, felt
-        self.contacts = contacts_of(scene)
+        self.contacts = contacts.contacts_of(scene)
         step = float(np.min(np.diff(t), initial=1e-3))
         self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * step**2
         x, y, theta, x_dot, y_dot, theta_dot = states.T
         cos, sin = np.cos(theta), np.sin(theta)
         #: Of each contact at step ends: its gap, m; whether it touches, or has struck in the step
         #: before; whether it is closed, openings of less than 2 ms left out.
-        self.gap: dict[Contact, FloatArray] = {}
-        self.touching: dict[Contact, Flags] = {}
-        self.closed: dict[Contact, Flags] = {}
+        self.gap: dict[contacts.Contact, Floats] = {}
+        self.touching: dict[contacts.Contact, Flags] = {}
+        self.closed: dict[contacts.Contact, Flags] = {}
         for contact in self.contacts:
-            arm = arm_of(*contact.corner, cos, sin)
-            gap = gap_of(*contact.normal, contact.distance, x, y, arm)
-            rate = rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
+            arm = contacts.arm_of(*contact.corner, cos, sin)
+            gap = contacts.gap_of(*contact.normal, contact.distance, x, y, arm)
+            rate = contacts.rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
             # An engine that looks ahead stops a block, or turns it round, up to two steps before it
             # arrives.
             arrives = gap[:-1] + 2.0 * np.diff(t) * rate[:-1] < self.near
@@ -90,13 +88,13 @@ class _Motion:
         self.box = kinematics.of_box(scene.block, states)
         self.slip_rate = kinematics.slip_rate(scene.block, theta, self.box[:, 3], theta_dot)
 
-    def onset(self, contact: Contact, index: int) -> float:
+    def onset(self, contact: contacts.Contact, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
         before, after = self.gap[contact][index - 1 : index + 1]
         part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
 
-    def at_contact(self, contact: Contact) -> list[Found]:
+    def at_contact(self, contact: contacts.Contact) -> list[Found]:
         """Impacts of a contact; of one with a wall, releases too."""
         kind = "floor impact" if contact.surface == "floor" else "wall impact"
         t, closed = self.t, self.closed[contact]
@@ -138,7 +136,7 @@ class _Motion:
         """The first step end 2 ms after `index`, or the last one."""
         return min(int(np.searchsorted(self.t, self.t[index] + HOLD)), len(self.t) - 1)
 
-    def impulse(self, contact: Contact, index: int) -> float:
+    def impulse(self, contact: contacts.Contact, index: int) -> float:
         """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s.
 
         It follows from the balance of momentum: the change of velocity that free fall does not
@@ -155,8 +153,8 @@ class _Motion:
         columns, owners = [], []
         for other in self.contacts:
             if other is contact or np.any(self.touching[other][first : last + 1]):
-                arm = arm_of(*other.corner, cos, sin)
-                normal = rate_of(*other.normal, along_x, along_y, turning, arm)
+                arm = contacts.arm_of(*other.corner, cos, sin)
+                normal = contacts.rate_of(*other.normal, along_x, along_y, turning, arm)
                 friction = (
                     self.scene.floor.friction * (along_x - arm[1] * turning)
                     if other.surface == "floor"
@@ -176,10 +174,10 @@ class _Motion:
     def modes(self, indices: Sequence[int]) -> list[str]:
         """Modes of motion at some step ends."""
         chosen = self.box[list(indices)]
-        channels = {name: chosen[:, column] for column, name in enumerate(STATE)}
+        channels = {name: chosen[:, column] for column, name in enumerate(observation.STATE)}
         return [
             str(mode)
-            for mode in modes_of(
+            for mode in observation.modes_of(
                 self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]}
             )
         ]
@@ -193,7 +191,7 @@ def _falls(flags: Flags) -> list[int]:
     return _rises(~flags)
 
 
-def _start(values: FloatArray, index: int, noise: float) -> int:
+def _start(values: Floats, index: int, noise: float) -> int:
     """Index where the rise of `values` above `noise` began that reaches `index`.
 
     A slow rise is detected late.
@@ -203,7 +201,7 @@ def _start(values: FloatArray, index: int, noise: float) -> int:
     return index
 
 
-def _held(flags: Flags, t: FloatArray, hold: float = HOLD, *, value: bool = False) -> Flags:
+def _held(flags: Flags, t: Floats, hold: float = HOLD, *, value: bool = False) -> Flags:
     """`flags` without those runs of `value` inside it that last for `hold` s or less."""
     edges = np.flatnonzero(flags[1:] != flags[:-1]) + 1
     starts, ends = edges[:-1], edges[1:]  # of runs that neither begin nor end the motion

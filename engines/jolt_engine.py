@@ -3,9 +3,8 @@
 import math
 from typing import Any, ClassVar, Literal
 
-from rockcheck.engines.contacts import Point, surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import State, World
 from rockcheck.scenes import InputError, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -16,7 +15,7 @@ SCALE = 100.0
 ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num_threads": 1}
 
 
-class _JoltWorld(World):
+class _JoltWorld(steps.World):
     """A box, floor and walls, with Jolt's default parameters; the y axis points up.
 
     `scale`: lengths in this world per length in the scene.
@@ -30,7 +29,7 @@ class _JoltWorld(World):
         self.scale, self.jolt = scale, culverin
         self.world = culverin.PhysicsWorld(settings={"gravity": (0.0, 0.0, 0.0), **ROOM})
         # Of two frictions the geometric mean counts, of two restitutions the larger.
-        for face in surfaces_of(scene):
+        for face in contacts.surfaces_of(scene):
             fixed = {"friction": face.friction, "restitution": face.restitution}
             size = face.extent(SLAB, REACH)
             self._box(face.behind(SLAB), size, motion=culverin.MOTION_STATIC, **fixed)
@@ -40,7 +39,7 @@ class _JoltWorld(World):
         self.body = self._box((0.0, h), (b, b, h), motion=culverin.MOTION_DYNAMIC, **moved)
         self.world.step(0.0)  # what is made takes part from the next step on
 
-    def _box(self, place: Point, size: tuple[float, float, float], **more: Any) -> int:
+    def _box(self, place: contacts.Point, size: tuple[float, float, float], **more: Any) -> int:
         """A box with these half sizes, across, deep and high."""
         x, y, width, depth, height = (self.scale * one for one in (*place, *size))
         made: int = self.world.create_body(
@@ -59,7 +58,7 @@ class _JoltWorld(World):
         self.world.set_gravity(self.scale * felt[0], self.scale * felt[1], 0.0)
         self.world.step(dt)
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         world, body, s = self.world, self.body, self.scale
         (x, y, _), (_, _, turn, whole) = world.get_position(body), world.get_rotation(body)
         (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)

@@ -5,14 +5,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from rockcheck.engines import steps
 from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.steps import FloatArray, State, Vector, World
-from rockcheck.scenes import Floor, ModelFailure, Scene
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes import Floats, Floor, ModelFailure, Scene, printable
 
 
-class MuJoCoWorld(World):
+class MuJoCoWorld(steps.World):
     """A compiled model with its data, stepped by Euler's method."""
 
     def __init__(self, model_text: str) -> None:
@@ -40,10 +39,10 @@ class MuJoCoWorld(World):
             self.model.opt.timestep = self.dt = dt
         self.mujoco.mj_step(self.model, self.data)
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         return (*self.qpos.tolist(), *self.qvel.tolist())
 
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+    def march(self, felt: Floats, dt: float) -> Floats:
         states = super().march(felt, dt)
         self.check()
         return states
@@ -150,7 +149,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             0.0,
         )
 
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+    def march(self, felt: Floats, dt: float) -> Floats:
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
         self.stiffness[:] = self.pushing_out / dt**2
         self.damping[:], self.slowing[:] = self.bouncing / dt, self.stopping / dt
@@ -169,8 +168,13 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             self.mujoco.mj_Euler(self.model, self.data)
 
     def push(
-        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
-    ) -> Vector:
+        self,
+        pose: steps.Vector,
+        velocity: steps.Vector,
+        dt: float,
+        felt: tuple[float, float],
+        bouncing: bool,
+    ) -> steps.Vector:
         model, data = self.model, self.data
         self.qpos[:] = pose
         self.qvel[:] = velocity
@@ -269,16 +273,18 @@ class MuJoCo(Engine):
     bounces_with: ClassVar[tuple[str, ...]] = ("best",)
     cone_correction: bool = True
 
-    def rigid_world(self, scene: Scene) -> World:
+    def rigid_world(self, scene: Scene) -> steps.World:
         """The scene as MuJoCo holds it: point contacts of the corners."""
         friction = scene.floor.friction if self.cone_correction else 0.0
         return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
 
-    def stock_world(self, scene: Scene) -> World:
+    def stock_world(self, scene: Scene) -> steps.World:
         """The scene as MuJoCo holds it: a box among planes."""
         return MuJoCoWorld(stock_model(scene))
 
-    def tuned_world(self, scene: Scene, parameters: Mapping[str, float], step: float) -> World:
+    def tuned_world(
+        self, scene: Scene, parameters: Mapping[str, float], step: float
+    ) -> steps.World:
         """A box on a plane whose contacts stop within a step.
 
         The parameter `restitution` is MuJoCo's damping times the step.

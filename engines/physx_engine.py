@@ -4,9 +4,8 @@ import math
 import warnings
 from typing import Any, ClassVar, Literal
 
-from rockcheck.engines.contacts import corners_of, surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import State, World
 from rockcheck.scenes import Scene
 
 CORNER_RADIUS = 1e-4  # of the block's radius; contacts are points
@@ -15,7 +14,7 @@ THRESHOLD = 1e-3  # block radii a second: slower approaches do not bounce
 PLANAR = 1e3  # by how much the block is harder to turn out of its plane than in it
 
 
-class _PhysXWorld(World):
+class _PhysXWorld(steps.World):
     """A scene with a box on planes, and PhysX's default parameters.
 
     Of two materials PhysX takes the mean. A user gives the block and the floor the friction that
@@ -49,7 +48,7 @@ class _PhysXWorld(World):
         self.body.set_linear_damping(0.0)
         self.body.set_angular_damping(0.0)
         self.body.set_disable_gravity(True)
-        for face in surfaces_of(scene):
+        for face in contacts.surfaces_of(scene):
             rough, bounce = (self.shares[1] * one for one in (face.friction, face.restitution))
             plane = physx.PhysxCollisionShapePlane(physx.PhysxMaterial(rough, rough, bounce))
             (x, z), (nx, nz) = face.behind(self.inset), face.normal
@@ -84,7 +83,7 @@ class _PhysXWorld(World):
         self.body.add_force_torque([felt[0], 0.0, felt[1]], [0.0, 0.0, 0.0], "force")
         self.world.step()
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         pose = self.block.get_pose()
         (x, _, z), (whole, _, turn, _) = pose.p.tolist(), pose.q.tolist()
         (vx, _, vz), w = self.body.get_linear_velocity().tolist(), self.body.get_angular_velocity()
@@ -104,7 +103,7 @@ class _RigidPhysXWorld(_PhysXWorld):
 
     def shape(self, scene: Scene, material: Any) -> None:
         depth = scene.block.half_width  # before and behind the plane
-        for bx, bz in corners_of(scene):
+        for bx, bz in contacts.corners_of(scene):
             for by in (-depth, depth):
                 corner = self.physx.PhysxCollisionShapeSphere(CORNER_RADIUS, material)
                 corner.set_local_pose(self.sapien.Pose([bx, by, bz]))

@@ -5,10 +5,9 @@ import os
 from functools import cache
 from typing import Any, ClassVar
 
-from rockcheck.engines.contacts import Surface, corners_of, rebounds, surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import FloatArray, State, Vector, World
-from rockcheck.scenes import Scene
+from rockcheck.scenes import Floats, Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
 CORNER_RADIUS = 1e-9
@@ -33,7 +32,7 @@ def _bullet() -> Any:
     return pybullet
 
 
-class _PyBulletWorld(World):
+class _PyBulletWorld(steps.World):
     """A physics server with block, floor and walls, at PyBullet's default parameters."""
 
     def __init__(self, scene: Scene) -> None:
@@ -44,7 +43,7 @@ class _PyBulletWorld(World):
         self.dt = 0.0
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
-        for surface in surfaces_of(scene):
+        for surface in contacts.surfaces_of(scene):
             shape, depth = self.make_shape(surface)
             x, z = surface.behind(depth)
             body = pybullet.createMultiBody(0.0, shape, basePosition=[x, 0.0, z], **self.options)
@@ -74,7 +73,7 @@ class _PyBulletWorld(World):
             )
         return body
 
-    def make_shape(self, surface: Surface) -> tuple[int, float]:
+    def make_shape(self, surface: contacts.Surface) -> tuple[int, float]:
         """A thick box whose face is the surface, and how far behind that its centre is, m."""
         return self.bullet.createCollisionShape(
             self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
@@ -97,13 +96,13 @@ class _PyBulletWorld(World):
         self.bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=self.client)
         self.bullet.stepSimulation(physicsClientId=self.client)
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self.client
         )
         return x, z, -2.0 * math.atan2(turn, whole), *self.velocity()
 
-    def velocity(self) -> Vector:
+    def velocity(self) -> steps.Vector:
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
         return vx, vz, -w
 
@@ -121,7 +120,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
-        self.bounces = rebounds(scene)
+        self.bounces = contacts.rebounds(scene)
         # Where it would add to a bounce or make one, a penetration is left as it is.
         self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
         self.bouncing: bool | None = None
@@ -138,7 +137,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
 
         A huge inertia about the other axes keeps it in its plane.
         """
-        places = [[bx, 0.0, bz] for bx, bz in corners_of(scene)]
+        places = [[bx, 0.0, bz] for bx, bz in contacts.corners_of(scene)]
         shape = self.bullet.createCollisionShapeArray(
             shapeTypes=[self.bullet.GEOM_SPHERE] * len(places),
             radii=[CORNER_RADIUS] * len(places),
@@ -169,14 +168,14 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         )
         return body
 
-    def make_shape(self, surface: Surface) -> tuple[int, float]:
+    def make_shape(self, surface: contacts.Surface) -> tuple[int, float]:
         """A plane, behind the surface by the radius of the corners."""
         normal = [surface.normal[0], 0.0, surface.normal[1]]
         return self.bullet.createCollisionShape(
             self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
         ), CORNER_RADIUS
 
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+    def march(self, felt: Floats, dt: float) -> Floats:
         self.bounce(True)
         self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
         return super().march(felt, dt)

@@ -2,9 +2,8 @@
 
 from typing import ClassVar
 
-from rockcheck.engines.contacts import surfaces_of
+from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.engines.steps import State, Vector, World
 from rockcheck.scenes import Scene
 
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
@@ -15,7 +14,7 @@ KEPT = 0.5  # share of a penetration that is left after a second
 ITERATIONS = 200
 
 
-class _PymunkWorld(World):
+class _PymunkWorld(steps.World):
     """A space of its own with a box, floor and walls, and Chipmunk's default parameters."""
 
     slab = 0.0  # m: half the thickness of floor and walls
@@ -34,7 +33,7 @@ class _PymunkWorld(World):
         )
         self.box.friction = self.box.elasticity = 1.0
         self.space.add(self.body, self.box)
-        for surface in surfaces_of(scene):
+        for surface in contacts.surfaces_of(scene):
             (x, z), (nx, nz) = surface.behind(slab), surface.normal
             ends = [(x + way * REACH * nz, z + way * REACH * abs(nx)) for way in (-1.0, 1.0)]
             segment = pymunk.Segment(self.space.static_body, *ends, slab)
@@ -49,7 +48,7 @@ class _PymunkWorld(World):
         self.space.gravity = felt
         self.space.step(dt)
 
-    def state(self) -> State:
+    def state(self) -> steps.State:
         body = self.body
         (x, y), (vx, vy) = body.position, body.velocity
         return x, y, body.angle, vx, vy, body.angular_velocity
@@ -74,8 +73,13 @@ class _RigidPymunkWorld(_PymunkWorld):
         self.box.elasticity = float(bouncing)
 
     def push(
-        self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
-    ) -> Vector:
+        self,
+        pose: steps.Vector,
+        velocity: steps.Vector,
+        dt: float,
+        felt: tuple[float, float],
+        bouncing: bool,
+    ) -> steps.Vector:
         """Velocity after `dt` s with the contacts closed at `pose`.
 
         Chipmunk begins with the impulses of the step before, which has to be as long: a step aloft

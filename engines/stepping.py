@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.engines.base_motion import starts_of_motion, velocity_at, velocity_of
-from rockcheck.engines.contacts import arm_of, contacts_of, gap_of, rate_of
-from rockcheck.scenes import Scene, kinematics
+from rockcheck.engines import base_motion, contacts
+from rockcheck.scenes import Floats, Scene, kinematics
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-Floats = NDArray[np.float64]
 Base = tuple[Floats, float, float]
 Velocity = tuple[float, float, float]  # along x, y and theta
 
@@ -95,14 +93,16 @@ class March(NamedTuple):
 
 def course_of(scene: Scene, longest: float, short: float) -> Course:
     """Steps of at most `longest` s, and near events `short` times the usual."""
-    base = velocity_of(scene.excitation), velocity_of(scene.vertical)
+    base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
     moment = short / scene.frequency_parameter
     across, up = (
         (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in base
     )
     return Course(
-        corners=np.array([(*one.corner, *one.normal, one.distance) for one in contacts_of(scene)]),
-        starts=np.array([*starts_of_motion(scene, *base), math.inf]),
+        corners=np.array(
+            [(*one.corner, *one.normal, one.distance) for one in contacts.contacts_of(scene)]
+        ),
+        starts=np.array([*base_motion.starts_of_motion(scene, *base), math.inf]),
         across=across,
         up=up,
         end=float(scene.output_times[-1]),
@@ -125,8 +125,8 @@ def begun(scene: Scene, contacts: int) -> March:
     return March(state, closed, before, np.zeros(IMPACT + 1))
 
 
-_velocity_at, _rate_of = inner_kernel(velocity_at), inner_kernel(rate_of)
-_arm_of, _gap_of = inner_kernel(arm_of), inner_kernel(gap_of)
+_velocity_at, _rate_of = inner_kernel(base_motion.velocity_at), inner_kernel(contacts.rate_of)
+_arm_of, _gap_of = inner_kernel(contacts.arm_of), inner_kernel(contacts.gap_of)
 
 
 @inner_kernel

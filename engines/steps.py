@@ -20,14 +20,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from rockcheck.engines.base_motion import FloatArray, felt_acceleration
-from rockcheck.scenes import Block, ModelFailure, Scene, kinematics
-from rockcheck.scenes.progress import tell
+from rockcheck.engines import base_motion
+from rockcheck.scenes import Block, Floats, ModelFailure, Scene, kinematics, progress
 
 Vector = tuple[float, float, float]  # along x, y and theta
 State = tuple[float, float, float, float, float, float]
 #: Times (n) and states (n, 6) at step ends, felt accelerations (n-1, 2).
-Marched = tuple[FloatArray, FloatArray, FloatArray]
+Marched = tuple[Floats, Floats, Floats]
 STEPS_AT_ONCE = 2048
 #: Where a block lies on its side: contacts stop it a hair before a quarter turn, or after it.
 LYING = math.pi / 2 - 1e-6
@@ -60,7 +59,7 @@ class World(ABC):
         """How fast the block is."""
         return self.state()[3:]
 
-    def march(self, felt: FloatArray, dt: float) -> FloatArray:
+    def march(self, felt: Floats, dt: float) -> Floats:
         """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2)."""
         states = np.empty((len(felt), 6))
         for row, (ax, ay) in enumerate(felt.tolist()):
@@ -108,7 +107,7 @@ def in_units_of(length: float, scene: Scene) -> Scene:
     )
 
 
-def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray) -> Marched:
+def march_fixed(world: World, scene: Scene, times: Floats, felt: Floats) -> Marched:
     """Times, states of the mass's centre at step ends, felt accelerations, until the block lies.
 
     The first state in which the block lies is the last one returned. Raises `ModelFailure` if the
@@ -118,7 +117,7 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
     pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
     world.place(*pieces[0][0].tolist())
     for first in range(0, len(felt), STEPS_AT_ONCE):
-        tell(first, len(felt))
+        progress.tell(first, len(felt))
         states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= LYING)
         if tipped.size:
@@ -140,7 +139,7 @@ def march_fixed(world: World, scene: Scene, times: FloatArray, felt: FloatArray)
     return times[: len(marched)], marched, felt
 
 
-def at_output_times(scene: Scene, times: FloatArray, states: FloatArray) -> FloatArray:
+def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
     """States on the output grid: positions by cubic Hermite interpolation, velocities linear.
 
     Velocities jump at impacts, where a cubic would overshoot.
@@ -200,7 +199,7 @@ def adaptive_march(
             going = step(run, course, kicked, rows[count])
             count += 1
             if count % 512 == 0:
-                tell(rows[count - 1, 0], course.end)
+                progress.tell(rows[count - 1, 0], course.end)
             if going == stepping.LOST or count > most_steps:
                 raise ModelFailure(
                     f"no end to the events, or a motion that blew up, after {count} steps at t ="
@@ -224,7 +223,7 @@ class FixedStep:
         count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
-        felt = felt_acceleration(scene, times)
+        felt = base_motion.felt_acceleration(scene, times)
         return partial(march_fixed, world, scene, times, felt)
 
 

@@ -41,17 +41,7 @@ from rockcheck.reports.style import (
     stamp_in,
     stamp_of,
 )
-from rockcheck.scenes.errors import InputError, inert, one_of, printable
-from rockcheck.scenes.reading import MOST_BYTES, head_of, read_json, within
-from rockcheck.scenes.writing import (
-    finite,
-    json_text,
-    made,
-    markdown_table,
-    script_text,
-    table_text,
-    write_whole,
-)
+from rockcheck.scenes import InputError, errors, printable, reading, writing
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
@@ -142,7 +132,10 @@ def _grid(table: Table) -> Grid:
     for row in table.rows[: table.most]:
         grid.add_row(
             *(
-                Line(inert(words(cell, column, "{:.{}g}".format)), VERDICTS[_mark(cell).verdict][1])
+                Line(
+                    errors.inert(words(cell, column, "{:.{}g}".format)),
+                    VERDICTS[_mark(cell).verdict][1],
+                )
                 for cell, column in zip(row, table.columns, strict=True)
                 if column.brief
             )
@@ -152,7 +145,7 @@ def _grid(table: Table) -> Grid:
 
 def csv(table: Table) -> str:
     """A table as CSV with all digits."""
-    return table_text(
+    return writing.table_text(
         [column.name for column in table.columns],
         ([plain(cell) for cell in row] for row in table.rows),
     )
@@ -184,7 +177,7 @@ def block_markdown(block: Table | Plot | Text) -> str:
         for row in block.rows
     )
     note = f"\n\n{block.note}" if block.note else ""
-    return title + markdown_table([column.head for column in block.columns], rows) + note
+    return title + writing.markdown_table([column.head for column in block.columns], rows) + note
 
 
 def _draw(plot: Plot, stem: Path, stamp: str) -> None:
@@ -192,7 +185,7 @@ def _draw(plot: Plot, stem: Path, stamp: str) -> None:
 
 
 def _draw_again(data: Path, path: Path) -> None:
-    save_as(figure_of(PLOT.validate_python(read_json(data))), path)
+    save_as(figure_of(PLOT.validate_python(reading.read_json(data))), path)
 
 
 def write_figure(folder: Path, name: str, path: Path) -> Path:
@@ -203,7 +196,7 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     """
     kind_of(path)
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
-    data = known[one_of("figure", name, known)]
+    data = known[errors.one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:
         (ended,) = pool.run(deque([Call(_draw_again, (data, path), DRAWING)]))
     if ended.error is not None:
@@ -219,17 +212,22 @@ def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
     """
     before: dict[str, list[dict[str, Any]]] = {}
     with suppress(InputError, KeyError, TypeError, ValidationError):
-        before = TABLES.validate_python(read_json(within(folder, "run.json"))["tables"])
+        before = TABLES.validate_python(
+            reading.read_json(reading.within(folder, "run.json"))["tables"]
+        )
     for name in before.keys() - {table.name for table in found.tables()}:
         path = folder / f"{name}.csv"
-        heads = [table_text([*row], []) for row in before[name][:1] if path.parent == folder]
-        if heads and head_of(path, 10_000).startswith(heads[0]):
+        heads = [
+            writing.table_text([*row], []) for row in before[name][:1] if path.parent == folder
+        ]
+        if heads and reading.head_of(path, 10_000).startswith(heads[0]):
             yield path
     drawn = {plot.name for plot in found.plots()}
     for data in (folder / FIGURES).glob("*.json"):
         svg = data.with_suffix(".svg")
         if data.stem not in drawn and (
-            stamp_in(svg).split()[:1] == stamp_of(head_of(data, MOST_BYTES)).split()[:1]
+            stamp_in(svg).split()[:1]
+            == stamp_of(reading.head_of(data, reading.MOST_BYTES)).split()[:1]
         ):
             yield from (data, svg)
 
@@ -244,24 +242,27 @@ def publish(found: Finding, folder: Path) -> Path:
     tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for old in (*_left_by_another(folder, found), *folder.glob("failures/*.toml")):
         old.unlink()
-    write_whole(folder / "run.json", json_text(found.as_dict()) + "\n")
+    writing.write_whole(folder / "run.json", writing.json_text(found.as_dict()) + "\n")
     for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
         *parts, last = name.split("/")
-        write_whole(made(folder, *parts) / last, content)
+        writing.write_whole(writing.made(folder, *parts) / last, content)
     plots = list(found.plots())
-    figures = made(folder, FIGURES)
+    figures = writing.made(folder, FIGURES)
     calls = []
     for plot in plots:
         drawn = replace(plot, played=None)
-        data, stem = json_text(asdict(drawn)), figures / plot.name
-        write_whole(stem.with_suffix(".json"), data)
+        data, stem = writing.json_text(asdict(drawn)), figures / plot.name
+        writing.write_whole(stem.with_suffix(".json"), data)
         stamp = stamp_of(data)
         if stamp_in(stem.with_suffix(".svg")) != stamp:
             calls.append(Call(_draw, (drawn, stem, stamp)))
     list(side_by_side(calls))
     write_assets(folder)
     if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
-        write_whole(folder / "curves.js", script_text("window.rockcheckCurves", finite(live)))
+        writing.write_whole(
+            folder / "curves.js",
+            writing.script_text("window.rockcheckCurves", writing.finite(live)),
+        )
     return write_page(
         folder,
         "index.html",
@@ -294,7 +295,7 @@ TEMPLATES = Environment(
     undefined=StrictUndefined,
     trim_blocks=True,
     lstrip_blocks=True,
-    finalize=lambda value: inert(value) if type(value) is str else value,
+    finalize=lambda value: errors.inert(value) if type(value) is str else value,
 )
 TEMPLATES.filters |= {
     one.__name__: one for one in (number, unit, duration, moment, window, dash_array, readable)
@@ -313,16 +314,16 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     page = TEMPLATES.get_template(template).render(
         root="../" * len(parts), address=address, **context
     )
-    return write_whole(made(folder, *parts) / name, page)
+    return writing.write_whole(writing.made(folder, *parts) / name, page)
 
 
 def write_assets(folder: Path) -> None:
     """Write style sheets, scripts and the plotting library, once for all pages of a folder."""
-    target = made(folder, PAGES, "assets")
+    target = writing.made(folder, PAGES, "assets")
     for source in (*(DATA / "assets").iterdir(), *(DATA / "vendor").glob("*/*")):
         name = source.name if source.name != "LICENSE" else f"LICENSE.{source.parent.name}.txt"
-        write_whole(target / name, source.read_bytes())
-    write_whole(
+        writing.write_whole(target / name, source.read_bytes())
+    writing.write_whole(
         target / "models.css",
         "".join(
             f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"

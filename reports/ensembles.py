@@ -11,7 +11,7 @@ from rockcheck.reports.show.words import number, scene_facts
 from rockcheck.reports.tables import checks_table, formula, runs_table, verdict_mark
 from rockcheck.reports.view import View, slugs_of
 from rockcheck.scenes import Scene
-from rockcheck.validation.discrepancy.measures import CONFIDENCE, Samples
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -25,8 +25,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.motions import Distribution, Ensemble
-from rockcheck.validation.suite.results import EnsembleRecord
+from rockcheck.validation.suite import motions, results
 
 #: Ends of the axes of peaks, alpha, and where an overturned block is drawn beyond.
 LEAST, MOST, FALLEN = 1e-3, 1.0, 3.2
@@ -66,7 +65,7 @@ POINTS = (
 class EnsembleView(View):
     """One ensemble of a finished run, ready to be shown."""
 
-    record: EnsembleRecord
+    record: results.EnsembleRecord
     #: Its figures are for a paper, too.
     printed: ClassVar[bool] = True
 
@@ -133,7 +132,7 @@ class EnsembleView(View):
 
     def facts(self) -> list[tuple[str, str]]:
         """The ensemble in a few words: what is drawn, and the scene that it is drawn from."""
-        drawn = Ensemble(**self.record.definition)
+        drawn = motions.Ensemble(**self.record.definition)
         pulse, noise, motion = drawn.pulse, drawn.noise, drawn.pulse or drawn.noise
         facts = {
             "scenes": f"{drawn.count}, seed {drawn.seed}",
@@ -169,10 +168,10 @@ class EnsembleView(View):
             for model, (peaks, _) in self.curves.items()
         }
         known, reference = self.looks, self.references[0]
-        same = float(kstwobign.ppf(CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
+        same = float(kstwobign.ppf(measures.CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
         ends = (0.0, float(grid[-1]))
         band = Series(
-            f"no difference at the {CONFIDENCE:.0%} level",
+            f"no difference at the {measures.CONFIDENCE:.0%} level",
             ends,
             (0.0, 0.0),
             (-same, -same),
@@ -203,7 +202,7 @@ class EnsembleView(View):
         """Peak rotation of each scene by each model against the reference's."""
         reference, known, panels = self.references[0], self.looks, []
         for model in [one for one in self.record.samples if one != reference]:
-            pair = Samples(self.record.samples[reference], self.record.samples[model])
+            pair = measures.Samples(self.record.samples[reference], self.record.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LEAST, MOST * 1.6))
                 for one in (pair.reference, pair.candidate)
@@ -266,7 +265,7 @@ class EnsembleView(View):
         return Table("", list(map(Column, ["scene", *values])), rows, on="file")
 
 
-def _distribution(of: Distribution | None) -> str:
+def _distribution(of: motions.Distribution | None) -> str:
     if of and of.uniform:
         return f"uniform {number(of.uniform[0])} to {number(of.uniform[1])}"
     if of and of.lognormal:

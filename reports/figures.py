@@ -22,7 +22,7 @@ from rockcheck.reports.show.words import number
 from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, figure_style
 from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
-from rockcheck.validation.discrepancy.figures import IMPACTS, WindowedHistory
+from rockcheck.validation.discrepancy import figures
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
@@ -215,7 +215,7 @@ def summary(view: SceneView) -> str:
     """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
     said = []
     for model, history in view.histories.items():
-        impacts = len(WindowedHistory(history).events(*IMPACTS))
+        impacts = len(figures.WindowedHistory(history).events(*figures.IMPACTS))
         peak = number(history.peak_rotation / view.scene.block.alpha)
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
@@ -360,7 +360,7 @@ def _tracks(ax: Any, view: SceneView) -> None:
     shown = [model for model in view.looks if model in view.histories]
     for row, model in enumerate(shown):
         for kind, marker, size in TRACKED:
-            times = [e.t for e in WindowedHistory(view.histories[model]).events(kind)]
+            times = [e.t for e in figures.WindowedHistory(view.histories[model]).events(kind)]
             ax.plot(
                 times,
                 [row] * len(times),

@@ -28,16 +28,20 @@ from rockcheck.reports.figures import (
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.style import looks, save, save_as, stamp_in, stamp_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
-from rockcheck.scenes import InputError, Record, Scene, experience
-from rockcheck.scenes.errors import printable, unknown_name
-from rockcheck.scenes.files import scene_text, tables_of
-from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.reading import MOST_BYTES, head_of, read_text
-from rockcheck.scenes.writing import made, no_link, script_text, write_whole
-from rockcheck.validation.execute.models import FAMILIES
-from rockcheck.validation.execute.pool import Call
+from rockcheck.scenes import (
+    Record,
+    Scene,
+    errors,
+    experience,
+    files,
+    printable,
+    progress,
+    reading,
+    writing,
+)
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import Plot
-from rockcheck.validation.suite.results import SEVERITY, Run
+from rockcheck.validation.suite import results
 from rockcheck.validation.suite.tables import files_of, junit, markdown, shown
 
 #: The page to open.
@@ -70,40 +74,40 @@ def _turn(folder: Path) -> Iterator[None]:
 
     A run that waits says for which one, and gives up after `PATIENCE` s.
     """
-    lock, holder = FileLock(no_link(folder / LOCK)), folder / HOLDER
+    lock, holder = FileLock(writing.no_link(folder / LOCK)), folder / HOLDER
     try:
         lock.acquire(timeout=SILENT)
     except Timeout:
         other = ""
-        with suppress(InputError):  # it has just gone, or has not said who it is
-            other = printable(read_text(holder, most=1000))
+        with suppress(errors.InputError):  # it has just gone, or has not said who it is
+            other = printable(reading.read_text(holder, most=1000))
         whom = f"{other or 'another run'}, which holds {printable(folder / LOCK)}"
         print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
         try:
             lock.acquire(timeout=PATIENCE)
         except Timeout:
-            raise InputError(
+            raise errors.InputError(
                 f"{printable(folder)}: waited {PATIENCE:g} s for {whom}: end it, or give another"
                 " --out"
             ) from None
     try:
-        write_whole(holder, f"process {os.getpid()} on {platform.node()}")
+        writing.write_whole(holder, f"process {os.getpid()} on {platform.node()}")
         yield
     finally:
         holder.unlink(missing_ok=True)
         lock.release()
 
 
-def keep(run: Run, folder: Path) -> Path:
+def keep(run: results.Run, folder: Path) -> Path:
     """Write run.json, its schema and the tables; returns run.json.
 
     The histories are there already. Two runs take turns.
     """
     with _turn(folder):
         for table in files_of(run):
-            write_whole(folder / f"{table.name}.csv", csv(table))
-        write_whole(folder / "junit.xml", junit(run))
-        write_whole(folder / "summary.md", markdown(run))
+            writing.write_whole(folder / f"{table.name}.csv", csv(table))
+        writing.write_whole(folder / "junit.xml", junit(run))
+        writing.write_whole(folder / "summary.md", markdown(run))
         return run.save(folder)
 
 
@@ -117,7 +121,7 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     if isinstance(view, EnsembleView):
         return save_as(figure_of(view.distributions()), path)
     if not view.histories:
-        raise InputError(
+        raise errors.InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
     return save_as(histories_figure(view), path)
@@ -129,7 +133,7 @@ def write_site(
     jobs: int = 1,
     afresh: bool = True,
     wanted: Sequence[str] = (),
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
 ) -> Path:
     """Write `index.html` and a page a scene and an ensemble, beside a finished run.
 
@@ -178,11 +182,11 @@ class _Pages:
 
     def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
         self.folder = folder
-        self.run = Run.load(folder)
+        self.run = results.Run.load(folder)
         self.wanted = tuple(wanted)
         slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
         if unknown := [name for name in wanted if name not in slugs]:
-            raise unknown_name("scene of the run", unknown[0], slugs)
+            raise errors.unknown_name("scene of the run", unknown[0], slugs)
         self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
             EnsembleView(self.run, one.name, slugs[one.name], one) for one in self.run.ensembles
@@ -200,7 +204,7 @@ class _Pages:
             "run": self.run,
             "looks": looks(self.run.models),
             "channels": CHANNELS,
-            "SEVERITY": SEVERITY,
+            "SEVERITY": results.SEVERITY,
             "VERDICTS": tables.VERDICTS,
             "tables": tables,
             "row_cells": row_cells,
@@ -229,7 +233,7 @@ class _Pages:
         The figures are a thumbnail of all rotations, and where the run asks for them those for a
         paper, one a reference.
         """
-        figures = made(self.folder, PAGES, FIGURES)
+        figures = writing.made(self.folder, PAGES, FIGURES)
         curves = [
             (view.t, view.drawn[model]["theta"], look)
             for model, look in view.looks.items()
@@ -244,11 +248,13 @@ class _Pages:
         }
         for against, stem in stems.items() if view.printed else ():
             save(histories_figure(view, against), figures / stem)
-        write_whole(
-            made(self.folder, PAGES, "data") / f"{view.slug}.js",
-            script_text("window.rockcheck", payload(view)),
+        writing.write_whole(
+            writing.made(self.folder, PAGES, "data") / f"{view.slug}.js",
+            writing.script_text("window.rockcheck", payload(view)),
         )
-        files = write_scene_file(view.scene, made(self.folder, PAGES, "scene-files"), view.slug)
+        files = write_scene_file(
+            view.scene, writing.made(self.folder, PAGES, "scene-files"), view.slug
+        )
         beside = [None, *self.scenes, None]
         place = beside.index(view)
         return {
@@ -263,7 +269,7 @@ class _Pages:
 
     def _write_ensemble(self, view: EnsembleView) -> dict[str, Any]:
         """Write an ensemble's figures and tables; returns what its page shows beside the view."""
-        page, figures = view.page(), made(self.folder, PAGES, FIGURES)
+        page, figures = view.page(), writing.made(self.folder, PAGES, FIGURES)
         curves = [
             (*view.curves[model], look)
             for model, look in view.looks.items()
@@ -274,11 +280,13 @@ class _Pages:
             save(figure_of(plot), figures / plot.name)
         for table in page.tables():
             *parts, name = table.name.split("/")
-            write_whole(made(self.folder, PAGES, *parts) / f"{name}.csv", csv(table))
+            writing.write_whole(
+                writing.made(self.folder, PAGES, *parts) / f"{name}.csv", csv(table)
+            )
         return {"found": page}
 
     def _write_index(self) -> None:
-        figures = made(self.folder, PAGES, FIGURES)
+        figures = writing.made(self.folder, PAGES, FIGURES)
         blocks = tables.accuracy(self.run)
         (figures / f"{tables.PEAKS}.svg").unlink(missing_ok=True)
         for block in blocks:
@@ -295,7 +303,9 @@ class _Pages:
             worst=tables.worst_table(self.run, self.links),
             hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
             times=tables.times_table(self.run),
-            summaries={m: FAMILIES[m].summary for m in self.run.models if m in FAMILIES},
+            summaries={
+                m: models.FAMILIES[m].summary for m in self.run.models if m in models.FAMILIES
+            },
             matrix={scene: row for scene, row in matrix.items() if scene in self.views},
             accuracy=blocks,
             glance=tables.glance(self.run, matrix),
@@ -347,7 +357,9 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
     """
     few = sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW
     calls = [
-        Call(pages.write, one) if few else Call(_write_page, (pages.folder, pages.wanted, *one))
+        pool.Call(pages.write, one)
+        if few
+        else pool.Call(_write_page, (pages.folder, pages.wanted, *one))
         for one in (*stamps.items(), (INDEX, ""))
     ]
     yield from side_by_side(calls, 1 if few else min(jobs, len(stamps)), least=2)
@@ -356,7 +368,10 @@ def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterato
 def _belongings(page: Path) -> set[str]:
     """The files of a scene's page, relative to the folder of pages."""
     address = r'(?:href|src)="(?:pages/)?((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"'
-    return {*re.findall(address, head_of(page, MOST_BYTES)), f"figures/{page.stem}-small.svg"}
+    return {
+        *re.findall(address, reading.head_of(page, reading.MOST_BYTES)),
+        f"figures/{page.stem}-small.svg",
+    }
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
@@ -366,7 +381,7 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
 
     `load_scene` reads the file back to a scene that moves in the same way.
     """
-    tables, records = tables_of(scene), {}
+    tables, records = files.tables_of(scene), {}
     for key in ("excitation", "vertical"):
         excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
@@ -376,8 +391,8 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
                 f"{excitation.time_step * n:.12g},{value!r}"
                 for n, value in enumerate(excitation.unscaled)
             )
-            write_whole(folder / name, "\n".join([*head, *rows, ""]))
+            writing.write_whole(folder / name, "\n".join([*head, *rows, ""]))
             records[name] = ""
-    text = scene_text(tables)
-    write_whole(folder / f"{slug}.toml", text)
+    text = files.scene_text(tables)
+    writing.write_whole(folder / f"{slug}.toml", text)
     return {f"{slug}.toml": text, **records}

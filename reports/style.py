@@ -18,10 +18,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.reading import head_of
-from rockcheck.scenes.writing import made, write_whole
-from rockcheck.validation.execute.provenance import digest
+from rockcheck.scenes import InputError, printable, reading, writing
+from rockcheck.validation.execute import provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -202,17 +200,17 @@ def save(
     written = []
     with figure_style():
         for kind in formats:
-            path = made(stem.parent) / f"{stem.name}.{kind}"
+            path = writing.made(stem.parent) / f"{stem.name}.{kind}"
             content = io.BytesIO()
             figure.savefig(content, format=kind, metadata=undated[kind])
-            written.append(write_whole(path, content.getvalue(), named=named))
+            written.append(writing.write_whole(path, content.getvalue(), named=named))
             figure.set_layout_engine(None)  # the other formats are laid out alike
     return written
 
 
 def stamp_of(shown: object) -> str:
     """Two short hashes: of what a figure shows, and of what draws it."""
-    return f"{digest(json.dumps(shown, sort_keys=True))} {drawn_by()}"
+    return f"{provenance.digest(json.dumps(shown, sort_keys=True))} {drawn_by()}"
 
 
 @cache
@@ -223,12 +221,13 @@ def drawn_by() -> str:
         for path in sorted(Path(__file__).parent.rglob("*"))
         if path.is_file() and path.suffix != ".pyc"
     )
-    return digest("\n".join([version("matplotlib"), *hashes]))
+    return provenance.digest("\n".join([version("matplotlib"), *hashes]))
 
 
 def stamp_in(path: Path) -> str:
     """The stamp that an SVG or a page names near its beginning, empty where there is none."""
     found = re.search(
-        r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)', head_of(path, 4000)
+        r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)',
+        reading.head_of(path, 4000),
     )
     return found[1] if found else ""

@@ -13,9 +13,9 @@ from typing import Any
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import label_of, looks
 from rockcheck.reports.view import FALL, SceneView, all_figures
-from rockcheck.scenes.experience import Trust, trust_of
+from rockcheck.scenes import experience
 from rockcheck.scenes.history import events_path
-from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -28,10 +28,8 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
-from rockcheck.validation.suite.across import pairs_of, trust_in
-from rockcheck.validation.suite.results import Cell, Check, Run, value_of
+from rockcheck.validation.suite import across, results, tolerances
 from rockcheck.validation.suite.tables import used
-from rockcheck.validation.suite.tolerances import MEASURES, apart
 
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
@@ -55,7 +53,7 @@ CHECKS = [
 WORST = 12
 
 
-def checks_table(cells: Iterable[Cell], name: str = "") -> Table:
+def checks_table(cells: Iterable[results.Cell], name: str = "") -> Table:
     """All checks of a place's cells; folded under its name where that is given."""
     rows = [_check_row(cell, check) for cell in cells for check in cell.checks]
     count = f"{name}: {len(rows)} check{'' if len(rows) == 1 else 's'}" if name else ""
@@ -63,13 +61,13 @@ def checks_table(cells: Iterable[Cell], name: str = "") -> Table:
     return Table("checks", without_scene[0], without_scene[1:], count, folded=bool(name))
 
 
-def verdict_mark(cell: Cell) -> Mark:
+def verdict_mark(cell: results.Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
     judged = cell.verdict != "pass" or bool(cell.checks)
     return Mark(VERDICTS[cell.verdict][0], cell.verdict) if judged else Mark("nothing judged")
 
 
-def worst_table(run: Run, links: Mapping[str, str]) -> Table:
+def worst_table(run: results.Run, links: Mapping[str, str]) -> Table:
     """What is not within tolerance, the worst first; `links` are the pages of the scenes."""
     return Table(
         "worst",
@@ -92,7 +90,9 @@ def worst_table(run: Run, links: Mapping[str, str]) -> Table:
     )
 
 
-def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None) -> list[Any]:
+def _check_row(
+    cell: results.Cell, check: results.Check, links: Mapping[str, str] | None = None
+) -> list[Any]:
     figure, weighs = check.figure, "" if check.verdict == "not defined" else check.weighs
     against = f"against {label_of(figure.against)}, " if figure.against else ""
     return [
@@ -113,17 +113,17 @@ def _check_row(cell: Cell, check: Check, links: Mapping[str, str] | None = None)
 
 def formula(measure: str) -> str:
     """How a measure is defined, empty where it is not known."""
-    return MEASURES[measure].formula if measure in MEASURES else ""
+    return tolerances.MEASURES[measure].formula if measure in tolerances.MEASURES else ""
 
 
-def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
+def worst_first(run: results.Run) -> list[tuple[results.Cell, results.Check | None]]:
     """What is not within tolerance, the worst first.
 
     Cells without a history, then checks by how far they are out, then those that changed.
 
     A figure that has no tolerance yet is not out of one; the page counts these.
     """
-    failed: list[tuple[Cell, Check | None]] = [
+    failed: list[tuple[results.Cell, results.Check | None]] = [
         (cell, None) for cell in run.cells if cell.status != "done"
     ]
     checks = [
@@ -134,7 +134,7 @@ def worst_first(run: Run) -> list[tuple[Cell, Check | None]]:
     return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])))
 
 
-def times_table(run: Run) -> Table:
+def times_table(run: results.Run) -> Table:
     """Run times relative to the reference in the same scene, and their geometric mean.
 
     The seconds stand below.
@@ -169,7 +169,7 @@ def measures_table(view: SceneView, against: str) -> Table:
 
     A row a measure and window, a column a model.
     """
-    found: dict[tuple[str, str], dict[str, tuple[Figure, Check | None]]] = {}
+    found: dict[tuple[str, str], dict[str, tuple[figures.Figure, results.Check | None]]] = {}
     for cell in view.cells:
         judged = [(check.figure, check) for check in cell.checks]
         for figure, check in (*judged, *((figure, None) for figure in cell.figures)):
@@ -193,7 +193,7 @@ def measures_table(view: SceneView, against: str) -> Table:
     )
 
 
-def _measured(figure: Figure, check: Check | None) -> Mark:
+def _measured(figure: figures.Figure, check: results.Check | None) -> Mark:
     limit = f"limit {number(check.limit)}" if check else ""
     return Mark(
         f"{number(figure.value, 4)} {unit(figure.unit)}",
@@ -233,7 +233,10 @@ def uncertainty_table(view: SceneView) -> Table:
 
 
 def runs_table(
-    run: Run, cells: Sequence[Cell], root: str = "", histories: Mapping[str, Any] | None = None
+    run: results.Run,
+    cells: Sequence[results.Cell],
+    root: str = "",
+    histories: Mapping[str, Any] | None = None,
 ) -> Table:
     """Settings, run times and outcomes of a place's cells.
 
@@ -280,7 +283,7 @@ def runs_table(
     )
 
 
-def _costs(cell: Cell, of: str, base: Cell | None) -> list[str]:
+def _costs(cell: results.Cell, of: str, base: results.Cell | None) -> list[str]:
     cost, whole = cell.cost, getattr(base.cost, of) if base else 0.0
     return [
         duration(getattr(cost, of)),
@@ -299,7 +302,7 @@ DEVIATIONS: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
 PEAKS = "overview-peaks"
 
 
-def matrix(run: Run) -> dict[str, list[Entry | None]]:
+def matrix(run: results.Run) -> dict[str, list[Entry | None]]:
     """By scene: an entry for each model of the run, None where it does not play the scene."""
     cells = run.by_scene()
     return {
@@ -308,7 +311,7 @@ def matrix(run: Run) -> dict[str, list[Entry | None]]:
     }
 
 
-def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, Any]:
+def glance(run: results.Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, Any]:
     """The answers that the index gives first; `rows` are the run's `matrix`.
 
     The entry `farthest` from the reference, the scenes whose outcome depends on the model (`apart`,
@@ -333,19 +336,19 @@ def glance(run: Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, An
     }
 
 
-def _moved(check: Check) -> bool:
+def _moved(check: results.Check) -> bool:
     """Whether a figure left its drift band; without one, its limit."""
     value, expected = check.figure.value, check.expected
     if check.drift is None or value is None or expected is None:
         return check.weighs != "pass"
-    measure = MEASURES.get(check.figure.measure)
+    measure = tolerances.MEASURES.get(check.figure.measure)
     return (
-        apart(value, expected, check.floor, (measure.ideal if measure else None) or 0.0)
+        tolerances.apart(value, expected, check.floor, (measure.ideal if measure else None) or 0.0)
         > check.drift
     )
 
 
-def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
+def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> Entry | None:
     """How far a model lies from the run's reference in a scene; None where it does not play it.
 
     `cells` are those of the scene, by model. Of its `cell`: `rms`, the RMS difference of rotation,
@@ -369,7 +372,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
         "whole": whole,
-        "ratio": value_of(figures, "peak_ratio", against),
+        "ratio": results.value_of(figures, "peak_ratio", against),
         "u_num": cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
         "outcome": outcome_of(cell),
         "apart": differs,
@@ -379,7 +382,7 @@ def entry(run: Run, cells: Mapping[str, Cell], model: str) -> Entry | None:
     }
 
 
-def why_apart(cell: Cell) -> str:
+def why_apart(cell: results.Cell) -> str:
     """Why an outcome other than the reference's is within tolerance; "" where it is not."""
     if not cell.checks or cell.verdict != "pass":
         return ""
@@ -387,9 +390,9 @@ def why_apart(cell: Cell) -> str:
     return f"not as the reference; {'accepted' if judged else 'not judged'}"
 
 
-def outcome_of(cell: Cell) -> str:
+def outcome_of(cell: results.Cell) -> str:
     """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall."""
-    last = value_of((f for f in all_figures(cell) if f.unit == "alpha"), "last_rotation")
+    last = results.value_of((f for f in all_figures(cell) if f.unit == "alpha"), "last_rotation")
     if cell.outcome == "moving" and last is not None and abs(last) > FALL:
         return f"falling {'left' if last > 0.0 else 'right'}"
     return cell.fate
@@ -401,7 +404,7 @@ def _side(outcome: str) -> str:
     return words[1] if words and words[0] in ("overturned", "falling") else ""
 
 
-def accuracy(run: Run) -> list[Block]:
+def accuracy(run: results.Run) -> list[Block]:
     """Peak rotation by each model against the reference's, over all scenes.
 
     A point a scene, lines for the bias and two standard deviations; bias and scatter of this run
@@ -409,10 +412,13 @@ def accuracy(run: Run) -> list[Block]:
 
     Nothing where neither is known.
     """
-    pairs, styles = pairs_of([run]), looks(run.models)
+    pairs, styles = across.pairs_of([run]), looks(run.models)
     settings = {cell.model: cell.settings for cell in run.cells}
     trusts = {
-        model: (trust_in(pairs[model]), trust_of(model, settings.get(model, {})).get(QUANTITY))
+        model: (
+            across.trust_in(pairs[model]),
+            experience.trust_of(model, settings.get(model, {})).get(QUANTITY),
+        )
         for model in run.models
         if model in pairs
     }
@@ -466,7 +472,7 @@ def accuracy(run: Run) -> list[Block]:
     ]
 
 
-def _expected(trust: Trust, ends: tuple[float, float], look: str) -> list[Series]:
+def _expected(trust: experience.Trust, ends: tuple[float, float], look: str) -> list[Series]:
     return [
         Series("", ends, [trust.bias * factor * end for end in ends], look=look, style=style)
         for sigma, style in DEVIATIONS.items()

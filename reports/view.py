@@ -10,17 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.reports.style import Look, looks
-from rockcheck.scenes import History, InputError, Scene, kinematics
+from rockcheck.scenes import Floats, History, InputError, Scene, kinematics, reading
 from rockcheck.scenes.history import COLUMNS, events_path
-from rockcheck.scenes.reading import within
+from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.discrepancy.compare import QUANTITIES, motion_of
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.suite.results import Cell, Run, value_of
+from rockcheck.validation.suite import results
 
-Array = NDArray[np.float64]
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
 #: not come back.
 FALL = 1.5
@@ -77,12 +74,12 @@ class Band:
 class View:
     """A scene or an ensemble of a finished run: what has a page of its own."""
 
-    run: Run
+    run: results.Run
     name: str
     slug: str
 
     @cached_property
-    def cells(self) -> tuple[Cell, ...]:
+    def cells(self) -> tuple[results.Cell, ...]:
         """Its cells, in the models' order."""
         return self.run.of_scene(self.name)
 
@@ -138,21 +135,21 @@ class SceneView(View):
         return {cell.model: _history_of(cell, self.folder) for cell in self.cells}
 
     @cached_property
-    def t(self) -> Array:
+    def t(self) -> Floats:
         """The common time axis, s."""
         return self.scene.output_times[:: self.stride]
 
     @cached_property
-    def ground(self) -> Array:
+    def ground(self) -> Floats:
         """Horizontal base acceleration on `t`, m/s^2."""
         return np.asarray(self.scene.excitation.acceleration(self.t))
 
     @cached_property
-    def values(self) -> dict[str, dict[str, Array]]:
+    def values(self) -> dict[str, dict[str, Floats]]:
         """By model and channel (also x and y, m): values on `t`, NaN where the history has none."""
         return {model: self._channels(history) for model, history in self.histories.items()}
 
-    def _channels(self, history: History) -> dict[str, Array]:
+    def _channels(self, history: History) -> dict[str, Floats]:
         block = self.scene.block
         found = {name: self._on_axis(history, name) for name in COLUMNS[1:-1]}
         motion = (found[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
@@ -165,7 +162,7 @@ class SceneView(View):
             name: found[name] for name in ("x", "y")
         }
 
-    def _on_axis(self, history: History, name: str) -> Array:
+    def _on_axis(self, history: History, name: str) -> Floats:
         """A column on `t`, linear between its rows.
 
         NaN outside them and where there is no such column.
@@ -199,7 +196,7 @@ class SceneView(View):
         return {model: np.unique(rows[rows < len(self.t)]).tolist() for model, rows in near.items()}
 
     @cached_property
-    def drawn(self) -> dict[str, dict[str, Array]]:
+    def drawn(self) -> dict[str, dict[str, Floats]]:
         """The `values` up to the fall, NaN from there on."""
         return {
             model: {name: np.where(stands, column, math.nan) for name, column in columns.items()}
@@ -237,7 +234,7 @@ class SceneView(View):
             self.cells, key=lambda cell: cell.settings.get("pivot") != "unilateral"
         )
         heights = (
-            (cell.model, value_of(cell.figures, "highest_hop"))
+            (cell.model, results.value_of(cell.figures, "highest_hop"))
             for cell in trusted_first
             if cell.settings.get("pivot") != "bilateral"
         )
@@ -277,7 +274,7 @@ class SceneView(View):
         """
         return (self.references if self.model_form_matters else self.references[:1]) or (None,)
 
-    def differences(self, channel: str, against: str) -> dict[str, Array]:
+    def differences(self, channel: str, against: str) -> dict[str, Floats]:
         """Candidate minus reference by model, in the channel's unit.
 
         The difference ends with the first fall of the two.
@@ -288,7 +285,7 @@ class SceneView(View):
             if model != against
         }
 
-    def running_rms(self, band: Band) -> Array:
+    def running_rms(self, band: Band) -> Floats:
         """The RMS difference from 0 up to each time, to `band.until`.
 
         The band's limit applies to the last value. NaN where it is not known.
@@ -390,7 +387,11 @@ class SceneView(View):
 
 
 def scene_views(
-    run: Run, folder: Path, chosen: Container[str] | None = None, *, most_values: int = 2_000_000
+    run: results.Run,
+    folder: Path,
+    chosen: Container[str] | None = None,
+    *,
+    most_values: int = 2_000_000,
 ) -> list[SceneView]:
     """The views of the chosen scenes of a run, or of all.
 
@@ -426,16 +427,16 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
     return slugs
 
 
-def all_figures(cell: Cell) -> list[Figure]:
+def all_figures(cell: results.Cell) -> list[figures.Figure]:
     """The figures of a cell, those with a check first."""
     return [*(check.figure for check in cell.checks), *cell.figures]
 
 
-def _history_of(cell: Cell, folder: Path) -> History | str:
+def _history_of(cell: results.Cell, folder: Path) -> History | str:
     if cell.status != "done" or cell.history is None:
         return cell.reason or "no history"
     try:
-        within(folder, str(events_path(Path(cell.history))))
-        return History.load(within(folder, cell.history))
+        reading.within(folder, str(events_path(Path(cell.history))))
+        return History.load(reading.within(folder, cell.history))
     except InputError as error:
         return str(error)

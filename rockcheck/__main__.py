@@ -24,10 +24,12 @@ def _leave_garbage() -> None:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     from rockcheck.commands.cli import main as run
-    from rockcheck.scenes.progress import INTERRUPTED
+    from rockcheck.scenes import progress
 
     code = run(arguments, began=BEGAN)
-    if code == INTERRUPTED:  # compiled code may still run in threads, which Python would wait for
+    if (
+        code == progress.INTERRUPTED
+    ):  # compiled code may still run in threads, which Python would wait for
         os._exit(code)
     return code
 

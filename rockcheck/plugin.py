@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Literal
 import pytest
 
 if TYPE_CHECKING:
-    from rockcheck.validation.suite.results import Cell
+    from rockcheck.validation.suite import results
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -48,7 +48,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture
-def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
+def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cell]:
     """Run a cell and its references; the test fails if the cell is out of tolerance.
 
     `rockcheck_check(scene, model=..., suite=None, strict=False)` returns the finished
@@ -64,10 +64,9 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
         model: str,
         suite: str | Path | None = None,
         strict: bool | Literal["both"] = False,
-    ) -> Cell:
+    ) -> results.Cell:
+        from rockcheck.validation.suite import suites, tables
         from rockcheck.validation.suite.runner import run_suite
-        from rockcheck.validation.suite.suites import load_suite, named_suites
-        from rockcheck.validation.suite.tables import cell_lines
 
         own = config.rootpath / "rockcheck.toml"
         chosen = str(
@@ -77,13 +76,14 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
             *config.getini("rockcheck_allow_code"),
             *config.getoption("--rockcheck-allow-code"),
         ]
-        loaded = load_suite(
-            chosen if chosen in named_suites() else config.rootpath / chosen, allow_code=allowed
+        loaded = suites.load_suite(
+            chosen if chosen in suites.named_suites() else config.rootpath / chosen,
+            allow_code=allowed,
         )
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)
         assert cell is not None
-        wrong = list(cell_lines(cell, strict))
+        wrong = list(tables.cell_lines(cell, strict))
         if wrong:
             pytest.fail("\n".join(wrong), pytrace=False)
         if all(check.verdict == "not defined" for check in cell.checks):
@@ -99,7 +99,7 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., Cell]:
 if find_spec("pytest_check") is None:
 
     @pytest.fixture
-    def check(rockcheck_check: Callable[..., Cell]) -> Callable[..., Cell]:
+    def check(rockcheck_check: Callable[..., results.Cell]) -> Callable[..., results.Cell]:
         """The old name of `rockcheck_check`; it goes with the next release."""
         warnings.warn(
             "rockcheck's fixture `check` is called `rockcheck_check` now",

@@ -1,12 +1,21 @@
 """The contract that every model signs: a Scene goes in, a History comes out."""
 
-from rockcheck.scenes.block import Block
-from rockcheck.scenes.errors import InputError, ModelFailure
-from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
+from rockcheck.scenes.base import (
+    Finite as Finite,
+    Floats as Floats,
+    Frozen as Frozen,
+    NonNegative as NonNegative,
+    Positive as Positive,
+    Shown as Shown,
+)
+from rockcheck.scenes.block import Block, Pivot as Pivot
+from rockcheck.scenes.errors import InputError, ModelFailure, printable as printable
+from rockcheck.scenes.excitations import Excitation as Excitation, Record, Rest, Ricker, Sine
 from rockcheck.scenes.files import load_scene, named_scenes
 from rockcheck.scenes.history import Cost, Event, History
-from rockcheck.scenes.scene import Floor, Scene, Wall
+from rockcheck.scenes.scene import PAPER_BLOCK as PAPER_BLOCK, Floor, Scene, Wall
 
+# Public names; the others are for the packages above.
 __all__ = [
     "Block",
     "Cost",

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationError
 
 from rockcheck.scenes.errors import from_validation
@@ -19,6 +21,7 @@ from rockcheck.scenes.errors import from_validation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+Floats = NDArray[np.float64]
 #: Allowed sizes of numbers in SI units: their squares, cubes and inverses are still finite.
 LEAST, MOST = 1e-30, 1e30
 

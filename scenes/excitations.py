@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, StringConstraints, model_validator
 
-from rockcheck.scenes.base import Finite, Frozen, Positive
+from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
-FloatArray = NDArray[np.float64]
 #: Largest peak acceleration that a record may be scaled to, g.
 MOST_PGA = 1000.0
 
@@ -46,7 +45,7 @@ class Rest(Motion):
 
     kind: Literal["rest"] = "rest"
 
-    def acceleration(self, t: ArrayLike) -> FloatArray:
+    def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration at times `t` (s): zero."""
         return np.zeros_like(np.asarray(t, dtype=float))
 
@@ -96,7 +95,7 @@ class Ricker(Motion):
         slope = self.amplitude / 1.38 * 2.0 * math.pi / (math.sqrt(3.0) * self.period)
         return 0.0, -3.0 * slope, 0.0, 2.0 * self.rate * slope
 
-    def acceleration(self, t: ArrayLike) -> FloatArray:
+    def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration in m/s^2 at times `t` in s from the pulse's start; zero before it."""
         time = np.asarray(t, dtype=float)
         tau = time - self.centre
@@ -118,7 +117,7 @@ class Sine(Motion):
     period: Positive
     cycles: Annotated[int, Field(ge=1, le=1000)] = 1
 
-    def acceleration(self, t: ArrayLike) -> FloatArray:
+    def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration in m/s^2 at times `t` in s."""
         time = np.asarray(t, dtype=float)
         inside = (time >= 0.0) & (time <= self.quiet_after)
@@ -191,11 +190,11 @@ class Record(Motion):
         )
 
     @property
-    def samples(self) -> FloatArray:
+    def samples(self) -> Floats:
         """The scaled samples, m/s^2."""
         return self.scale * np.asarray(self.unscaled)
 
-    def acceleration(self, t: ArrayLike) -> FloatArray:
+    def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration in m/s^2 at times `t` in s, linear between samples."""
         times = self.time_step * np.arange(len(self.unscaled))
         return np.interp(np.asarray(t, dtype=float), times, self.samples, left=0.0, right=0.0)

@@ -28,9 +28,8 @@ from typing import Any, Literal, TypeVar, cast
 import numpy as np
 from pydantic import model_validator
 
-from rockcheck.scenes.base import Finite, Frozen, Positive
+from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
-from rockcheck.scenes.excitations import FloatArray
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene, Wall
@@ -207,7 +206,7 @@ class UncertainScene:
     scene: Scene
     spreads: Mapping[str, Spread]
     #: Correlation matrix in the order of `spreads`; the unit matrix if all are independent.
-    correlation: FloatArray
+    correlation: Floats
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -219,7 +218,7 @@ class UncertainScene:
         """Whether no two numbers are correlated."""
         return bool(np.array_equal(self.correlation, np.eye(len(self.spreads))))
 
-    def values(self, uniform: FloatArray) -> FloatArray:
+    def values(self, uniform: Floats) -> Floats:
         """The uncertain numbers (n x count) at points of the unit cube (n x count).
 
         The correlation enters by a Gaussian copula.

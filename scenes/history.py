@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from rockcheck.scenes.base import MOST, Frozen, NonNegative, Positive, Shown
+from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.experience import Expected, expected, trust_of
@@ -436,7 +436,7 @@ def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]
     return channels
 
 
-def _numbers(column: pd.Series[Any], shown: str) -> NDArray[np.float64]:
+def _numbers(column: pd.Series[Any], shown: str) -> Floats:
     import pandas as pd
 
     try:

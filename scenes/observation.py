@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import kinematics
+from rockcheck.scenes.base import Floats
 from rockcheck.scenes.history import Cost, Event, History, outcome_of
 from rockcheck.scenes.scene import Scene
 
@@ -27,7 +28,7 @@ class About(TypedDict, total=False):
 def observe(
     scene: Scene,
     model: str,
-    state: NDArray[np.float64],
+    state: Floats,
     *,
     mode: NDArray[Any] | None = None,
     events: Sequence[Event] = (),

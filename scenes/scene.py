@@ -9,10 +9,9 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
-from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive, Restitution, Shown
+from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Excitation, Rest
@@ -147,7 +146,7 @@ class Scene(Shown, Frozen):
         return self.block.weaker_pivot.frequency_parameter(self.gravity)
 
     @property
-    def output_times(self) -> NDArray[np.float64]:
+    def output_times(self) -> Floats:
         """The output grid: multiples of `output_step` from 0 up to `duration`, s."""
         steps = math.floor(self.duration / self.output_step * (1.0 + 1e-12))
         return self.output_step * np.arange(steps + 1, dtype=np.float64)

@@ -17,10 +17,8 @@ import numpy as np
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import Block, Event, History
-from rockcheck.scenes.errors import InputError, NotInstalled
-from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.execute.models import not_installed
+from rockcheck.scenes import PAPER_BLOCK, Block, Event, History, InputError, errors
+from rockcheck.validation.execute import models
 
 # What tests of several folders share beside fixtures, and what is a program of its own, too.
 sys.path[:0] = [
@@ -67,7 +65,7 @@ ARGUMENTS = [
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """A test that is marked as needing what is not here is skipped."""
     for name in (name for mark in item.iter_markers("needs") for name in mark.args):
-        missing = ("" if HERE[name] else "not here") if name in HERE else not_installed(name)
+        missing = ("" if HERE[name] else "not here") if name in HERE else models.not_installed(name)
         if missing:
             pytest.skip(f"needs {name}: {missing}")
 
@@ -77,7 +75,7 @@ def pytest_runtest_call() -> Iterator[None]:
     """A test that comes to play an engine that is not installed is skipped."""
     try:
         return (yield)
-    except NotInstalled as error:
+    except errors.NotInstalled as error:
         pytest.skip(f"needs {error.key}: {error.reason}")
 
 

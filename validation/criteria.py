@@ -16,9 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rockcheck.scenes import Record, Scene
-from rockcheck.scenes.block import Block, Pivot
-from rockcheck.scenes.excitations import Excitation
+from rockcheck.scenes import Block, Excitation, Pivot, Record, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 
 #: Samples in one period of a pulse.

@@ -21,18 +21,8 @@ from typing import Any, Literal
 
 from pydantic import TypeAdapter
 
-from rockcheck.scenes.progress import INTERRUPTED, OnProgress, announce, unheard
-from rockcheck.scenes.writing import made, write_whole
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.pool import (
-    THREADS,
-    Call,
-    Cluster,
-    Failure,
-    Pool,
-    check_scheduler,
-    guarded,
-)
+from rockcheck.scenes import progress, writing
+from rockcheck.validation.execute import pool, provenance
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
@@ -147,7 +137,7 @@ def run(
     scheduler: str | None = None,
     force: bool = False,
     minutes: float | None = None,
-    on_progress: OnProgress = unheard,
+    on_progress: progress.OnProgress = progress.unheard,
 ) -> Finding:
     """Play what is not up to date in `folder`, keep each record as it comes, and gather.
 
@@ -157,7 +147,7 @@ def run(
     `InputError` where the folder cannot be used or no cluster answers.
     """
     if scheduler is not None:
-        check_scheduler(scheduler)
+        pool.check_scheduler(scheduler)
     return _Run(
         study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress
     ).finding(minutes)
@@ -171,7 +161,7 @@ class _Run:
         jobs: int,
         scheduler: str | None,
         force: bool,
-        heard: OnProgress,
+        heard: progress.OnProgress,
     ) -> None:
         self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
         self.force, self.heard = force, heard
@@ -188,14 +178,14 @@ class _Run:
     def finding(self, minutes: float | None) -> Finding:
         ended = 0
         with self.stack:
-            self.stack.callback(THREADS.reset, THREADS.set(self.jobs))
+            self.stack.callback(pool.THREADS.reset, pool.THREADS.set(self.jobs))
             try:
                 self._play(self.began + 60.0 * minutes if minutes else math.inf)
             except KeyboardInterrupt:
-                ended = INTERRUPTED
+                ended = progress.INTERRUPTED
         complete = not ended and len(self.done) == len(self.known)
         if minutes and not (ended or complete):
-            announce(f"{self.study.name}: its {minutes:g} minutes are over")
+            progress.announce(f"{self.study.name}: its {minutes:g} minutes are over")
         # In the order of the tasks: a finding must not depend on which ended first.
         found = self.study.gather(
             {task: self.done[task] for task in self.known if task in self.done}
@@ -206,7 +196,7 @@ class _Run:
             failures={
                 task.label: one.reason
                 for task, one in self.done.items()
-                if isinstance(one, Failure)
+                if isinstance(one, pool.Failure)
             }
             | {**found.failures},
             exit_code=found.exit_code or ended,
@@ -221,25 +211,27 @@ class _Run:
         )
 
     @cached_property
-    def _workers(self) -> Pool:
+    def _workers(self) -> pool.Pool:
         return self.stack.enter_context(
-            Pool(self.jobs, self.study.memory_mb)
+            pool.Pool(self.jobs, self.study.memory_mb)
             if self.scheduler is None
-            else Cluster(self.scheduler, self.study.memory_mb)
+            else pool.Cluster(self.scheduler, self.study.memory_mb)
         )
 
     def _play(self, until: float) -> None:
         """Waves of tasks, until the study has no more."""
         while waiting := self._next():
             self._estimate(waiting)
-            calls = deque[Call]()
+            calls = deque[pool.Call]()
             for task in waiting:
                 if task.where in self.elsewhere:
                     calls.append(
-                        Call(guarded, (self.study.play, task), task.seconds, task.compiles, task)
+                        pool.Call(
+                            pool.guarded, (self.study.play, task), task.seconds, task.compiles, task
+                        )
                     )
                 elif time.monotonic() < until:
-                    self._end(task, guarded(self.study.play, task))
+                    self._end(task, pool.guarded(self.study.play, task))
             if not calls:
                 continue
             for ended in self._workers.run(calls, until=until):
@@ -262,10 +254,11 @@ class _Run:
 
     def _end(self, task: Task, result: Any) -> None:
         self.done[task] = result
-        if isinstance(result, Failure):
+        if isinstance(result, pool.Failure):
             if result.traceback:
-                write_whole(
-                    made(self.folder, FAULTS) / f"{self.study.file(task)}.txt", result.traceback
+                writing.write_whole(
+                    writing.made(self.folder, FAULTS) / f"{self.study.file(task)}.txt",
+                    result.traceback,
                 )
         else:
             self.study.keep(self.store, task, result)
@@ -277,4 +270,4 @@ class _Run:
         )
         if seconds >= LONG:
             long = f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-            announce(f"{self.study.name}: {len(waiting)} tasks, about {long}")
+            progress.announce(f"{self.study.name}: {len(waiting)} tasks, about {long}")

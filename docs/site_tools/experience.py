@@ -12,11 +12,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes.experience import Experience, Range, Trust, axes_of
-from rockcheck.scenes.writing import markdown_table, write_whole
-from rockcheck.validation.execute.models import FAMILIES, build
-from rockcheck.validation.suite.across import pairs_of, trust_in
-from rockcheck.validation.suite.results import Run
+from rockcheck.scenes import experience, writing
+from rockcheck.validation.execute import models
+from rockcheck.validation.suite import across, results
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "scenes" / "data" / "experience.json"
@@ -27,39 +25,39 @@ BEGIN, END = "<!-- experience: begin -->\n", "<!-- experience: end -->\n"
 LIMITS = {"estimate_error", "most_steps", "most_events"}
 
 
-def experience_of(runs: Sequence[Run]) -> Experience:
+def experience_of(runs: Sequence[results.Run]) -> experience.Experience:
     """Bias and scatter by model and figure, and the domain of the scenes, over some runs.
 
     The domain is the range of each axis, `scenes.experience.axes_of`.
     """
-    trust: dict[str, dict[str, Trust]] = {}
-    for model, pairs in sorted(pairs_of(runs).items()):
-        if found := trust_in(pairs):
+    trust: dict[str, dict[str, experience.Trust]] = {}
+    for model, pairs in sorted(across.pairs_of(runs).items()):
+        if found := across.trust_in(pairs):
             trust[model] = {"peak_rotation": found}
-    scenes = [axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
+    scenes = [experience.axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
     domain = {}
     for axis in dict.fromkeys(axis for one in scenes for axis in one):
         numbers = [number for one in scenes for number in one.get(axis, ())]
-        domain[axis] = Range(low=min(numbers), high=max(numbers))
-    settings = {model: _settings_of(model, runs) for model in trust if model in FAMILIES}
-    return Experience(
+        domain[axis] = experience.Range(low=min(numbers), high=max(numbers))
+    settings = {model: _settings_of(model, runs) for model in trust if model in models.FAMILIES}
+    return experience.Experience(
         suites=tuple(run.suite for run in runs), trust=trust, settings=settings, domain=domain
     )
 
 
-def _settings_of(model: str, runs: Iterable[Run]) -> dict[str, tuple[Any, ...]]:
+def _settings_of(model: str, runs: Iterable[results.Run]) -> dict[str, tuple[Any, ...]]:
     """The values of each setting that a model had, but for those that change no motion.
 
     Those that it has by default: what follows from others, as the stiffness, is left out.
     """
-    default: Any = build(model)
+    default: Any = models.build(model)
     names = default.model_dump(exclude=LIMITS, exclude_none=True)
     had = [cell.settings for run in runs for cell in run.cells if cell.model == model]
     given = [settings for settings in had if settings]
     return {name: tuple(dict.fromkeys(one[name] for one in given)) for name in names}
 
 
-def tables(found: Experience) -> str:
+def tables(found: experience.Experience) -> str:
     """Bias and scatter by model, and the domain, as Markdown."""
     rows = [
         (f"`{model}`", f"{trust.bias:.4f}", f"{trust.scatter:.2g}", str(trust.count))
@@ -67,17 +65,18 @@ def tables(found: Experience) -> str:
         for trust in (figures["peak_rotation"],)
     ]
     covered = [(axis, f"{one.low:.3g}", f"{one.high:.3g}") for axis, one in found.domain.items()]
-    first = markdown_table(("model", "bias", "scatter", "scenes"), rows)
-    return f"\n{first.strip()}\n\n{markdown_table(('axis', 'from', 'to'), covered).strip()}\n\n"
+    first = writing.markdown_table(("model", "bias", "scatter", "scenes"), rows).strip()
+    second = writing.markdown_table(("axis", "from", "to"), covered).strip()
+    return f"\n{first}\n\n{second}\n\n"
 
 
 def main(folders: Sequence[str]) -> None:
     """Learns from the runs in these folders."""
-    found = experience_of([Run.load(Path(folder)) for folder in folders])
-    write_whole(KEPT, found.model_dump_json(indent=1) + "\n")
+    found = experience_of([results.Run.load(Path(folder)) for folder in folders])
+    writing.write_whole(KEPT, found.model_dump_json(indent=1) + "\n")
     text = PAGE.read_text(encoding="utf-8")
     before, rest = text.split(BEGIN)
-    write_whole(PAGE, before + BEGIN + tables(found) + END + rest.split(END)[1])
+    writing.write_whole(PAGE, before + BEGIN + tables(found) + END + rest.split(END)[1])
     print(tables(found))
 
 

@@ -16,9 +16,8 @@ from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.reports.show.drawing import draw_block
 from rockcheck.reports.show.spectrum import draw
 from rockcheck.reports.style import PAGE, figure_style, looks, save
-from rockcheck.scenes import Floor, History, Ricker, Scene, Wall, load_scene
+from rockcheck.scenes import PAPER_BLOCK, Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height
-from rockcheck.scenes.scene import PAPER_BLOCK
 
 FOLDER = Path(__file__).parents[1] / "images" / "gallery"
 

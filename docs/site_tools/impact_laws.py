@@ -22,12 +22,7 @@ from rockcheck import engines
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Block, Floor, InputError, ModelFailure, Ricker, Scene, Wall
-from rockcheck.validation.discrepancy.impact_laws import (
-    TELLS,
-    Landing,
-    LawFollowed,
-    parting_landing,
-)
+from rockcheck.validation.discrepancy import impact_laws
 from rockcheck.validation.execute.models import Model
 from rockcheck.validation.finding import Column, Table, text
 
@@ -42,8 +37,8 @@ class Row:
     cannot be told or the model failed."""
 
     model: str
-    found: Sequence[LawFollowed | None]
-    default: Sequence[LawFollowed | None]
+    found: Sequence[impact_laws.LawFollowed | None]
+    default: Sequence[impact_laws.LawFollowed | None]
 
     def cells(self, columns: Sequence[str]) -> Iterator[str | int | None]:
         """The row of the table."""
@@ -60,7 +55,7 @@ class Row:
         yield self.model
         yield from (counts[law] or None for law in columns)
         yield f"{np.median(errors):.0e} ({min(errors):.0e} … {max(errors):.0e})" if errors else ""
-        yield f"{sum(error < TELLS for error in alike)}/{len(alike)}"
+        yield f"{sum(error < impact_laws.TELLS for error in alike)}/{len(alike)}"
 
 
 def landing(number: int) -> Scene:
@@ -85,7 +80,7 @@ def landing(number: int) -> Scene:
         period = 2.0 * math.pi / (scene.frequency_parameter * r.uniform(3.0, 6.0))
         pulse = Ricker(amplitude=9.81 * math.tan(alpha) * r.uniform(1.5, 4.0), period=period)
         scene = scene.replace(excitation=pulse, initial_rotation=0.0, initial_angular_velocity=0.0)
-    found = parting_landing(scene)
+    found = impact_laws.parting_landing(scene)
     by_rule = found and found.followed_by(
         EventBasedModel(pivot="unilateral", impacts="floor-first").simulate(scene), scene
     )
@@ -109,11 +104,11 @@ def flat_landing(number: int) -> Scene:
         duration=0.5,
         output_step=0.002,
     )
-    found = parting_landing(scene)
+    found = impact_laws.parting_landing(scene)
     return flat_landing(number + 1000) if found is None else _as_long_as(scene, found)
 
 
-def _as_long_as(scene: Scene, found: Landing) -> Scene:
+def _as_long_as(scene: Scene, found: impact_laws.Landing) -> Scene:
     told = scene.output_step * (
         found.start + max(len(motion) for motion in found.branches.values())
     )
@@ -143,9 +138,9 @@ def models() -> dict[str, Model]:
 
 def played(scenes: Sequence[Scene]) -> Iterator[Row]:
     """The rows, one after the other."""
-    landings = [where for scene in scenes if (where := parting_landing(scene))]
+    landings = [where for scene in scenes if (where := impact_laws.parting_landing(scene))]
 
-    def followed(model: Model) -> list[LawFollowed | None]:
+    def followed(model: Model) -> list[impact_laws.LawFollowed | None]:
         return [
             _followed(where, scene, model) for where, scene in zip(landings, scenes, strict=True)
         ]
@@ -155,7 +150,9 @@ def played(scenes: Sequence[Scene]) -> Iterator[Row]:
         yield Row(words, followed(model), default)
 
 
-def _followed(where: Landing, scene: Scene, model: Model) -> LawFollowed | None:
+def _followed(
+    where: impact_laws.Landing, scene: Scene, model: Model
+) -> impact_laws.LawFollowed | None:
     try:
         return where.followed_by(model.simulate(scene), scene)
     except (InputError, ModelFailure) as error:

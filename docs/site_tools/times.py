@@ -11,7 +11,7 @@ import time
 
 import whole_runs
 
-from rockcheck.validation.execute.provenance import hardware, versions
+from rockcheck.validation.execute import provenance
 from rockcheck.validation.finding import Column, Finding, Made, Table, text
 
 UNITS = (("wall", "wall clock"), ("cpu", "CPU"))
@@ -51,8 +51,8 @@ def main() -> None:
         created=time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
         jobs=os.cpu_count() or 1,
         wall_seconds=time.perf_counter() - began,
-        versions=versions(),
-        hardware={**hardware(), "load before": f"{load:.1f}"},
+        versions=provenance.versions(),
+        hardware={**provenance.hardware(), "load before": f"{load:.1f}"},
     )
     table = Table("commands", columns, rows, "Commands")
     answer = f"{len(rows)} commands, one after the other, models compiled."

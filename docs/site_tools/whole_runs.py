@@ -28,7 +28,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from rockcheck.reports import document
-from rockcheck.scenes.writing import json_text
+from rockcheck.scenes import writing
 from rockcheck.validation.finding import Finding, Made, Mark, Plot, Table, Text, plain
 
 DOCS = Path(__file__).parents[1]
@@ -52,9 +52,11 @@ PLACE = re.compile(r"(<!-- table: ([^>]*?) -->\n).*?(?=\n<!-- end -->)", re.DOTA
 def keep(name: str, found: Finding) -> None:
     """Write a finding as docs/runs/NAME.json."""
     blocks = [{"block": block.block, **asdict(block)} for block in found.blocks]
-    blocks = [one for one in blocks if one["on"] != "file" and len(json_text(one)) < MOST]
+    blocks = [one for one in blocks if one["on"] != "file" and len(writing.json_text(one)) < MOST]
     about = {"name": found.name, "title": found.title, "answer": found.answer, "made": found.made}
-    lines = json_text({**about, "made": found.made and asdict(found.made), "blocks": blocks})
+    lines = writing.json_text(
+        {**about, "made": found.made and asdict(found.made), "blocks": blocks}
+    )
     (RUNS / f"{name}.json").write_text(lines + "\n", encoding="utf-8")
 
 

@@ -28,15 +28,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
 from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Friction, Kind, Law
 from rockcheck.ebm.core.series import NOISE
+from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-Numbers = NDArray[np.float64]
 #: Rows of scratch that an impact needs.
 WORK = 20
 # Every set of at most three contacts: their number, the contacts, and these as bits.
@@ -67,11 +66,11 @@ class Impact(NamedTuple):
 
     sense: float
     phi: float
-    touching: Numbers
+    touching: Floats
     e_tip: float
     e_far: float
     resting: float
-    v: Numbers
+    v: Floats
 
 
 class Stage(NamedTuple):
@@ -83,18 +82,18 @@ class Stage(NamedTuple):
     (`taking`), and its `full` rebound. `after` has the velocities after the stage.
     """
 
-    rows: Numbers
-    system: Numbers
-    lam: Numbers
-    trial: Numbers
-    restitution: Numbers
-    target: Numbers
-    part: Numbers
-    approach: Numbers
-    ahead: Numbers
-    after: Numbers
-    taking: Numbers
-    full: Numbers
+    rows: Floats
+    system: Floats
+    lam: Floats
+    trial: Floats
+    restitution: Floats
+    target: Floats
+    part: Floats
+    approach: Floats
+    ahead: Floats
+    after: Floats
+    taking: Floats
+    full: Floats
 
 
 @inner_kernel

@@ -7,12 +7,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
+from rockcheck.scenes import Floats, Record, Rest, Ricker, Sine
 from rockcheck.scenes.compiled import inner_kernel
-from rockcheck.scenes.excitations import Record, Rest, Ricker, Sine
 
 NEVER = np.inf
 
@@ -40,7 +39,7 @@ class Ground(NamedTuple):
     """One component of the base motion: its FORM, and its samples."""
 
     form: np.record
-    samples: NDArray[np.float64]
+    samples: Floats
 
 
 _NO_SAMPLES = np.zeros(1)

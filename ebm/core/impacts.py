@@ -12,13 +12,20 @@ on the pivot.
 """
 
 import math
+from enum import IntEnum
 from typing import NamedTuple
 
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.names import Branch, Kind, Landing
+from rockcheck.ebm.core.names import Kind
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import inner_kernel
+
+#: Forms of the paper's floor impact.
+Landing = IntEnum("Landing", "HELD_FAST SLID FLAT_END", start=0)
+
+#: Branches of the wall impact's cascade, as the paper's Fig. 3 letters them.
+Branch = IntEnum("Branch", "A_STICK B_STICK C_STICK D_SLIP E_SLIP NO_BRANCH", start=0)
 
 
 class Corner(NamedTuple):

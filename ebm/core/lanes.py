@@ -20,9 +20,9 @@ from numba.core import cgutils, types
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
-from numpy.typing import NDArray
 
-Numbers = NDArray[np.float64]
+from rockcheck.scenes import Floats
+
 LANES = 8
 _PLACES = np.arange(LANES)
 _NUMBER, _PLACE = ir.DoubleType(), ir.IntType(64)
@@ -131,7 +131,7 @@ _calculates(operator.add, "fadd")
 _calculates(operator.mul, "fmul")
 
 
-def zeros() -> Numbers:
+def zeros() -> Floats:
     """0 in each lane."""
     return np.zeros(LANES)
 
@@ -141,7 +141,7 @@ def _zeros(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return _ZEROS
 
 
-def ramp() -> Numbers:
+def ramp() -> Floats:
     """Each lane's own number: 0, 1, 2, ..."""
     return np.arange(float(LANES))
 
@@ -151,7 +151,7 @@ def _ramp(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return _RAMP
 
 
-def powers(t: float) -> Numbers:
+def powers(t: float) -> Floats:
     """1, t, t^2, ..."""
     result = np.ones(LANES)
     for bit in (1, 2, 4):
@@ -172,7 +172,7 @@ def _powers(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return result
 
 
-def first(v: Numbers) -> float:
+def first(v: Floats) -> float:
     """The number in lane 0."""
     return v[0]
 
@@ -182,7 +182,7 @@ def _first(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.extract_element(values[0], ir.IntType(32)(0))
 
 
-def shifted(v: Numbers) -> Numbers:
+def shifted(v: Floats) -> Floats:
     """Each lane's number moved to the lane before; 0 comes into the last one."""
     return np.append(v[1:], 0.0)
 
@@ -192,7 +192,7 @@ def _shifted(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.shuffle_vector(values[0], _ZEROS, _indices(_PLACES + 1))
 
 
-def put(v: Numbers, place: int, number: float) -> Numbers:
+def put(v: Floats, place: int, number: float) -> Floats:
     """The lanes with this number in one place."""
     return np.where(place == _PLACES, number, v)
 
@@ -203,7 +203,7 @@ def _put(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.select(_where(b, "==", place), _all(b, number), v)
 
 
-def upto(v: Numbers, place: int) -> Numbers:
+def upto(v: Floats, place: int) -> Floats:
     """The lanes up to this place, 0 in those behind it."""
     return np.where(place >= _PLACES, v, 0.0)
 
@@ -213,7 +213,7 @@ def _upto(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.select(_where(b, "<=", values[1]), values[0], _ZEROS)
 
 
-def above(v: Numbers, place: int) -> Numbers:
+def above(v: Floats, place: int) -> Floats:
     """The lanes behind this place, 0 in those up to it."""
     return np.where(place < _PLACES, v, 0.0)
 
@@ -223,7 +223,7 @@ def _above(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.select(_where(b, ">", values[1]), values[0], _ZEROS)
 
 
-def falls(v: Numbers) -> Numbers:
+def falls(v: Floats) -> Floats:
     """The negative numbers, and 0 for the positive ones. NaN stays NaN."""
     return np.where(v > 0.0, 0.0, v)
 
@@ -233,7 +233,7 @@ def _falls(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.select(b.fcmp_ordered(">", values[0], _ZEROS), _ZEROS, values[0])
 
 
-def total(v: Numbers) -> float:
+def total(v: Floats) -> float:
     """The sum of all lanes, by halving.
 
     The two halves are added, then the two quarters of that, and at last the two numbers left.
@@ -255,7 +255,7 @@ def _total(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.extract_element(v, ir.IntType(32)(0))
 
 
-def load(a: Numbers, row: int, k: int) -> Numbers:
+def load(a: Floats, row: int, k: int) -> Floats:
     """The numbers a[row, k], a[row, k + 1], ... of a matrix; they must all be in the row."""
     return a[row, k : k + LANES].copy()
 
@@ -274,7 +274,7 @@ def _load(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return b.load(_place(context, b, kinds, values), align=8)
 
 
-def store(a: Numbers, row: int, k: int, v: Numbers) -> None:
+def store(a: Floats, row: int, k: int, v: Floats) -> None:
     """Writes a[row, k], a[row, k + 1], ... of a matrix; they must all be in the row."""
     a[row, k : k + LANES] = v
 

@@ -137,12 +137,6 @@ Friction = IntEnum("Friction", "FREE HELD PLUS MINUS", start=0)
 #: What came of an impact: its stages do not end, all obey the law, or one violates it least.
 Found = IntEnum("Found", "ENDLESS FITS LEAST_WRONG", start=0)
 
-#: Forms of the paper's floor impact.
-Landing = IntEnum("Landing", "HELD_FAST SLID FLAT_END", start=0)
-
-#: Branches of the wall impact's cascade, as the paper's Fig. 3 letters them.
-Branch = IntEnum("Branch", "A_STICK B_STICK C_STICK D_SLIP E_SLIP NO_BRANCH", start=0)
-
 
 class Rule(IntEnum):
     """The modelling choices of the event-based models.

@@ -13,9 +13,9 @@ from rockcheck.ebm.core.block import record
 from rockcheck.ebm.core.ground import Ground
 from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
+from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-Numbers = NDArray[np.float64]
 #: How many modes there are.
 MODES = 128
 
@@ -148,9 +148,9 @@ class Rows(NamedTuple):
     horizontal: NDArray[np.void]
     vertical: NDArray[np.void]
     starts: NDArray[np.void]
-    durations: Numbers
-    output_steps: Numbers
-    samples: Numbers
+    durations: Floats
+    output_steps: Floats
+    samples: Floats
 
     def part(self, part: "slice | NDArray[np.bool_]") -> "Rows":
         """Some of the runs. The samples stay those of all."""
@@ -163,17 +163,17 @@ class Records(NamedTuple):
     Arrays of these where there are several runs.
     """
 
-    out: Numbers
+    out: Floats
     out_mode: NDArray[np.int8]
-    log: Numbers
+    log: Floats
 
 
 class Run(NamedTuple):
     """A run: its state, the series `a` of its step, the root search's `stack`, and its records."""
 
     state: np.record
-    a: Numbers
-    stack: Numbers
+    a: Floats
+    stack: Floats
     records: Records
 
 

@@ -12,17 +12,7 @@ import numpy as np
 from rockcheck.ebm.core import contacts, impacts, modes
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contact_impacts import ROUNDING, WORK, Impact, contact_impact
-from rockcheck.ebm.core.names import (
-    Branch,
-    Contact,
-    Event,
-    Family,
-    Found,
-    Guard,
-    Landing,
-    Pivot,
-    Rule,
-)
+from rockcheck.ebm.core.names import Contact, Event, Family, Found, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, place
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -149,7 +139,7 @@ def _floor_impact(block, state, resting):
     form, w2, v2, p = impacts.floor_impact(block, S1, w1, v1, mu_s, block.mu_k)
     state.impulse = p
     motion.w, motion.vx, motion.vy = w2, v2 - c * w2, -S1 * s2 * w2
-    if form == Landing.HELD_FAST and abs(w2) > SETTLE:
+    if form == impacts.Landing.HELD_FAST and abs(w2) > SETTLE:
         place(mode, Family.TILT, -S1, Pivot.STICK, 0)
         return True
     return False
@@ -199,7 +189,7 @@ def _corner_impact(block, state, sw, e, resting):
     state.impulse = abs(p) + n
     count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / block.spin, state)
     C = corner.C
-    stays = e == 0.0 and branch != Branch.B_STICK and branch != Branch.E_SLIP
+    stays = e == 0.0 and branch != impacts.Branch.B_STICK and branch != impacts.Branch.E_SLIP
     stays = stays or sw * (xdot2 - C * w2) < resting
     if stays:
         xdot2 = C * w2

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from pkgutil import resolve_name
 from typing import Any
 
-from rockcheck.ebm.spectrum import Spectrum
+from rockcheck.ebm import Spectrum
 from rockcheck.reports.show import words
 from rockcheck.reports.style import Figure
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.base import View
-from rockcheck.validation.discrepancy.compare import Discrepancy
+from rockcheck.validation import Discrepancy
 
 
 def _later(name: str) -> Callable[[Any], Figure]:

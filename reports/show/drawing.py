@@ -13,8 +13,8 @@ from matplotlib.patches import Polygon, Rectangle
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
-from rockcheck.validation.discrepancy.compare import Discrepancy
-from rockcheck.validation.discrepancy.figures import Pair
+from rockcheck.validation import Discrepancy
+from rockcheck.validation.discrepancy import figures
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
 #: Limit of the rotation axis where a block overturns, either way, in alpha.
@@ -130,7 +130,7 @@ def discrepancy_figure(found: Discrepancy) -> Figure:
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
     rotation_lines(above, [reference, candidate], [mine.light, other.light])
     above.legend(frameon=False, ncols=2)
-    pair = Pair(reference, candidate, None, found.end)
+    pair = figures.Pair(reference, candidate, None, found.end)
     below.plot(pair.time, np.diff(pair.theta, axis=0)[0], color=other.light, linewidth=0.9)
     below.set(xlabel="t, s", ylabel="difference, α" if pair.alpha else "difference, rad")
     below.grid(color=SHADE, linewidth=0.5)

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm.spectrum import LEFT, Spectrum
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import LEFT
 from rockcheck.reports.style import LOOKS, PAGE, Figure, figure_style
+from rockcheck.scenes import writing
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
-from rockcheck.scenes.writing import script_text, write_whole
 from rockcheck.validation.finding import Plot
 
 #: The paper's colours.
@@ -244,5 +245,7 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
     }
     for what, content in (("Nodes", data), ("Histories", plot.played)):
         place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
-        write_whole(folder / f"{plot.name}.{what.lower()}.js", script_text(place, content))
+        writing.write_whole(
+            folder / f"{plot.name}.{what.lower()}.js", writing.script_text(place, content)
+        )
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]

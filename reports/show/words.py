@@ -10,17 +10,12 @@ from itertools import chain, repeat, takewhile
 
 import numpy as np
 
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
+from rockcheck.ebm import Spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.reports.style import SUPERSCRIPTS, Look
-from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine
-from rockcheck.scenes.errors import inert
-from rockcheck.validation.discrepancy.compare import Discrepancy
-from rockcheck.validation.discrepancy.figures import (
-    IMPACTS,
-    STANDARD_GRAVITY,
-    Figure,
-    WindowedHistory,
-)
+from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine, errors
+from rockcheck.validation import Discrepancy
+from rockcheck.validation.discrepancy import figures
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -40,13 +35,13 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
     ]
     lines = (
         "".join(
-            f'<{tag} style="text-align: left">{escape(inert(str(cell)))}</{tag[:2]}>'
+            f'<{tag} style="text-align: left">{escape(errors.inert(str(cell)))}</{tag[:2]}>'
             for cell, tag in zip(row, tags, strict=False)
         )
         for row, tags in tagged
     )
     return (
-        f'<table><caption style="text-align: left"><b>{escape(inert(caption))}</b></caption>'
+        f'<table><caption style="text-align: left"><b>{escape(errors.inert(caption))}</b></caption>'
         f"{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
     )
 
@@ -66,7 +61,11 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     """(label, text) of a scene's block, floor, walls, excitation and duration."""
     block, tilt = scene.block, scene.initial_rotation
-    g = "" if scene.gravity == STANDARD_GRAVITY else f", gravity {number(scene.gravity)} m/s²"
+    g = (
+        ""
+        if scene.gravity == figures.STANDARD_GRAVITY
+        else f", gravity {number(scene.gravity)} m/s²"
+    )
     mu, mu_s, e = scene.floor.friction, scene.floor.mu_s, scene.floor.restitution
     floor = f"μ {number(mu)}{f' (static {number(mu_s)})' if mu_s != mu else ''}"
     floor += f", restitution {number(e)}" if e else ""
@@ -133,7 +132,9 @@ def history_html(history: History) -> str:
     """
     time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
     peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
-    kinds = Counter(event.kind for event in WindowedHistory(history).events(*IMPACTS))
+    kinds = Counter(
+        event.kind for event in figures.WindowedHistory(history).events(*figures.IMPACTS)
+    )
     facts = {
         "outcome": history.fate,
         "peak rotation": peak if history.overturned_at is None else "",
@@ -218,7 +219,7 @@ def ratio(value: float | None) -> str:
     return f"{value:,.0f}×".replace(",", "\u202f") if value >= 100.0 else f"{number(value, 2)}×"
 
 
-def window(figure: Figure) -> str:
+def window(figure: figures.Figure) -> str:
     """The window of a figure in words."""
     if figure.window == "horizon":
         return "to the horizon" + (

@@ -30,11 +30,9 @@ from rich.progress import (
 )
 
 from rockcheck.reports.style import ENDINGS, kind_of, save_as
-from rockcheck.scenes.errors import InputError, inert, printable
-from rockcheck.scenes.files import named_scenes
+from rockcheck.scenes import InputError, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
-from rockcheck.scenes.recordings.sets import Odd
-from rockcheck.scenes.writing import json_text, made
+from rockcheck.scenes.recordings import sets
 from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
 
 if TYPE_CHECKING:
@@ -107,7 +105,9 @@ class _Screen(Console):
     """
 
     def print(self, *objects: Any, **options: Any) -> None:
-        super().print(*(inert(one) if isinstance(one, str) else one for one in objects), **options)
+        super().print(
+            *(errors.inert(one) if isinstance(one, str) else one for one in objects), **options
+        )
 
 
 def console() -> Console:
@@ -130,10 +130,10 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
 
     These are vertical components, with a `hint` how to play them, and files that are no records.
     """
-    vertical = [name for name in names if not isinstance(name, Odd)]
+    vertical = [name for name in names if not isinstance(name, sets.Odd)]
     said = f"vertical; {hint}" if hint else "vertical"
     lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
-    for line in [*lines, *(name for name in names if isinstance(name, Odd))]:
+    for line in [*lines, *(name for name in names if isinstance(name, sets.Odd))]:
         console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 
@@ -143,7 +143,7 @@ def answer(value: Any) -> None:
     Numbers that are not finite become null.
     """
     if _voice.get() == "json":
-        print(json_text(value))
+        print(writing.json_text(value))
 
 
 #: Time between two lines of progress, s; and before the first one, which is printed only if more
@@ -316,7 +316,7 @@ def usable_folder(folder: Path, *parts: str) -> Path:
     """
     path = folder.joinpath(*parts)
     try:
-        made(folder, *parts)
+        writing.made(folder, *parts)
     except OSError as error:
         raise InputError(
             f"{printable(path)}: cannot be used as a folder: {error.strerror}"

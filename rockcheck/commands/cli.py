@@ -23,9 +23,8 @@ import typer
 import typer.core
 
 from rockcheck.commands import console, report_file, speaking
-from rockcheck.scenes.errors import InputError, ModelFailure, printable
-from rockcheck.scenes.progress import INTERRUPTED
-from rockcheck.validation.suite.results import FAULT
+from rockcheck.scenes import InputError, ModelFailure, printable, progress
+from rockcheck.validation.suite import results
 
 #: The commands, in the order of the help: where each is below this package, a module with
 #: its function `run` or another function of one; and an example.
@@ -83,8 +82,8 @@ EXIT_CODES = {
     1: "out of tolerance, or an invariant is broken",
     2: "bad input, or a file that cannot be read or written",
     3: "a model failed",
-    FAULT: "a fault of rockcheck itself: please report it",
-    INTERRUPTED: "interrupted by Ctrl-C",
+    results.FAULT: "a fault of rockcheck itself: please report it",
+    progress.INTERRUPTED: "interrupted by Ctrl-C",
 }
 
 _NAMED = inspect.Parameter.KEYWORD_ONLY
@@ -255,7 +254,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         except ModelFailure as error:
             return _told(str(error), 3)
         except (KeyboardInterrupt, typer.Abort):
-            code = INTERRUPTED
+            code = progress.INTERRUPTED
         except OSError as error:  # a full disk: what was written before is whole
             return _told(
                 f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used:"
@@ -270,10 +269,12 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
             return _told(
                 f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
                 f" {where or f'this: {error}'}",
-                FAULT,
+                results.FAULT,
             )
-        if code == INTERRUPTED:  # a study has gathered what there is, or Typer has caught it
-            return _told("interrupted; what was finished is kept", INTERRUPTED)
+        if (
+            code == progress.INTERRUPTED
+        ):  # a study has gathered what there is, or Typer has caught it
+            return _told("interrupted; what was finished is kept", progress.INTERRUPTED)
         return code if isinstance(code, int) else 0
 
 

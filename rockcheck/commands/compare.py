@@ -15,15 +15,12 @@ from rockcheck.commands import (
     scene_names,
     told,
 )
-from rockcheck.scenes import History, InputError, Scene, load_scene
-from rockcheck.scenes.errors import printable
-from rockcheck.validation.discrepancy.compare import Discrepancy, compare, motion_of
-from rockcheck.validation.discrepancy.figures import value_words
-from rockcheck.validation.discrepancy.measured import read_measured, shifted, time_shift
-from rockcheck.validation.discrepancy.measures import DIFFERENCES
+from rockcheck.scenes import History, InputError, Scene, load_scene, printable
+from rockcheck.validation import Discrepancy, compare
+from rockcheck.validation.discrepancy import figures, measured, measures
+from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
-from rockcheck.validation.suite.across import difference
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite import across, results
 
 #: Value of --align without a time.
 BEST = "best"
@@ -76,7 +73,7 @@ def run(
         if study.wrote(reference):
             told(study.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
-        told(difference(Run.load(reference), Run.load(candidate)))
+        told(across.difference(results.Run.load(reference), results.Run.load(candidate)))
     if plot is not None:
         check_file(plot, "--plot")
     what = load_scene(scene) if scene else None
@@ -84,9 +81,9 @@ def run(
         offset = 0.0 if align == BEST else float(align or 0.0)
     except ValueError:
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
-    given, other = read_measured(reference), read_measured(candidate)
-    shift = time_shift(given, other) if align == BEST else offset
-    found = compare(given, shifted(other, shift), until=until, scene=what)
+    given, other = measured.read_measured(reference), measured.read_measured(candidate)
+    shift = measured.time_shift(given, other) if align == BEST else offset
+    found = compare(given, measured.shifted(other, shift), until=until, scene=what)
     finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
     document.show(finding, console())
     if plot is not None:
@@ -101,8 +98,8 @@ def _finding(
     rows = [
         [
             figure.label,
-            value_words(figure.value, yes_no=DIFFERENCES[figure.measure].yes_no),
-            "" if DIFFERENCES[figure.measure].yes_no else figure.unit,
+            figures.value_words(figure.value, yes_no=measures.DIFFERENCES[figure.measure].yes_no),
+            "" if measures.DIFFERENCES[figure.measure].yes_no else figure.unit,
             figure.note,
         ]
         for figure in found.figures

@@ -16,11 +16,10 @@ from rockcheck.commands import (
     setting_of,
     tell_left_out,
 )
-from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.recordings import UNITS, Reading, Recording, intensity
-from rockcheck.scenes.recordings.sets import Odd, files_of, read_files, record_path
+from rockcheck.scenes import InputError, printable, recordings
+from rockcheck.scenes.recordings import sets
 from rockcheck.validation.finding import Finding, Table, Text, text
-from rockcheck.validation.suite.motions import RecordSet
+from rockcheck.validation.suite import motions
 
 ReadOption = Annotated[
     list[str] | None,
@@ -28,9 +27,9 @@ ReadOption = Annotated[
         "--read",
         metavar="KEY=VALUE",
         help="What a file does not say of itself, or which part of it is wanted; repeatable. unit:"
-        f" {', '.join(UNITS)}; time_step, s; column: that of the accelerations, its number"
-        " from 1, or its name; header_lines to skip; decimal: . or ,; component: its number from 1,"
-        " or its name.",
+        f" {', '.join(recordings.UNITS)}; time_step, s; column: that of the accelerations, its"
+        " number from 1, or its name; header_lines to skip; decimal: . or ,; component: its number"
+        " from 1, or its name.",
     ),
 ]
 RecordsArgument = Annotated[
@@ -61,9 +60,9 @@ def run(
     """
     if plot is not None:
         check_file(plot, "--plot")
-    reading = Reading(**dict(setting_of(word, "--read") for word in read or ()))
-    asked = files_of(files)
-    known, faults = read_files(dict.fromkeys(asked, False), reading)
+    reading = recordings.Reading(**dict(setting_of(word, "--read") for word in read or ()))
+    asked = sets.files_of(files)
+    known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
     found = [(path, one) for path, components in known.items() for one in components]
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
@@ -76,12 +75,12 @@ def run(
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
-        tell_left_out([*map(Odd, faults[1:])])
+        tell_left_out([*map(sets.Odd, faults[1:])])
         more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
 
 
-def _values(path: Path, record: Recording) -> dict[str, Any]:
+def _values(path: Path, record: recordings.Recording) -> dict[str, Any]:
     return {
         "file": path,
         "format": record.form,
@@ -90,18 +89,18 @@ def _values(path: Path, record: Recording) -> dict[str, Any]:
         "step_s": record.time_step,
         "duration_s": record.time_step * (len(record.samples) - 1),
         "unit": record.unit,
-        "pga_g": intensity.peak_acceleration(record),
-        "pgv_m_s": intensity.peak_velocity(record),
-        "arias_m_s": intensity.arias(record),
+        "pga_g": recordings.intensity.peak_acceleration(record),
+        "pgv_m_s": recordings.intensity.peak_velocity(record),
+        "arias_m_s": recordings.intensity.arias(record),
         "sa_g": {
-            f"{period:g}": intensity.spectral_acceleration(record, period)
-            for period in intensity.PERIODS
+            f"{period:g}": recordings.intensity.spectral_acceleration(record, period)
+            for period in recordings.intensity.PERIODS
         },
         "notes": record.notes,
     }
 
 
-def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
+def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> None:
     from rockcheck.reports.document import show
 
     rows = [
@@ -122,7 +121,7 @@ def _show(path: Path, record: Recording, value: dict[str, Any]) -> None:
     show(Finding("record", title, "", [Text(title), table]), console())
 
 
-def _picture(record: Recording) -> str:
+def _picture(record: recordings.Recording) -> str:
     """The largest acceleration in each part of the motion, as bars."""
     parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
     peaks = np.array([np.max(part) for part in parts])
@@ -130,7 +129,7 @@ def _picture(record: Recording) -> str:
     return "".join(_MARKS[level] for level in levels)
 
 
-def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
+def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:
     """The records, and how they are read. Raises `InputError`."""
     given = dict(setting_of(word, "--read") for word in read)
     if not records:
@@ -138,10 +137,10 @@ def record_sets(records: Sequence[str], read: Sequence[str]) -> list[RecordSet]:
             raise InputError("needs records", "--read")
         return []
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
-    reading = {name: value for name, value in Reading(**given) if value is not None}
+    reading = {name: value for name, value in recordings.Reading(**given) if value is not None}
     return [
-        RecordSet(
-            files=tuple(str(record_path(word, Path()).absolute()) for word in records),
+        motions.RecordSet(
+            files=tuple(str(sets.record_path(word, Path()).absolute()) for word in records),
             scale=scale,
             vertical=vertical,
             **reading,

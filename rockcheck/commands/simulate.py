@@ -31,22 +31,11 @@ from rockcheck.commands import (
     setting_of,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
-from rockcheck.scenes import History, InputError, ModelFailure, Scene, load_scene, named_scenes
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.files import read_toml
+from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import ONE_RUN, announcing, listening, within
-from rockcheck.scenes.writing import write_new
 from rockcheck.validation.discrepancy.compare import motion_of
-from rockcheck.validation.execute.models import (
-    FAMILIES,
-    REFERENCE,
-    Work,
-    build,
-    check_allowed,
-    is_own,
-    play,
-)
+from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.execute.store import TABLE, name_of
 from rockcheck.validation.finding import Column, Finding, Table, text
@@ -57,11 +46,11 @@ def scenes() -> None:
     from rockcheck.reports.document import show
     from rockcheck.validation.suite.suites import named_suites
 
-    suites = {name: read_toml(path) for name, path in named_suites().items()}
+    suites = {name: files.read_toml(path) for name, path in named_suites().items()}
     listings = {
-        "scene": {name: load_scene(name).description for name in named_scenes()},
+        "scene": {name: files.load_scene(name).description for name in files.named_scenes()},
         "suite": {name: one.get("description", "") for name, one in suites.items()},
-        "model": {name: family.summary for name, family in FAMILIES.items()},
+        "model": {name: family.summary for name, family in models.FAMILIES.items()},
     }
     tables = [
         Table(title, [text(title), text("about", " ")], list(rows.items()), most=len(rows))
@@ -82,17 +71,19 @@ def new(
     it is.
     """
     if path.suffix.lower() != ".toml":
-        raise InputError(f"{printable(path)}: give the name of a .toml file")
+        raise errors.InputError(f"{printable(path)}: give the name of a .toml file")
     content = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(
         encoding="utf-8"
     )
     try:
-        write_new(path, content)
+        writing.write_new(path, content)
     except FileExistsError:
-        raise InputError(f"{printable(path)}: is there already; it is left as it is") from None
+        raise errors.InputError(
+            f"{printable(path)}: is there already; it is left as it is"
+        ) from None
     except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
-    scene = load_scene(path)
+        raise errors.InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    scene = files.load_scene(path)
     console().print(
         f"{path}: a block of {2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m",
         soft_wrap=True,
@@ -107,8 +98,10 @@ def run(
     ],
     model: Annotated[
         str,
-        typer.Option("--model", help=f"One of {', '.join(FAMILIES)}.", autocompletion=model_names),
-    ] = REFERENCE,
+        typer.Option(
+            "--model", help=f"One of {', '.join(models.FAMILIES)}.", autocompletion=model_names
+        ),
+    ] = models.REFERENCE,
     output: Annotated[
         list[Path] | None,
         typer.Option(
@@ -129,17 +122,19 @@ def run(
     Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
     A figure shows rotation, slip and impacts.
     """
-    check_allowed(model, allow_code or ())
+    models.check_allowed(model, allow_code or ())
     given = dict(setting_of(text) for text in settings or [])
     simulate = (
-        partial(_played_apart, model, given) if is_own(model) else build(model, given).simulate
+        partial(_played_apart, model, given)
+        if models.is_own(model)
+        else models.build(model, given).simulate
     )
-    what = load_scene(scene)
-    files = output or [Path(f"{name_of(what.name, model)}.csv")]
-    figures = [path for path in files if path.suffix.lower()[1:] in FORMATS]
-    histories = [path for path in files if path not in figures]
+    what = files.load_scene(scene)
+    outputs = output or [Path(f"{name_of(what.name, model)}.csv")]
+    figures = [path for path in outputs if path.suffix.lower()[1:] in FORMATS]
+    histories = [path for path in outputs if path not in figures]
     checks = dict.fromkeys(histories, partial(check_format, more=f"; its figure as {ENDINGS}"))
-    for path in files:
+    for path in outputs:
         check_file(path, "--output", checks.get(path, kind_of))
     title = f"{what.name}, {model}"
     with (
@@ -152,7 +147,7 @@ def run(
         for path in histories:
             history.save(path)
     except OSError as error:
-        raise InputError(
+        raise errors.InputError(
             f"{printable(path)}: cannot be written: {error.strerror}", "--output"
         ) from None
     motion = motion_of(history, what)
@@ -176,22 +171,22 @@ def run(
             "rules": dict(history.cost.rules),
             "notes": history.notes,
             "history": next(iter(histories), None),
-            "files": files,
+            "files": outputs,
         }
     )
 
 
 def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
-    work = Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
+    work = models.Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
     with Pool(1) as pool:
-        (ended,) = pool.run(deque([Call(guarded, (play, work, scene))]))
+        (ended,) = pool.run(deque([Call(guarded, (models.play, work, scene))]))
     result = ended.outcome
     if isinstance(result, Failure):
         if result.refused:
-            raise InputError(result.reason)
+            raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
-        raise ModelFailure(f"{result.reason}{where}")
+        raise errors.ModelFailure(f"{result.reason}{where}")
     with tempfile.TemporaryDirectory() as folder:
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
@@ -200,15 +195,15 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
 
 def _begin(*names: str) -> None:
     for name in names:
-        build(name).simulate(load_scene("fig5a").replace(duration=0.1))
+        models.build(name).simulate(files.load_scene("fig5a").replace(duration=0.1))
 
 
 def _engine_steps() -> None:
-    from rockcheck.engines.steps import adaptive_march, in_units_of
+    from rockcheck.engines import steps
 
-    scene = load_scene("fig5a").replace(duration=0.1)
-    scene = in_units_of(scene.block.radius, scene)
-    adaptive_march(scene, lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
+    scene = files.load_scene("fig5a").replace(duration=0.1)
+    scene = steps.in_units_of(scene.block.radius, scene)
+    steps.adaptive_march(scene, lambda pose, velocity, dt, felt, bouncing: velocity, longest=1e-3)
 
 
 #: The parts that are compiled, the longest first. The event loops of both kinds of friction share

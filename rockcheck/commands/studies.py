@@ -32,15 +32,7 @@ from rockcheck.commands import (
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
-from rockcheck.ebm.spectrum import Floats
-from rockcheck.scenes import Scene
-from rockcheck.scenes.errors import InputError, NotInstalled, one_of, printable, unknown_name
-from rockcheck.scenes.files import (
-    UncertainScene,
-    load_scene,
-    load_uncertain_scene,
-    named_scenes,
-)
+from rockcheck.scenes import Floats, Scene, errors, files, printable
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import name_of
@@ -48,7 +40,7 @@ from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, 
 from rockcheck.validation.studies.population.answers import Assessment
 from rockcheck.validation.studies.population.runs import gaps_of
 from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida
-from rockcheck.validation.suite.motions import under_records
+from rockcheck.validation.suite import motions
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
 #: Of the pulses of a fragility curve, omega_p/p.
@@ -134,7 +126,7 @@ def assess(
     Exit 0: done; of a single run: converged. 1: a single run that is not converged. 3: a model
     failed.
     """
-    given = load_uncertain_scene(scene)
+    given = files.load_uncertain_scene(scene)
     words = [
         word if "." in word.partition("=")[0] else f"{models.split(',')[0]}.{word}"
         for word in settings or ()
@@ -144,9 +136,9 @@ def assess(
     sides = tuple(wall.side for wall in given.scene.walls)
     if tried.gaps is not None:
         clear, sides, changed = gaps_of(tried.gaps, given.scene)
-        given = UncertainScene(changed, given.spreads, given.correlation)
+        given = files.UncertainScene(changed, given.spreads, given.correlation)
     sets = record_sets(records or (), read or ())
-    cases, left_out = under_records({given.scene.name: given}, sets, Path())
+    cases, left_out = motions.under_records({given.scene.name: given}, sets, Path())
     check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
@@ -169,7 +161,7 @@ def assess(
 
 
 def check_tried(
-    tried: Tried, drawn: UncertainScene, given: UncertainScene, *, recorded: bool
+    tried: Tried, drawn: files.UncertainScene, given: files.UncertainScene, *, recorded: bool
 ) -> None:
     """Raises `InputError` for a scene in which nothing happens, or an option without an effect.
 
@@ -198,10 +190,10 @@ def check_tried(
         ),
     ):
         if wrong:
-            raise InputError(said, option)
+            raise errors.InputError(said, option)
 
 
-def population_of(tried: Tried, scene: Scene, cases: dict[str, UncertainScene]) -> Population:
+def population_of(tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]) -> Population:
     """What --levels asks for. Raises `InputError`.
 
     An incremental dynamic analysis of the `cases` under records; without any, the fragility under
@@ -210,7 +202,9 @@ def population_of(tried: Tried, scene: Scene, cases: dict[str, UncertainScene]) 
     measure, values = levels_of(tried.levels or "")
     if not cases:
         if measure not in ("", "pga-ratio"):
-            raise InputError(f"{measure} needs records; of pulses it is pga-ratio", "--levels")
+            raise errors.InputError(
+                f"{measure} needs records; of pulses it is pga-ratio", "--levels"
+            )
         return fragility(scene, values, PULSES)
     return ida(
         scene,
@@ -234,7 +228,7 @@ def levels_of(text: str) -> tuple[str, Floats]:
     except ValueError:
         first = last = number = 0.0
     if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
-        raise InputError(
+        raise errors.InputError(
             printable(
                 "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
                 f" {MOST_LEVELS} of them, not {text!r}",
@@ -280,7 +274,7 @@ def spectrum(
             metavar="[WHAT]",
             help="paper (all 28 spectra), fig6, fig7, fig8 or fig9; or your own block, walls,"
             " friction and pulse or record: a scene's name or a .toml file.",
-            autocompletion=completing(lambda: [*PAPER, *named_scenes()]),
+            autocompletion=completing(lambda: [*PAPER, *files.named_scenes()]),
         ),
     ] = "paper",
     grid: Grid = Grid(),
@@ -320,7 +314,7 @@ def spectrum(
     if what in PAPER:
         panels = paper_panels(*PAPER[what])
     else:
-        scene = load_scene(what)
+        scene = files.load_scene(what)
         panels = (Panel(name_of(scene.name.replace(" ", "-")), scene.name, scene),)
     # Beside a wall a block hops, which the pivot of the paper's figures forbids.
     hops = what not in PAPER and panels[0].wall is not None
@@ -329,11 +323,11 @@ def spectrum(
     request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
         if name != "ebm":
-            raise InputError(
+            raise errors.InputError(
                 "cannot be given together with --model: all are compared", "--agreement"
             )
         if not 2 <= agreement <= grid.size**2:
-            raise InputError(
+            raise errors.InputError(
                 f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes",
                 "--agreement",
             )
@@ -359,7 +353,7 @@ def benchmark(
     """
     from rockcheck.validation.studies.work_precision.study import What, WorkPrecision
 
-    part: What = one_of("benchmark", what, get_args(What))
+    part: What = errors.one_of("benchmark", what, get_args(What))
     tell_missing()
     studied(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)
 
@@ -401,12 +395,14 @@ def stress(
     from rockcheck.validation.studies.stress.runs import PLAYERS
     from rockcheck.validation.studies.stress.study import Stress, What, places
 
-    part: What = one_of("stress", what, get_args(What))
+    part: What = errors.one_of("stress", what, get_args(What))
     for name in model or ():
-        if missing := models.not_installed(one_of("model", name, PLAYERS).split()[0]):
-            raise NotInstalled(missing, name)
+        if missing := models.not_installed(errors.one_of("model", name, PLAYERS).split()[0]):
+            raise errors.NotInstalled(missing, name)
     if part == "maps" and not places(quick, model or ()):
-        raise InputError("maps are of engines and cm: an event-based model has no step", "--model")
+        raise errors.InputError(
+            "maps are of engines and cm: an event-based model has no step", "--model"
+        )
     tell_missing()
     studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
 
@@ -467,7 +463,7 @@ def conformance(
         _check_engine(name, allow_code or (), own=tune is None)
     if tune is not None:
         if folders:
-            raise InputError("does not go with --histories", "--tune")
+            raise errors.InputError("does not go with --histories", "--tune")
         _tune(names, tune, given, played)
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
@@ -481,9 +477,9 @@ def _check_engine(name: str, allow_code: Sequence[str], *, own: bool) -> None:
     known = models.engine_names()
     if name not in known and not (own and models.is_own(name)):
         allowed = f"give one of {', '.join(known)}" + ", or module:Class" * own
-        raise InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
+        raise errors.InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
     if reason := models.not_installed(name):
-        raise InputError(reason, f"--engine {name}")
+        raise errors.InputError(reason, f"--engine {name}")
 
 
 def _tune(
@@ -493,7 +489,7 @@ def _tune(
 
     settings = WANTED.keys() - {"restitution"}
     if unknown := given.keys() - settings:
-        raise unknown_name("setting", min(unknown), settings)
+        raise errors.unknown_name("setting", min(unknown), settings)
     wanted = tuple(Tune(name, restitution, **given) for name in engines)
     studied(Tuning(wanted), replace(played, out=played.out / "tuned"))
 

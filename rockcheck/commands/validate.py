@@ -32,20 +32,10 @@ from rockcheck.commands import (
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes import InputError, printable
 from rockcheck.validation.finding import Finding, Text
-from rockcheck.validation.suite import acceptance
-from rockcheck.validation.suite.across import moment_of, remember, trend_of
-from rockcheck.validation.suite.results import Run, Strict
+from rockcheck.validation.suite import acceptance, across, results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import (
-    Suite,
-    is_scene,
-    load_suite,
-    named_suites,
-    scene_suite,
-)
-from rockcheck.validation.suite.tables import finding_of, summary
 
 #: The folder of the trend's page.
 TREND = "trend"
@@ -87,7 +77,7 @@ _named = partial(
     typer.Argument,
     help="Named, or a .toml file (default: suite paper).",
     show_default=False,
-    autocompletion=completing(named_suites),
+    autocompletion=completing(suites.named_suites),
 )
 
 
@@ -132,22 +122,22 @@ def run(
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of
     rockcheck itself.
     """
-    asked = _scene if is_scene(what) else _suite
+    asked = _scene if suites.is_scene(what) else _suite
     for option, given in (("--strict", strict), ("--history", history)):
         if given and asked is _scene:
             said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
             raise InputError(said, option)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
-    how: Strict = "both" if strict == "both" else strict is not None
+    how: results.Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document, site
 
     finished = play(suite, folder, played, force=force, strict=how)
     page = site.keep(finished, folder)
-    document.show(finding_of(finished), console())
+    document.show(tables.finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
-        moment = moment_of(finished, Path(finished.tolerances_file).parent)
-        trend = trend_of(remember(history, moment))
+        moment = across.moment_of(finished, Path(finished.tolerances_file).parent)
+        trend = across.trend_of(across.remember(history, moment))
         document.show(trend, console())
         if report:
             where = document.publish(trend, usable_folder(folder, TREND))
@@ -160,34 +150,34 @@ def run(
         site.remove_site(folder)
     console().print(f"report: {page}", soft_wrap=True)
     more = {} if suite.judged else {"left_out": suite.left_out}
-    answer(summary(finished) | more | {"report": page})
+    answer(tables.summary(finished) | more | {"report": page})
     raise typer.Exit(finished.exit_code)
 
 
 def _suite(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
-) -> tuple[Suite, Path]:
+) -> tuple[suites.Suite, Path]:
     for option, given in vars(of_scene).items():
         if given and given != ALL:
             raise InputError("is for a scene: a suite says which models play what", f"--{option}")
     folder = usable_folder(out)
-    suite = load_suite(name or "paper", allow_code=allow_code)
+    suite = suites.load_suite(name or "paper", allow_code=allow_code)
     tell_left_out(suite.left_out)
     return suite, folder
 
 
 def _scene(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
-) -> tuple[Suite, Path]:
+) -> tuple[suites.Suite, Path]:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
     chosen = chosen_models(of_scene.models, of_scene.set or ())
-    suite = scene_suite(name, chosen, records=sets, allow_code=allow_code)
+    suite = suites.scene_suite(name, chosen, records=sets, allow_code=allow_code)
     folder = usable_folder(out)
     if of_scene.models == ALL:
         tell_missing()
-    before: Run | None = None
+    before: results.Run | None = None
     with suppress(InputError):  # no run there, or none that can be read
-        before = Run.load(folder)
+        before = results.Run.load(folder)
     if before is not None and before.judged:
         raise InputError(
             f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
@@ -201,7 +191,7 @@ def _scene(
     return suite, folder
 
 
-def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
+def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> results.Run:
     """Run a suite with a progress bar on stderr."""
     models = ((one.family, one.settings) for one in suite.models.values())
     with playing(suite.name, models) as told:
@@ -209,7 +199,7 @@ def play(suite: Suite, folder: Path, played: Played, **how: Any) -> Run:
         return run_suite(suite, folder, **how)
 
 
-def tell_faults(finished: Run, folder: Path) -> None:
+def tell_faults(finished: results.Run, folder: Path) -> None:
     """Print a line on stderr for each exception that no model may raise.
 
     One of rockcheck's own models is to be reported, one of the user's own models to be mended.
@@ -305,7 +295,7 @@ def report(
         console().print(f"figure: {written}", soft_wrap=True)
         answer({"figure": written})
         return
-    Run.load(folder)
+    results.Run.load(folder)
     with progress("pages") as on_progress:
         index = site.write_site(
             folder,

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from rockcheck.scenes.base import Floats
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, Recording
 
 #: Periods at which spectral accelerations are given, s.
@@ -18,7 +18,7 @@ def peak_acceleration(record: Recording) -> float:
     return float(np.max(np.abs(record.samples))) / GRAVITY_OF_RECORDS
 
 
-def velocity(record: Recording) -> NDArray[np.float64]:
+def velocity(record: Recording) -> Floats:
     """Ground velocity at the samples in m/s, from rest, without baseline correction.
 
     Exact for straight lines between samples.

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, Strict, StringConstraints
 
-from rockcheck.scenes.base import LEAST, MOST, Frozen, Positive
+from rockcheck.scenes.base import LEAST, MOST, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError, printable
 
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
@@ -75,7 +73,7 @@ class Recording:
     or assumed.
     """
 
-    samples: NDArray[np.float64]
+    samples: Floats
     time_step: float
     unit: str
     form: str

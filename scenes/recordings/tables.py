@@ -8,9 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.scenes.base import LEAST
+from rockcheck.scenes.base import LEAST, Floats
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import MOST_COLUMNS
 from rockcheck.scenes.recordings.recording import (
@@ -105,9 +104,7 @@ class _Cells:
     names: list[str]
     width: int
 
-    def read(
-        self, place: int, time: int | None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[str]]:
+    def read(self, place: int, time: int | None) -> tuple[Floats, Floats, list[str]]:
         """Numbers of column `place` and of column `time`, and the words of the latter."""
         values, times, words = [], [], []
         for n, line in self.rows:
@@ -254,7 +251,7 @@ def _decimals(word: str) -> int:
 
 def _step_of(
     path: Path,
-    time: NDArray[np.float64],
+    time: Floats,
     words: Sequence[str],
     lines: Sequence[int],
     reading: Reading,

@@ -7,7 +7,7 @@ from cases import UNAMBIGUOUS, free_rocking, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
 from rockcheck import ContinuousModel, EventBasedModel, Floor, Sine, load_scene
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK
 
 
 def rms(history, theta):

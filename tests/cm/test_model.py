@@ -17,8 +17,8 @@ from rockcheck import (
     Wall,
     load_scene,
 )
+from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.scenes.kinematics import energy
-from rockcheck.scenes.scene import PAPER_BLOCK
 
 G = 9.81
 

@@ -15,7 +15,7 @@ from rockcheck import (
     measured_restitution,
 )
 from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK
 
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
 

@@ -8,9 +8,8 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.suite.across import changes, moment_of, read_history
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.suite import across, results
 
 SUITE = """
 reference = "still"
@@ -82,11 +81,11 @@ def test_a_verdict_that_changes_is_exit_1_and_comes_first(diff, told, typed):
 
 def changed(**change: object) -> None:
     Path("b").mkdir()
-    Run.load("a").model_copy(update=change).save(Path("b"))
+    results.Run.load("a").model_copy(update=change).save(Path("b"))
 
 
 def test_a_cell_that_is_gone_is_a_change(diff):
-    changed(cells=Run.load("a").cells[:1])
+    changed(cells=results.Run.load("a").cells[:1])
     assert [
         (one["model"], one["before"], one["after"])
         for one in diff("a", "b", 1)
@@ -108,11 +107,11 @@ def test_runs_of_two_suites_are_not_compared(refused):
     ],
 )
 def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, names, kept):
-    run = Run.load("a")
+    run = results.Run.load("a")
     near = run.cell("short", "near")
 
-    def reached(peak: float) -> Run:
-        figure = Figure(
+    def reached(peak: float) -> results.Run:
+        figure = figures.Figure(
             measure="peak_rotation", label="peak rotation", unit="alpha", value=peak, note=note
         )
         check = near.checks[0].model_copy(update={"figure": figure})
@@ -121,8 +120,8 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, nam
         )
 
     before = reached(peak)
-    assert [one.name for one in changes(before, reached(peak + 0.1))] == names
-    assert list(moment_of(before, Path()).figures.values()) == [kept]
+    assert [one.name for one in across.changes(before, reached(peak + 0.1))] == names
+    assert list(across.moment_of(before, Path()).figures.values()) == [kept]
 
 
 @pytest.mark.needs("git")
@@ -142,7 +141,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     head = subprocess.run(
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
     ).stdout.strip()
-    moments = read_history(Path("runs.jsonl"))
+    moments = across.read_history(Path("runs.jsonl"))
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
     first, second, third = (one.figures[name] for one in moments)
@@ -152,7 +151,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     assert 'href="trend/index.html"' in Path("a/index.html").read_text("utf-8")
     os.truncate("runs.jsonl", Path("runs.jsonl").stat().st_size - 1)  # as some editors do
     ran("a", 0.001, "--history", "runs.jsonl")
-    assert len(read_history(Path("runs.jsonl"))) == 4
+    assert len(across.read_history(Path("runs.jsonl"))) == 4
     assert f"{name}: " in capsys.readouterr().out
 
 

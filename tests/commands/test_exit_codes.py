@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 from filelock import FileLock
 
+from rockcheck import InputError
 from rockcheck.commands import cli
 from rockcheck.reports import site
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite import results
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
 
@@ -112,14 +113,14 @@ def test_no_binding_tells_what_it_still_holds_at_the_end(tmp_path):
 
 
 def test_a_held_lock_says_for_whom_it_waits_and_for_how_long(tmp_path, monkeypatch, capsys):
-    run = Run(suite="s", created="", reference="ebm", scenes={}, models=("ebm",), cells=())
+    run = results.Run(suite="s", created="", reference="ebm", scenes={}, models=("ebm",), cells=())
     monkeypatch.setattr(site, "SILENT", 0.0)
     monkeypatch.setattr(site, "PATIENCE", 0.1)
     for lock, holder in (
         (FileLock(tmp_path / ".lock"), r"another run, which holds .*\.lock"),
         (site._turn(tmp_path), f"process {os.getpid()} on .*"),
     ):
-        with lock, pytest.raises(site.InputError, match=rf"waited 0\.1 s for {holder}"):
+        with lock, pytest.raises(InputError, match=rf"waited 0\.1 s for {holder}"):
             site.keep(run, tmp_path)
         assert re.fullmatch(
             rf"rockcheck: waiting up to 0\.1 s for {holder}\n", capsys.readouterr().err

@@ -9,8 +9,7 @@ import pytest
 
 from rockcheck.scenes import Record, load_scene
 from rockcheck.validation.execute.models import FAMILIES, not_installed
-from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite import results, suites
 
 SCENE = """
 duration = 0.5
@@ -81,7 +80,7 @@ def test_files_folders_and_patterns_each_shake_the_scene(told, words, played, le
 
 def test_a_record_takes_the_place_of_the_excitation_and_lasts(told):
     told("validate", "rack.toml", "--records", "records/RSN1_H2.AT2", "--read", "scale=1.5", *STILL)
-    scene = Run.load("rockcheck-report").load_scene("rack, RSN1_H2")
+    scene = results.Run.load("rockcheck-report").load_scene("rack, RSN1_H2")
     assert isinstance(scene.excitation, Record)
     np.testing.assert_allclose(scene.excitation.samples, 1.5 * 9.80665 * motion(0.2), atol=1e-6)
     assert (scene.duration, scene.block) == (pytest.approx(2.0), load_scene("rack.toml").block)
@@ -95,7 +94,7 @@ def test_the_vertical_component_may_be_a_file_of_its_own(told, refused):
         *("--read", "vertical=true", "--read", "scale=2", *STILL),
     )
     assert names(told(*words)["left_out"]) == [ODD]
-    run = Run.load("rockcheck-report")
+    run = results.Run.load("rockcheck-report")
     assert {name: run.load_scene(name).vertical.peak for name in run.scenes} == pytest.approx(
         {"rack, RSN1_H1": 0.6, "rack, RSN1_H2": 0.6, "rack, RSN2_H1": 0.1}, rel=1e-2
     )
@@ -151,7 +150,7 @@ scenes = ["rack"]
 def test_a_suite_has_tables_of_records(typed):
     Path("other.toml").write_text(SCENE, "utf-8")
     Path("mine.toml").write_text(SUITE, "utf-8")
-    suite = load_suite("mine.toml", allow_code=("faulty:Still",))
+    suite = suites.load_suite("mine.toml", allow_code=("faulty:Still",))
     assert (list(suite.scenes), suite.left_out) == (
         ["other", "rack, RSN1_H1", "rack, RSN1_H2"],
         ("RSN1_V.AT2",),

@@ -14,7 +14,7 @@ import pytest
 
 from rockcheck import Block, Floor, History, MuJoCo, Scene, Wall, commands, load_scene
 from rockcheck.commands.cli import COMMANDS, HIDDEN
-from rockcheck.scenes.progress import listening, tell
+from rockcheck.scenes import progress
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -186,11 +186,11 @@ def test_on_a_terminal_colour_progress_and_its_width(mine, columns):
 def test_models_tell_how_far_they_are(step):
     scene = load_scene("bookcase").replace(duration=4.0)
     heard: list[float] = []
-    with listening(lambda done, total, what="": heard.append(done / total)):
+    with progress.listening(lambda done, total, what="": heard.append(done / total)):
         MuJoCo(time_step=step).simulate(scene)
     assert heard == sorted(heard)
     assert 0.0 <= heard[0] <= heard[-1] < 1.0
-    tell(1, 2)  # nobody listens
+    progress.tell(1, 2)  # nobody listens
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from rockcheck.commands.simulate import new
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
+from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -191,7 +191,9 @@ def floor_impulses(scene, step=1e-4, alone=5) -> list[float]:
 
 
 def test_the_papers_floor_pulls_at_every_wall_impact():
-    found = [one for scene in load_suite("walls").scenes.values() for one in floor_impulses(scene)]
+    found = [
+        one for scene in suites.load_suite("walls").scenes.values() for one in floor_impulses(scene)
+    ]
     assert len(found) == 282
     assert max(found) < 0.0
 
@@ -217,7 +219,7 @@ def test_experience_is_learnt_from_a_run(tmp_path):
         "[models.ebm-unilateral]\n[models.ebm]\n[models.cm]\n"
     )
     found = experience.experience_of(
-        [run_suite(load_suite(tmp_path / "five.toml"), tmp_path / "run")]
+        [run_suite(suites.load_suite(tmp_path / "five.toml"), tmp_path / "run")]
     )
     counts = {model: one["peak_rotation"].count for model, one in found.trust.items()}
     assert counts == {"cm": 5, "ebm": 5}

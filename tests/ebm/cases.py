@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
-from rockcheck.scenes import Block, Floor, Ricker, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Block, Floats, Floor, Ricker, Scene, Wall
 from rockcheck.validation.paper import paper_panels
 
 DATA = Path(__file__).parents[1] / "data"
@@ -102,7 +100,7 @@ def scene_of(row: Row, rest: float = 20.0, **more: Any) -> Scene:
 
 def peak_errors(
     model: Any, rows: list[Row], rest: float, output_step: float
-) -> tuple[NDArray[np.float64], list[Row]]:
+) -> tuple[Floats, list[Row]]:
     """Errors of the peak of |theta|, in alpha, where the block stays, and the rows whose outcome is
     another. Peaks at a wall are sharp: rows must be close."""
     errors, missed = [], []

@@ -8,13 +8,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from rockcheck.scenes import Record, Scene
+from rockcheck.scenes import Floats, Record, Scene
 
-State = NDArray[np.float64]  # x, theta, dx/dt, dtheta/dt
+State = Floats  # x, theta, dx/dt, dtheta/dt
 
 
 def sign(value: float) -> int:
@@ -345,7 +344,7 @@ class PaperModel:
                 return t, y, kind
         return t, y, "end"
 
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, times: Floats) -> Floats:
         """x, theta, dx/dt, dtheta/dt at the times, up to where the run ended."""
         ends = [end for end, _ in self.pieces]
         times = times[times <= ends[-1] + 1e-9]

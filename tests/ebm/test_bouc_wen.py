@@ -14,6 +14,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import bouc_wen as law
 from rockcheck.ebm.core.names import Pivot, Row
 from rockcheck.scenes import (
+    PAPER_BLOCK,
     Block,
     Floor,
     Record,
@@ -24,7 +25,6 @@ from rockcheck.scenes import (
     kinematics,
     load_scene,
 )
-from rockcheck.scenes.scene import PAPER_BLOCK
 
 FAULTS = Path(__file__).parents[1] / "data" / "found_faults"
 G = 9.81

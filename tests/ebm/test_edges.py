@@ -8,6 +8,7 @@ from stepping import assert_contacts_hold
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
+    PAPER_BLOCK,
     Block,
     Floor,
     History,
@@ -19,7 +20,6 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
-from rockcheck.scenes.scene import PAPER_BLOCK
 
 SLOPE = PAPER_BLOCK.half_width / PAPER_BLOCK.half_height
 G = 9.81

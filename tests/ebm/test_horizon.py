@@ -16,8 +16,9 @@ from rockcheck import (
     Wall,
     load_scene,
 )
-from rockcheck.ebm.horizon import START, _disturbed, may_fly, predictability_horizon
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.ebm import predictability_horizon
+from rockcheck.ebm.horizon import START, _disturbed, may_fly
+from rockcheck.scenes import PAPER_BLOCK
 
 UNILATERAL = EventBasedModel(pivot="unilateral", tolerance=1e-13)
 

@@ -8,6 +8,7 @@ from cases import random_scene
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
+    PAPER_BLOCK,
     Block,
     Floor,
     Record,
@@ -19,7 +20,6 @@ from rockcheck.scenes import (
     kinematics,
     load_scene,
 )
-from rockcheck.scenes.scene import PAPER_BLOCK
 from rockcheck.validation.studies.stress.invariants import check_run
 
 PIVOTS = ["bilateral", "unilateral"]

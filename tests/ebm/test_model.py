@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel, packed
-from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall, load_scene
-from rockcheck.scenes.progress import ONE_RUN, within
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import (
+    PAPER_BLOCK,
+    Floor,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Wall,
+    load_scene,
+    progress,
+)
 
 #: A scene with what is changed in it.
 scene_of = Scene(
@@ -107,7 +115,7 @@ def test_a_single_short_run_does_not_wait_for_the_compiler(monkeypatch, settings
     monkeypatch.setattr(packed, "loop_of", compiled)
     monkeypatch.setattr(packed, "is_ready", lambda *given: False)
     monkeypatch.setattr("rockcheck.ebm.model._INTERPRETED", steps)
-    with within(ONE_RUN, True):
+    with progress.within(progress.ONE_RUN, True):
         found = model.simulate(scene)
     stiff = model.friction == "bouc-wen"
     calls = (not stiff, stiff or steps < found.cost.steps)

@@ -12,8 +12,7 @@ from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
-from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Wall
 
 RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
 

@@ -16,8 +16,8 @@ from rockcheck import (
     Scene,
     engines,
 )
-from rockcheck.engines.events import events_of
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.engines import events
+from rockcheck.scenes import PAPER_BLOCK
 
 TILTS = (0.3, -0.4, 0.5, 0.6, 0.7, -0.8, 0.9)
 #: Frequency in p, amplitude in g tan(alpha).
@@ -186,7 +186,7 @@ def test_an_impact_before_the_block_arrives_is_an_impact(rebound):
     states[:, 4] = np.where(np.arange(400) <= turn, -9.81 * t, after)
     fallen = np.concatenate([[0.0], np.cumsum(1e-3 * states[1:, 4])])
     states[:, 1] = PAPER_BLOCK.half_height + fallen - fallen[turn] + 1e-3  # by half a step early
-    found = events_of(scene, t, states, np.tile([0.0, -9.81], (399, 1)))
+    found = events.events_of(scene, t, states, np.tile([0.0, -9.81], (399, 1)))
     impacts = [event for event in found if event.kind == "floor impact"]
     assert [event.t for event in impacts] == pytest.approx([0.2, 0.2], abs=2e-3)
     assert sum(event.impulse for event in impacts) == pytest.approx(

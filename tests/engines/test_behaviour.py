@@ -28,11 +28,10 @@ from rockcheck import (
     compare,
     load_scene,
 )
+from rockcheck.engines import steps
 from rockcheck.engines.engine import Engine
-from rockcheck.engines.steps import AdaptiveStep, FixedStep
-from rockcheck.scenes import compiled
-from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+from rockcheck.scenes import PAPER_BLOCK, compiled
+from rockcheck.validation.uncertainty import numerical
 
 
 def test_a_missing_package_is_named(varying_engine, monkeypatch, fault_of):
@@ -84,7 +83,7 @@ for engine in (getattr(engines, name) for name in engines.__all__):
             '^time_step: "adaptive" is not allowed with settings = "default": give a step in s$',
         ),
         (
-            {"time_step": AdaptiveStep(largest=2e-3), "settings": "default"},
+            {"time_step": steps.AdaptiveStep(largest=2e-3), "settings": "default"},
             '"adaptive" is not allowed',
         ),
         ({"step": 1e-3}, "step: unknown key"),
@@ -104,11 +103,11 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
 
 
 def test_a_step_controller_says_how_steps_follow_each_other(varying_engine):
-    fixed, adaptive = FixedStep(1e-3), AdaptiveStep(largest=2e-3, short=3.0)
+    fixed, adaptive = steps.FixedStep(1e-3), steps.AdaptiveStep(largest=2e-3, short=3.0)
     assert varying_engine(time_step=fixed) == varying_engine(time_step=1e-3)
     model = varying_engine(time_step=adaptive)
     assert (model.largest_step, model.short_steps, model.steps) == (2e-3, 3.0, adaptive)
-    assert model.coarser(2.0).steps == AdaptiveStep(4e-3, 6.0)
+    assert model.coarser(2.0).steps == steps.AdaptiveStep(4e-3, 6.0)
     named = {"time_step": "adaptive", "largest_step": 2e-3, "short_steps": 3.0}
     assert model.steps == varying_engine(**named).steps
 
@@ -140,7 +139,7 @@ def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
     model = varying_engine()
     history = model.simulate(scene)
     reference = EventBasedModel(pivot="unilateral").simulate(scene)
-    found = numerical_uncertainty(model, scene, history)
+    found = numerical.numerical_uncertainty(model, scene, history)
     assert found.converged
     assert compare(reference, history)["theta_rms"] < found.u_num("theta_rms") < 1e-3
 
@@ -343,7 +342,7 @@ def test_mujocos_floor_is_where_it_is_said_to_be(friction, above):
 
 
 def test_a_march_loads_its_compiled_step_before_its_clock_starts(monkeypatch):
-    march = AdaptiveStep().ready(
+    march = steps.AdaptiveStep().ready(
         SimpleNamespace(push=lambda *asked: (0.0, 0.0, 0.0)), free_rocking(0.0, duration=0.01)
     )
     monkeypatch.delattr(compiled, "for_types_of")

@@ -19,8 +19,8 @@ from rockcheck import (
     Wall,
     engines,
 )
-from rockcheck.engines.base_motion import velocity_at, velocity_of
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.engines import base_motion
+from rockcheck.scenes import PAPER_BLOCK
 
 SQUAT = Block(half_width=1.0, half_height=0.5)
 
@@ -180,7 +180,9 @@ def test_the_base_gains_what_its_acceleration_gives(excitation, share):
         epsabs=1e-13,
         limit=500,
     )[0]
-    assert velocity_at(t, *velocity_of(excitation)) == pytest.approx(gained, abs=1e-10)
+    assert base_motion.velocity_at(t, *base_motion.velocity_of(excitation)) == pytest.approx(
+        gained, abs=1e-10
+    )
 
 
 ICE = Scene(name="ice", block=SQUAT, floor=Floor(friction=0.0), duration=1.0)

@@ -6,14 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Cost, Event, Floor, Ricker, Scene, Wall
-from rockcheck.scenes.observation import observe
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Cost, Event, Floor, Ricker, Scene, Wall, observation
+from rockcheck.validation.discrepancy import figures, measures
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord
-from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
 from rockcheck.validation.execute.store import HISTORIES
-from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
+from rockcheck.validation.suite import results
 
 NASTY = "<img src=x onerror=alert(1)>&\"'</script>"
 MODELS = {
@@ -76,7 +73,7 @@ def motion(scene, model, delay, *, falls=False):
         ),
         *[Event(t=float(late[-1]), kind="overturned left")] * falls,
     ]
-    return observe(
+    return observation.observe(
         scene,
         model,
         state,
@@ -87,7 +84,9 @@ def motion(scene, model, delay, *, falls=False):
 
 
 def figure(measure, value, unit="alpha", **more):
-    return Figure(measure=measure, label=measure.replace("_", " "), unit=unit, value=value, **more)
+    return figures.Figure(
+        measure=measure, label=measure.replace("_", " "), unit=unit, value=value, **more
+    )
 
 
 def cell_of(folder, scene, model, delay, falls=False):
@@ -97,7 +96,7 @@ def cell_of(folder, scene, model, delay, falls=False):
     (folder / HISTORIES).mkdir(parents=True, exist_ok=True)
     history.save(folder / path)
     checks = [
-        Check(
+        results.Check(
             figure=figure("peak_rotation", history.peak_rotation, until=8.0, window="8s"),
             kind="absolute",
             verdict="pass",
@@ -112,7 +111,7 @@ def cell_of(folder, scene, model, delay, falls=False):
     for against in (one for one in ("ebm-unilateral", "ebm") if one != model):
         verdict = "pass" if value < 0.8e-3 else "changed" if value < 2e-3 else "fail"
         checks.append(
-            Check(
+            results.Check(
                 figure=figure("theta_rms", value, against=against, window="8s", until=8.0),
                 kind="model form" if against == "ebm" and scene.walls else "numerical",
                 verdict=verdict,
@@ -137,7 +136,7 @@ def cell_of(folder, scene, model, delay, falls=False):
             ),
             figure("theta_rms", value, against=against, window="horizon", until=10.0),
         ]
-    return Cell(
+    return results.Cell(
         scene=scene.name,
         model=model,
         settings=MODELS[model],
@@ -146,7 +145,7 @@ def cell_of(folder, scene, model, delay, falls=False):
         history=path,
         outcome=history.outcome,
         notes=history.notes,
-        cost=CostRecord(**vars(history.cost), worker_seconds=0.5),
+        cost=results.CostRecord(**vars(history.cost), worker_seconds=0.5),
         figures=tuple(figures),
         checks=tuple(checks),
     )
@@ -162,18 +161,18 @@ DELAYS = {
 }
 
 
-def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
+def crowd(scatter: float) -> tuple[results.EnsembleRecord, list[results.Cell]]:
     """An ensemble of 40 scenes by three models: peaks from 0.02 to 2 alpha, the largest fall; one
     scatters, one has failed."""
     peaks = np.geomspace(0.02, 2.0, 40)
     other = peaks * np.exp(scatter * np.sin(np.arange(40.0)))
     samples = {
-        model: Sample(
+        model: measures.Sample(
             values, tuple("overturned left" if value > 1.0 else "at rest" for value in values)
         )
         for model, values in (("ebm-unilateral", peaks), ("cm", other))
     }
-    record = EnsembleRecord(
+    record = results.EnsembleRecord(
         name="crowd",
         description=f"made up {NASTY}",
         definition={
@@ -192,21 +191,23 @@ def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
         outcomes={model: tuple(sample.outcomes) for model, sample in samples.items()}
         | {"mujoco": (NASTY,) * 40},
     )
-    pair = Samples(samples["ebm-unilateral"], samples["cm"])
+    pair = measures.Samples(samples["ebm-unilateral"], samples["cm"])
     figures = tuple(
         evaluate(measure, pair, "alpha", against="ebm-unilateral")
-        for measure in STATISTICS.values()
+        for measure in measures.STATISTICS.values()
     )
     return record, [
-        Cell(scene="crowd", model="ebm-unilateral", status="done", outcome="6 of 40 overturned"),
-        Cell(
+        results.Cell(
+            scene="crowd", model="ebm-unilateral", status="done", outcome="6 of 40 overturned"
+        ),
+        results.Cell(
             scene="crowd",
             model="cm",
             status="done",
             outcome="6 of 40 overturned",
             figures=figures,
             checks=(
-                Check(
+                results.Check(
                     figure=figures[0],
                     kind="numerical",
                     verdict="pass",
@@ -218,7 +219,7 @@ def crowd(scatter: float) -> tuple[EnsembleRecord, list[Cell]]:
                 ),
             ),
         ),
-        Cell(
+        results.Cell(
             scene="crowd", model="mujoco", status="failed", reason=f"40 of 40 scenes failed {NASTY}"
         ),
     ]
@@ -241,10 +242,12 @@ def make_run(folder, duration=12.0):
             cell_of(folder, scenes[2], model, DELAYS[model], falls=True)
             for model in ("ebm-unilateral", "ebm")
         ),
-        Cell(scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"),
+        results.Cell(
+            scene="Free", model="mujoco", status="failed", reason=f"blew up at 3.2 s {NASTY}"
+        ),
         *of_ensemble,
     )
-    run = Run(
+    run = results.Run(
         suite="made-up",
         description=f"for the tests {NASTY}",
         created="2026-01-01T00:00:00+00:00",
@@ -257,7 +260,7 @@ def make_run(folder, duration=12.0):
         ensembles=(ensemble,),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
         measures=(
-            MeasureRecord(
+            figures.MeasureRecord(
                 name="theta_rms",
                 label="RMS difference of rotation",
                 unit="angle",
@@ -293,7 +296,7 @@ def site(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def run(site):
-    return Run.load(site)
+    return results.Run.load(site)
 
 
 @pytest.fixture(scope="session")

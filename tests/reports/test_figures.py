@@ -15,7 +15,7 @@ from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.reports.document import FIGURES, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
-from rockcheck.scenes.reading import read_json
+from rockcheck.scenes import reading
 from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
 from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
 from rockcheck.validation.paper.measures import Paper, beyond, findings_of
@@ -104,7 +104,7 @@ def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
 
 
 def test_the_documentation_shows_the_kept_study():
-    found = read_json(KEPT / "agreement.json")
+    found = reading.read_json(KEPT / "agreement.json")
     panels = mapped(paper_panels())
     _, table, by_spectrum, plot = blocks(found, panels, came=True)
     assert [list(map(plain, row)) for row in table.rows] == [

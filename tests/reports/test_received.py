@@ -11,20 +11,20 @@ import pytest
 
 from rockcheck.reports.site import LOCK, keep, write_site
 from rockcheck.validation.execute.store import HISTORIES, Store
-from rockcheck.validation.suite.results import RUN_FILE, Run
+from rockcheck.validation.suite import results
 
 
 @pytest.fixture
 def received(tmp_path, site):
     folder = tmp_path / "received"
     folder.mkdir()
-    shutil.copy(site / RUN_FILE, folder)
+    shutil.copy(site / results.RUN_FILE, folder)
     shutil.copytree(site / HISTORIES, folder / HISTORIES)
     return folder
 
 
 def published(folder):
-    keep(Run.load(folder), folder)
+    keep(results.Run.load(folder), folder)
     write_site(folder)
 
 
@@ -35,7 +35,7 @@ def test_no_file_of_a_run_is_written_through(tmp_path, received):
     shutil.copytree(received, whole)
     published(whole)
     names = (path.relative_to(whole) for path in whole.rglob("*") if path.is_file())
-    written = [name for name in names if name.parts[0] not in (HISTORIES, RUN_FILE, LOCK)]
+    written = [name for name in names if name.parts[0] not in (HISTORIES, results.RUN_FILE, LOCK)]
     assert len(written) > 40
     suffixes = {".csv", ".xml", ".md", ".html", ".js", ".svg", ".css", ".toml", ".json"}
     assert {name.suffix for name in written} >= suffixes
@@ -97,7 +97,7 @@ def test_a_kept_result_that_is_no_file_of_the_folder_is_none(tmp_path, trap, suf
 
 
 def changed(folder, **change):
-    path = folder / RUN_FILE
+    path = folder / results.RUN_FILE
     path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | change), "utf-8")
 
 
@@ -112,14 +112,14 @@ def changed(folder, **change):
 )
 def test_a_run_that_names_what_it_has_not_is_bad_input(received, change, said, refused):
     changed(received, **change)
-    assert re.search(f"{RUN_FILE}.*{said}", refused("report", str(received)))
+    assert re.search(f"{results.RUN_FILE}.*{said}", refused("report", str(received)))
 
 
 @pytest.mark.parametrize("signs", ["\u202e\u2067\x9b", "\ud800"])
 def test_text_that_turns_around_reaches_no_page(received, signs):
     """Also as JavaScript and JSON escape it; half of a pair of UTF-16 is no text at all."""
     evil = f"gnp{signs}.exe"
-    run = Run.load(received)
+    run = results.Run.load(received)
     changed(
         received,
         suite=evil,

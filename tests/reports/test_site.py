@@ -17,7 +17,7 @@ from rockcheck.reports.site import PAGES, STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History
-from rockcheck.validation.suite.tables import used
+from rockcheck.validation.suite import tables
 
 
 def addresses(text: str) -> list[str]:
@@ -58,7 +58,7 @@ def test_hostile_text_stays_text(site):
 def test_index_lists_what_is_wrong_worst_first(run, index):
     first, second, *rest = worst_first(run)
     assert [(cell.model, check) for cell, check in (first, second)] == [("mujoco", None)] * 2
-    order = [(check.verdict != "fail", -used(check)) for _, check in rest]
+    order = [(check.verdict != "fail", -tables.used(check)) for _, check in rest]
     assert order == sorted(order)
     wrong = [check.verdict for _, check in run.checks() if check.verdict in ("fail", "changed")]
     assert sorted(check.verdict for _, check in rest) == sorted(wrong)
@@ -91,7 +91,7 @@ def test_index_answers_three_questions_first(run, index):
         scene for scene, row in matrix(run).items() if any(one and one["apart"] for one in row)
     ]
     verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
-    shares = [used(check) for _, check in found["changed"]]
+    shares = [tables.used(check) for _, check in found["changed"]]
     assert shares == sorted(shares, reverse=True)
     assert (found["judged"], len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
     at_a_glance, after = re.search('<dl class="glance"(.*?)</dl>(.*)', index, re.DOTALL).groups()

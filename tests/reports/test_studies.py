@@ -10,7 +10,7 @@ from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
 from rockcheck.reports.show.spectrum import COLOURS
-from rockcheck.validation.execute.pool import Failure as Lost
+from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -32,7 +32,7 @@ from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
 from rockcheck.validation.studies.work_precision.timings import Saving
-from rockcheck.validation.uncertainty.population import curve_of
+from rockcheck.validation.uncertainty import population
 
 pytestmark = pytest.mark.browser
 SIZE = 20
@@ -73,7 +73,7 @@ def benchmark() -> Finding:
         for line, value, error, cpu in lines
         if line == "cm" or not family.startswith(("long", "short"))
     }
-    done[Play("free", 0, "pybullet", 1e-2)] = Lost("it blew up")
+    done[Play("free", 0, "pybullet", 1e-2)] = pool.Failure("it blew up")
     done[Measure("saving", "made")] = [Saving("cm", "wall", "ms", 2.0, 1.0)]
     return WorkPrecision().gather(done)
 
@@ -111,7 +111,7 @@ def fragility() -> Finding:
     level = np.linspace(0.5, 5.0, 10)
     fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
     curves = [
-        curve_of(label, fell, np.zeros_like(fell), level)
+        population.curve_of(label, fell, np.zeros_like(fell), level)
         for label in ("with the wall", "without a wall")
     ]
     other = {"per_unit": 0.2, "other_unit": "g", "other_label": "peak acceleration, g"}

@@ -26,9 +26,8 @@ from rockcheck.reports.tables import (
 from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.scenes import Block, Event, Floor, Record, Scene, Sine, Wall, load_scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
-from rockcheck.validation.discrepancy.figures import Figure, Pair
-from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.discrepancy import figures, measures
+from rockcheck.validation.suite import results
 
 
 def payload_of(site, slug):
@@ -39,7 +38,7 @@ def payload_of(site, slug):
 
 
 def view_of(folder, name):
-    return next(view for view in scene_views(Run.load(folder), folder) if view.name == name)
+    return next(view for view in scene_views(results.Run.load(folder), folder) if view.name == name)
 
 
 def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is_tighter(
@@ -71,7 +70,9 @@ def test_a_run_that_ends_during_a_fall_says_so(run, last, outcome, apart):
     """Two models fall to one side, one of them after the scene's end: the outcome does not depend
     on the model."""
     own = run.cell("Free", "ebm")
-    figure = Figure(measure="last_rotation", label="last rotation", unit="alpha", value=last)
+    figure = figures.Figure(
+        measure="last_rotation", label="last rotation", unit="alpha", value=last
+    )
     change = {"outcome": "moving", "overturned_at": None, "figures": (*own.figures, figure)}
     cells = [own.model_copy(update=change) if one is own else one for one in run.cells]
     changed = run.model_copy(update={"cells": tuple(cells)})
@@ -81,7 +82,7 @@ def test_a_run_that_ends_during_a_fall_says_so(run, last, outcome, apart):
 
 def test_an_outcome_unlike_the_references_within_tolerance_is_explained(run):
     own = next(c for c in run.cells if c.checks and c.verdict == "pass")
-    agrees = Figure(measure="outcome_agrees", label="outcome agrees", unit="1", value=0.0)
+    agrees = figures.Figure(measure="outcome_agrees", label="outcome agrees", unit="1", value=0.0)
     judged = own.checks[0].model_copy(update={"figure": agrees})
     cells = (own, *(own.model_copy(update={"checks": checks}) for checks in ((judged,), ())))
     assert [why_apart(cell).rpartition("; ")[2] for cell in cells] == ["not judged", "accepted", ""]
@@ -133,8 +134,8 @@ def test_the_running_rms_of_candidate_minus_reference_ends_at_the_measure(site):
     (band,) = (band for band in view.bands("ebm-unilateral") if band.model == "mujoco")
     assert (band.kind, band.until) == ("rms", 8.0)
     running = view.running_rms(band)
-    pair = Pair(reference, candidate, view.scene, until=8.0)
-    assert running[-1] == pytest.approx(DIFFERENCES["theta_rms"].evaluate(pair), rel=1e-12)
+    pair = figures.Pair(reference, candidate, view.scene, until=8.0)
+    assert running[-1] == pytest.approx(measures.DIFFERENCES["theta_rms"].evaluate(pair), rel=1e-12)
     assert running[400] == pytest.approx(
         np.sqrt(trapezoid(apart[:401] ** 2, view.t[:401]) / view.t[400]), rel=1e-12
     )

@@ -22,8 +22,7 @@ import pytest
 from rockcheck import ebm
 from rockcheck.commands.simulate import PARTS
 from rockcheck.ebm.core import march
-from rockcheck.scenes import compiled
-from rockcheck.scenes.progress import announce, announcing, interruptible
+from rockcheck.scenes import compiled, progress
 from rockcheck.validation.execute.pool import Call, Pool
 
 #: A package of one kernel. Played, it says whether the kernel was ready, how many functions were
@@ -268,7 +267,7 @@ except KeyboardInterrupt:
 def test_a_long_compilation_is_announced_once_a_package(tmp_path, replay, monkeypatch):
     """Whoever waits knows for what; of one that is quick nothing is said."""
     heard: list[str] = []
-    with announcing(heard.append):
+    with progress.announcing(heard.append):
         for number, (patience, said) in enumerate([(60.0, 0), (0.0, 1), (0.0, 1)]):
             monkeypatch.setattr(compiled, "_SILENT", patience)
             replay(COMPILED, cache_dir=f"cache{number}")
@@ -292,16 +291,16 @@ def test_what_is_compiled_ahead_is_not_compiled_again(typed):
 
 
 def test_interruptible_calls_share_a_thread_and_a_forked_process_has_its_own():
-    first = interruptible(threading.get_ident)
+    first = progress.interruptible(threading.get_ident)
     assert first != threading.get_ident()
     with pytest.raises(ZeroDivisionError):
-        interruptible(lambda: 1 // 0)
-    assert interruptible(threading.get_ident) == first
+        progress.interruptible(lambda: 1 // 0)
+    assert progress.interruptible(threading.get_ident) == first
     if hasattr(os, "fork"):
         child = os.fork()
         if child == 0:
             signal.alarm(60)
-            os._exit(interruptible(lambda: 7))
+            os._exit(progress.interruptible(lambda: 7))
         assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
@@ -311,8 +310,10 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
     previous = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            interruptible(lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0)))
-        assert interruptible(lambda: 3) == 3
+            progress.interruptible(
+                lambda: (os.kill(os.getpid(), signal.SIGINT), released.wait(60.0))
+            )
+        assert progress.interruptible(lambda: 3) == 3
         assert not released.is_set()
     finally:
         released.set()
@@ -322,9 +323,9 @@ def test_the_call_after_an_interrupted_one_works_while_that_one_goes_on():
 def test_a_worker_announces_on_the_runs_own_stderr(capfd):
     """Its output goes nowhere otherwise; and it says nothing where the run does not want to hear of
     it."""
-    calls = [Call(announce, ("compiling",)), Call(print, ("noise",))]
+    calls = [Call(progress.announce, ("compiling",)), Call(print, ("noise",))]
     for hears, said in (
-        (announcing(lambda words: None), "rockcheck: compiling\n"),
+        (progress.announcing(lambda words: None), "rockcheck: compiling\n"),
         (contextlib.nullcontext(), ""),
     ):
         with hears, Pool(1) as pool:

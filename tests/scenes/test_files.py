@@ -7,10 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Ricker, load_scene
-from rockcheck.scenes.errors import MOST_NAMES, suggestion
-from rockcheck.scenes.files import Spread, uncertain_scene, uncertain_scene_from, with_numbers
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Ricker, errors, files, load_scene
 
 TEXT = """
 duration = 8.0
@@ -114,10 +111,10 @@ def test_the_papers_scenes(name, friction, gap, restitution):
 
 
 def test_a_message_lists_no_more_names_than_fit_a_line():
-    said = suggestion("s7x", [f"s{n}" for n in range(MOST_NAMES + 20)])
+    said = errors.suggestion("s7x", [f"s{n}" for n in range(errors.MOST_NAMES + 20)])
     assert said.startswith("; did you mean 's7'? allowed: s0, s1, s10, ")
     assert said.endswith(" and 20 more")
-    assert suggestion("ebn", ["ebm", "cm"]) == "; did you mean 'ebm'? allowed: cm, ebm"
+    assert errors.suggestion("ebn", ["ebm", "cm"]) == "; did you mean 'ebm'? allowed: cm, ebm"
 
 
 # --- numbers that are not known exactly
@@ -147,13 +144,13 @@ def test_a_message_lists_no_more_names_than_fit_a_line():
 def test_a_number_has_its_mean_its_standard_deviation_and_its_distribution(
     given, mean, sd, at, share
 ):
-    law = Spread(**given).law
+    law = files.Spread(**given).law
     assert (law.mean(), law.std(), law.cdf(at)) == pytest.approx((mean, sd, share), rel=1e-12)
 
 
 @pytest.mark.parametrize(("given", "nominal"), [({}, 1.5), ({"value": 1.1}, 1.1)])
 def test_a_number_within_bounds_is_in_their_middle_unless_it_is_given(given, nominal):
-    assert Spread(low=1.0, high=2.0, **given).nominal == nominal
+    assert files.Spread(low=1.0, high=2.0, **given).nominal == nominal
 
 
 @pytest.mark.parametrize(
@@ -170,7 +167,7 @@ def test_a_number_within_bounds_is_in_their_middle_unless_it_is_given(given, nom
     ],
 )
 def test_what_is_no_spread(given, key, fault_of):
-    assert fault_of(Spread, **given).key == key
+    assert fault_of(files.Spread, **given).key == key
 
 
 TABLES = {
@@ -182,7 +179,7 @@ TABLES = {
 
 
 def made():
-    one = uncertain_scene_from(TABLES, folder=Path(), default_name="made")
+    one = files.uncertain_scene_from(TABLES, folder=Path(), default_name="made")
     return one.scene, one.spreads
 
 
@@ -190,7 +187,7 @@ def test_numbers_stand_where_they_were_written():
     scene, spreads = made()
     assert list(spreads) == ["duration", "block.half_width", "walls.right.gap"]
     assert (scene.duration, scene.block.half_width, scene.wall("right").gap) == (2.0, 0.4, 0.05)
-    other = with_numbers(
+    other = files.with_numbers(
         scene,
         {
             "duration": 3.0,
@@ -206,9 +203,11 @@ def test_numbers_stand_where_they_were_written():
 def test_correlations_that_contradict_each_other_are_refused(fault_of):
     scene, spreads = made()
     a, b, c = spreads
-    fine = uncertain_scene(scene, spreads, {f"{a}, {b}": 0.9, f"{b},{c}": 0.9, f"{a}, {c}": 0.9})
+    fine = files.uncertain_scene(
+        scene, spreads, {f"{a}, {b}": 0.9, f"{b},{c}": 0.9, f"{a}, {c}": 0.9}
+    )
     np.testing.assert_array_equal(fine.correlation, 0.9 + 0.1 * np.eye(3))
-    plain = [uncertain_scene(scene, numbers, {}) for numbers in (spreads, {})]
+    plain = [files.uncertain_scene(scene, numbers, {}) for numbers in (spreads, {})]
     assert [one.independent for one in (fine, *plain)] == [False, True, True]
     for wrong, said in (
         ({f"{a}, {b}": 0.9, f"{b}, {c}": 0.9, f"{a}, {c}": -0.9}, "not positive definite"),
@@ -219,12 +218,12 @@ def test_correlations_that_contradict_each_other_are_refused(fault_of):
         ({f"{a}, {b}": True}, "between -1 and 1"),
         ({f"{a}, gravity": 0.5}, "not an uncertain number"),
     ):
-        assert said in str(fault_of(uncertain_scene, scene, spreads, wrong))
+        assert said in str(fault_of(files.uncertain_scene, scene, spreads, wrong))
 
 
 def test_correlated_inputs_have_the_correlation_and_their_own_distributions():
     scene, spreads = made()
-    values = uncertain_scene(scene, spreads, {"duration, walls.right.gap": -0.8}).values(
+    values = files.uncertain_scene(scene, spreads, {"duration, walls.right.gap": -0.8}).values(
         np.random.default_rng(1).random((50_000, 3))
     )
     assert np.corrcoef(values.T)[0] == pytest.approx([1.0, 0.0, -0.8], abs=0.02)

@@ -9,11 +9,20 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from rockcheck.scenes import Block, Cost, Event, Floor, History, Rest, Scene, reading
+from rockcheck.scenes import (
+    Block,
+    Cost,
+    Event,
+    Floor,
+    History,
+    Rest,
+    Scene,
+    observation,
+    reading,
+    writing,
+)
 from rockcheck.scenes.history import COLUMNS
-from rockcheck.scenes.observation import observe
-from rockcheck.scenes.writing import columns_text
-from rockcheck.validation.discrepancy.measured import read_measured
+from rockcheck.validation.discrepancy import measured
 
 SCENE = Scene(
     name="observed",
@@ -35,7 +44,7 @@ def states(theta: np.ndarray) -> np.ndarray:
 
 @pytest.fixture
 def history() -> History:
-    return observe(
+    return observation.observe(
         SCENE,
         "model",
         states(np.linspace(0.1, 0.01, 11)),
@@ -75,7 +84,7 @@ def test_a_loaded_blocks_history_keeps_where_its_mass_is(tmp_path):
         (block, unit, math.atan2(0.4 - 0.1, 1.6 - 0.3)),
         (SCENE.block, SCENE.block, SCENE.block.alpha),
     ):
-        still = observe(
+        still = observation.observe(
             SCENE.replace(block=given), "model", states(np.zeros(11)), outcome="at rest"
         )
         still.save(tmp_path / "run.csv")
@@ -211,9 +220,9 @@ HOSTILE_TO_BOTH = [
 @pytest.mark.parametrize(
     ("read", "text", "said"),
     [(History.load, *row) for row in HOSTILE]
-    + [(read, *row) for read in (History.load, read_measured) for row in HOSTILE_TO_BOTH]
+    + [(read, *row) for read in (History.load, measured.read_measured) for row in HOSTILE_TO_BOTH]
     # Found by fuzzing: control characters in a heading.
-    + [(read_measured, "t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n", "x")],
+    + [(measured.read_measured, "t,theta,\x1b[2Jx,\x1b[2Jx\n0,0,0,0\n", "x")],
 )
 def test_hostile_tables(read, text, said, written, fault_of):
     assert said in str(fault_of(read, written("hostile.csv", text))).split("hostile.csv", 1)[1]
@@ -223,7 +232,7 @@ def test_hostile_tables(read, text, said, written, fault_of):
 def test_pandas_reads_the_table_without_an_option(tmp_path):
     """Also a long one, whose columns pandas looks at in pieces."""
     scene = SCENE.replace(duration=30.0, output_step=0.001)
-    history = observe(scene, "model", states(0.1 * np.sin(scene.output_times)))
+    history = observation.observe(scene, "model", states(0.1 * np.sin(scene.output_times)))
     history.save(tmp_path / "run.csv")
     frame = pd.read_csv(tmp_path / "run.csv")
     pd.testing.assert_frame_equal(
@@ -246,11 +255,11 @@ def test_hostile_events(written, fault_of):
 def test_overturning_cuts_the_rows(side):
     state = states(side * np.linspace(1.2, 2.2, 11))
     name = "overturned left" if side > 0 else "overturned right"
-    history = observe(SCENE, "model", state, events=[Event(t=0.02, kind=name)])
+    history = observation.observe(SCENE, "model", state, events=[Event(t=0.02, kind=name)])
     assert (history.outcome, len(history.channels["t"])) == (name, 4)
     assert np.all(np.abs(history.channels["theta"]) < math.pi / 2)
     with pytest.raises(ValueError, match="must report the event"):
-        observe(SCENE, "model", state)
+        observation.observe(SCENE, "model", state)
 
 
 def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
@@ -259,5 +268,10 @@ def test_columns_as_csv_have_all_digits_and_no_word_for_what_is_not_a_number():
         "b": ["x, y", "", "z"],
         "c": [1e-300, 1.0, math.inf],
     }
-    assert columns_text(columns) == 'a,b,c\n0.30000000000000004,"x, y",1e-300\n,,1.0\n-0.0,z,inf\n'
-    assert columns_text(columns) == pd.DataFrame(columns).to_csv(index=False, lineterminator="\n")
+    assert (
+        writing.columns_text(columns)
+        == 'a,b,c\n0.30000000000000004,"x, y",1e-300\n,,1.0\n-0.0,z,inf\n'
+    )
+    assert writing.columns_text(columns) == pd.DataFrame(columns).to_csv(
+        index=False, lineterminator="\n"
+    )

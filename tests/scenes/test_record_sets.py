@@ -6,17 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.scenes import load_scene
-from rockcheck.scenes.observation import scene_notes
-from rockcheck.scenes.recordings import Reading, read_record
+from rockcheck.scenes import load_scene, observation, recordings
+from rockcheck.scenes.recordings import sets
 from rockcheck.scenes.recordings.recording import Recording
-from rockcheck.scenes.recordings.sets import (
-    _vertical_file,
-    files_of,
-    is_vertical,
-    motions_of,
-    verticals_of,
-)
 
 
 def table(path, gain=1.0):
@@ -57,31 +49,38 @@ def test_a_folder_means_its_files_and_a_pattern_those_that_fit(tmp_path, monkeyp
         (["set/*.csv"], ["set/a.csv", "set/b.csv"]),
         (["gone.csv"], ["gone.csv"]),  # whoever reads it says so
     ):
-        assert list(files_of(words)) == [Path(name) for name in names]
+        assert list(sets.files_of(words)) == [Path(name) for name in names]
     Path("empty").mkdir()
     for word, said in (
         ("empty", "a folder without files"),
         ("set/x*", "no such files"),
         ("set/bel*", "no such files"),
     ):
-        assert said in str(fault_of(files_of, [word]))
+        assert said in str(fault_of(sets.files_of, [word]))
     for name in ("a1.csv", "a[1].csv"):  # a name that could be a pattern
         table(tmp_path / name)
-        assert list(files_of(["a[1].csv"])) == [Path(name)]
+        assert list(sets.files_of(["a[1].csv"])) == [Path(name)]
 
 
 def test_vertical_components_are_left_out_unless_they_are_asked_for(tmp_path, fault_of):
     both, alone = channels(tmp_path / "two.v2", East=1.0, Up=0.5), table(tmp_path / "up.csv", 0.25)
     every = [both, table(tmp_path / "ns.csv", 2.0), alone]
     for paths, reading, found, other in (
-        (every, Reading(), [("two.v2 East", 1.0), ("ns.csv", 2.0)], ["two.v2 Up", "up.csv"]),
-        ([both], Reading(component="Up"), [("two.v2", 0.5)], []),
-        ([alone], Reading(column=2), [("up.csv", 0.25)], []),
-        ([], Reading(), [], []),
+        (
+            every,
+            recordings.Reading(),
+            [("two.v2 East", 1.0), ("ns.csv", 2.0)],
+            ["two.v2 Up", "up.csv"],
+        ),
+        ([both], recordings.Reading(component="Up"), [("two.v2", 0.5)], []),
+        ([alone], recordings.Reading(column=2), [("up.csv", 0.25)], []),
+        ([], recordings.Reading(), [], []),
     ):
-        motions, left_out = motions_of(paths, reading)
+        motions, left_out = sets.motions_of(paths, reading)
         assert ([(name, peak(one)) for name, one in motions], left_out) == (found, other)
-    assert "up.csv: a vertical component" in str(fault_of(motions_of, [alone], Reading()))
+    assert "up.csv: a vertical component" in str(
+        fault_of(sets.motions_of, [alone], recordings.Reading())
+    )
 
 
 def test_the_vertical_component_is_that_of_the_same_file_or_of_one_named_alike(tmp_path):
@@ -90,7 +89,9 @@ def test_the_vertical_component_is_that_of_the_same_file_or_of_one_named_alike(t
         table(tmp_path / "a-ns.csv"),
         table(tmp_path / "a-up.csv", 0.25),
     ]
-    assert {name: peak(one) for name, one in verticals_of(paths, Reading()).items()} == {
+    assert {
+        name: peak(one) for name, one in sets.verticals_of(paths, recordings.Reading()).items()
+    } == {
         "two.v2 East": 0.5,
         "two.v2 North": 0.5,
         "a-ns.csv": 0.25,
@@ -108,7 +109,7 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(tmp_p
         ([plain, up, other], "b-up.csv: a vertical component, and no horizontal"),
         ([up], "a-up.csv: a vertical component, and no horizontal"),
     ):
-        assert said in str(fault_of(verticals_of, paths, Reading()))
+        assert said in str(fault_of(sets.verticals_of, paths, recordings.Reading()))
 
 
 @pytest.mark.parametrize(
@@ -137,7 +138,7 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(tmp_p
 )
 def test_which_component_is_vertical(name, form, component, vertical):
     given = {"form": form, "component": component, "unit": "g", "time_step": 0.01}
-    assert is_vertical(Path(name), Recording(samples=np.zeros(3), **given)) == vertical
+    assert sets.is_vertical(Path(name), Recording(samples=np.zeros(3), **given)) == vertical
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def test_which_component_is_vertical(name, form, component, vertical):
 )
 def test_which_file_has_the_vertical_component(name, others, vertical):
     paths = [Path(other) for other in others]
-    assert _vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])
+    assert sets._vertical_file(Path(name), paths) == (None if vertical is None else paths[vertical])
 
 
 G = 9.80665
@@ -200,8 +201,9 @@ G = 9.80665
     ("encoding", "end"), [("utf-8", "\n"), ("utf-8-sig", "\n"), ("utf-16", "\n"), ("utf-8", "\r\n")]
 )
 def test_tables(text, options, samples, step, encoding, end, written):
-    record = read_record(
-        written("motion.txt", text.replace("\n", end).encode(encoding)), Reading(**options)
+    record = recordings.read_record(
+        written("motion.txt", text.replace("\n", end).encode(encoding)),
+        recordings.Reading(**options),
     )
     np.testing.assert_allclose(record.samples, samples, rtol=1e-15)
     assert record.time_step == step
@@ -216,10 +218,10 @@ def test_times_are_judged_by_their_digits(rate, decimals, written, fault_of):
     path = written("a.csv", "time_s,acceleration_g\n" + rows)
     hidden = 10.0**-decimals > 0.5 / rate and rate not in (100, 200)
     if hidden:
-        said = str(fault_of(read_record, path)).split("is off the uniform step ")[1]
+        said = str(fault_of(recordings.read_record, path)).split("is off the uniform step ")[1]
         assert "; times of 0.01 s may hide it: --read time_step" in said
-    reading = Reading(time_step=1 / rate) if hidden else Reading()
-    assert read_record(path, reading).time_step == pytest.approx(1 / rate, rel=1e-12)
+    reading = recordings.Reading(time_step=1 / rate) if hidden else recordings.Reading()
+    assert recordings.read_record(path, reading).time_step == pytest.approx(1 / rate, rel=1e-12)
 
 
 def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(written):
@@ -230,4 +232,6 @@ def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(written):
     )
     scene = load_scene(written("a.toml", text))
     np.testing.assert_allclose(scene.excitation.acceleration([0.0, 0.5, 1.0]), [0.0, 0.5 * G, 0.0])
-    assert scene_notes(scene) == ("the horizontal record: the first time is 5 s; it is 0 here",)
+    assert observation.scene_notes(scene) == (
+        "the horizontal record: the first time is 5 s; it is 0 here",
+    )

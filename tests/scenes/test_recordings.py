@@ -8,11 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from rockcheck.scenes import Record
-from rockcheck.scenes.recordings import Reading, intensity, read_components, read_record
-from rockcheck.scenes.recordings.sets import files_of, motions_of
+from rockcheck.scenes import Floats, Record, recordings
+from rockcheck.scenes.recordings import intensity, sets
 
 G = 9.80665
 STEP = 0.01
@@ -20,7 +18,7 @@ STEP = 0.01
 PEAKS = {"N-S": 0.31, "E-W": -0.27, "U-D": 0.15}
 
 
-def motion(component: str) -> NDArray[np.float64]:
+def motion(component: str) -> Floats:
     """Accelerations in m/s^2, 401 of them: a burst without a mean, whose largest one stands at a
     sample."""
     t = STEP * np.arange(401)
@@ -28,7 +26,7 @@ def motion(component: str) -> NDArray[np.float64]:
     return PEAKS[component] * G * shape
 
 
-def _fixed(values: NDArray[np.float64], across: int, form: str) -> str:
+def _fixed(values: Floats, across: int, form: str) -> str:
     words = [format(value, form) for value in values]
     return "".join("".join(words[k : k + across]) + "\n" for k in range(0, len(words), across))
 
@@ -167,7 +165,7 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path, written, 
     assert len(made) == 24
     for one in records:
         write, digit, component = made[one["file"]]
-        record = read_record(Path(one["file"]))
+        record = recordings.read_record(Path(one["file"]))
         expected = motion(component)[: 400 if write is knet else 401]
         if write is knet:
             expected = expected - expected.mean()
@@ -189,7 +187,7 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path, written, 
 )
 def test_several_components_in_one_file(write, names, written, told, fault_of):
     path = written("three.V2", write(*PEAKS))
-    found = read_components(path)
+    found = recordings.read_components(path)
     assert [one.component for one in found] == names
     for one, component in zip(found, PEAKS, strict=True):
         np.testing.assert_allclose(one.samples, motion(component), atol=1.01e-7)
@@ -215,11 +213,11 @@ RAW, OWN, UNKNOWN = (b"%13.6f" % value for value in (2 * STEP, 1000 * STEP, -999
 )
 def test_a_v2_file_has_its_own_time_step_not_that_of_the_raw_record(written, raw, own):
     path = written("a.V2", cosmos("N-S").replace(RAW, raw).replace(OWN, own))
-    assert read_record(path).time_step == STEP
+    assert recordings.read_record(path).time_step == STEP
 
 
 def test_k_net_takes_out_the_offset_and_says_so(written):
-    record = read_record(written("MYG0041103111446.NS", knet("N-S", "4")))
+    record = recordings.read_record(written("MYG0041103111446.NS", knet("N-S", "4")))
     assert record.component == "4"
     assert record.notes == ("the mean, 2.987 gal, is taken out: the offset of the digitiser",)
     assert abs(record.samples.mean()) < 1e-12
@@ -262,7 +260,10 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
 def test_a_header_says_enough_and_neither_samples_nor_options_overrule_it(
     written, name, content, option, said, fault_of
 ):
-    assert re.search(said, str(fault_of(read_record, written(name, content), Reading(**option))))
+    assert re.search(
+        said,
+        str(fault_of(recordings.read_record, written(name, content), recordings.Reading(**option))),
+    )
 
 
 def test_the_command_shows_and_draws(tmp_path, monkeypatch, typed, refused):
@@ -281,11 +282,11 @@ def test_of_a_folder_the_odd_file_is_named(tmp_path, typed, fault_of):
     out, _ = typed("record", str(tmp_path), "--json", code=2, holds=["2.txt, line 1: 3 columns"])
     assert json.loads(out)["samples"] == 401
     for words in ([tmp_path], [tmp_path / "[1-3].*"]):
-        (motion, *more), (left_out,) = motions_of(files_of(words), Reading())
+        (motion, *more), (left_out,) = sets.motions_of(sets.files_of(words), recordings.Reading())
         assert (motion[0], more) == ("1.AT2", [])
         assert "2.txt" in left_out
     for words in ([tmp_path, tmp_path / "2.txt"], [tmp_path / "2*"]):
-        assert "2.txt" in str(fault_of(motions_of, files_of(words), Reading()))
+        assert "2.txt" in str(fault_of(sets.motions_of, sets.files_of(words), recordings.Reading()))
 
 
 def test_a_shipped_record_is_found_by_name_as_in_a_scene(tmp_path, monkeypatch, told, refused):

@@ -5,10 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from rockcheck.scenes import Record
-from rockcheck.scenes.recordings import read_record
+from rockcheck.scenes import Floats, Record, recordings
 
 G = 9.80665
 NAMED = (
@@ -57,7 +55,7 @@ def test_genuine_peer_files(component, count, peak):
 
 def run_together(
     across: int, count: int, width: int, form: str, unit: str = "G"
-) -> tuple[str, NDArray[np.float64]]:
+) -> tuple[str, Floats]:
     """A PEER file in Fortran's columns without a blank between them, and its numbers as they are
     printed."""
     values = (
@@ -203,7 +201,9 @@ def test_faults_are_named(name, text, options, said, written, fault_of):
 def test_columns_of_fortran_may_run_together(written, across, width, form, count):
     """E-011.19 is the end of one number and the beginning of the next."""
     text, values = run_together(across, count, width, form)
-    np.testing.assert_array_equal(read_record(written("a.AT2", text)).samples, values * G)
+    np.testing.assert_array_equal(
+        recordings.read_record(written("a.AT2", text)).samples, values * G
+    )
 
 
 SPELT = {
@@ -220,7 +220,7 @@ SPELT = {
 )
 def test_the_header_states_the_unit(written, unit, word):
     text = f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
-    found = read_record(written("a.AT2", text))
+    found = recordings.read_record(written("a.AT2", text))
     assert found.unit == unit
     np.testing.assert_allclose(
         found.samples,

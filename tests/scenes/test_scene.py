@@ -5,9 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import Block, Floor, Scene, Wall, kinematics
-from rockcheck.scenes.observation import scene_notes
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Block, Floor, Scene, Wall, kinematics, observation
 
 GOOD = {
     "name": "good",
@@ -248,7 +246,7 @@ def test_the_moment_of_inertia_is_at_most_that_of_mass_in_the_corners(fault_of):
 def test_a_block_as_large_as_a_hill_is_told():
     """200 mm that are written as 200."""
     blocks = [Block(half_width=size / 4, half_height=size) for size in (0.2, 30.0, 200.0)]
-    notes = [str(scene_notes(scene(block=block, walls=[]))) for block in blocks]
+    notes = [str(observation.scene_notes(scene(block=block, walls=[]))) for block in blocks]
     assert ["m, not mm" in note for note in notes] == [False, False, True]
 
 

@@ -12,22 +12,9 @@ from pathlib import Path
 import pytest
 
 import rockcheck
-from rockcheck.scenes import History, load_scene
-from rockcheck.scenes.errors import inert
-from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.reading import (
-    head_of,
-    open_regular,
-    read_bytes,
-    read_json,
-    read_table,
-    read_text,
-    within,
-)
-from rockcheck.scenes.recordings import read_record
-from rockcheck.scenes.writing import columns_text, made, table_text, write_together, write_whole
-from rockcheck.validation.discrepancy.measured import read_measured
-from rockcheck.validation.suite.results import Run
+from rockcheck.scenes import History, errors, files, load_scene, reading, recordings, writing
+from rockcheck.validation.discrepancy import measured
+from rockcheck.validation.suite import results
 
 #: What may stand where a result is to be written, in a folder that somebody sent.
 TRAPS: dict[str, Callable[[Path, Path], None]] = {
@@ -42,7 +29,9 @@ TRAPS: dict[str, Callable[[Path, Path], None]] = {
 
 @pytest.mark.needs("POSIX")
 @pytest.mark.parametrize("trap", TRAPS)
-@pytest.mark.parametrize("write", [write_whole, lambda path, text: write_together({path: text})])
+@pytest.mark.parametrize(
+    "write", [writing.write_whole, lambda path, text: writing.write_together({path: text})]
+)
 def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
     victim, path = tmp_path / "victim", tmp_path / "result"
     victim.write_text("mine")
@@ -54,33 +43,42 @@ def test_nothing_in_the_way_is_written_through(tmp_path, trap, write):
 
 
 def test_a_folder_of_results_is_no_link(tmp_path, fault_of):
-    elsewhere, run = made(tmp_path, "elsewhere"), made(tmp_path, "run")
+    elsewhere, run = writing.made(tmp_path, "elsewhere"), writing.made(tmp_path, "run")
     (run / "pages").symlink_to(elsewhere)
-    assert "pages: a link" in str(fault_of(made, run, "pages", "data"))
+    assert "pages: a link" in str(fault_of(writing.made, run, "pages", "data"))
     assert not list(elsewhere.iterdir())
     (tmp_path / "mine").symlink_to(run)  # the folder that the user names may be one
-    assert made(tmp_path / "mine", "data").is_dir()
+    assert writing.made(tmp_path / "mine", "data").is_dir()
 
 
 @pytest.mark.needs("POSIX")
-@pytest.mark.parametrize("read", [open_regular, read_bytes, read_text, read_json, read_table])
+@pytest.mark.parametrize(
+    "read",
+    [
+        reading.open_regular,
+        reading.read_bytes,
+        reading.read_text,
+        reading.read_json,
+        reading.read_table,
+    ],
+)
 @pytest.mark.parametrize("trap", ["a link to a device", "a link to itself", "a pipe"])
 def test_what_is_no_file_is_not_opened(tmp_path, monkeypatch, trap, read, fault_of):
     path = tmp_path / "given"
     TRAPS[trap](path, tmp_path)
     monkeypatch.setattr(os, "open", lambda *_: pytest.fail("it was opened"))
     assert "given" in str(fault_of(read, path))
-    assert head_of(path, 100) == ""
+    assert reading.head_of(path, 100) == ""
 
 
 def test_a_link_may_not_lead_out_of_a_folder_that_was_sent(tmp_path, fault_of):
     (tmp_path / "secret").write_text("1")
-    folder = made(tmp_path / "run")
+    folder = writing.made(tmp_path / "run")
     (folder / "out").symlink_to(tmp_path)
     (folder / "inside").symlink_to(folder / "kept")
-    assert within(folder, "inside") == folder / "inside"
+    assert reading.within(folder, "inside") == folder / "inside"
     for name in ("out", "out/secret", "../secret"):
-        assert "lies outside" in str(fault_of(within, folder, name))
+        assert "lies outside" in str(fault_of(reading.within, folder, name))
 
 
 #: Where a file may be written or read without the doors: the doors themselves, the cache of machine
@@ -100,7 +98,7 @@ DOORS = {
         "scenes/compiled.py",
         "validation/execute/provenance.py",
     },
-    r"\.read_text\(|\.read_bytes\(": {
+    r"(?<!reading)\.read_(text|bytes)\(": {
         "scenes/compiled.py",
         "scenes/experience.py",
         "validation/execute/provenance.py",
@@ -129,7 +127,10 @@ def test_files_are_written_and_read_by_the_doors_alone(calls):
 @pytest.mark.parametrize("lead", "=+-@＝")
 @pytest.mark.parametrize(
     "table",
-    [lambda text: table_text([text], [[text]]), lambda text: columns_text({text: [text, text]})],
+    [
+        lambda text: writing.table_text([text], [[text]]),
+        lambda text: writing.columns_text({text: [text, text]}),
+    ],
 )
 def test_no_cell_of_text_is_a_formula(lead, table):
     assert set(table(f"{lead}1+1").splitlines()) == {f"'{lead}1+1"}
@@ -137,7 +138,7 @@ def test_no_cell_of_text_is_a_formula(lead, table):
 
 @pytest.mark.parametrize("plain", ["-", "-1.5", "-1e-3", "+2", "-inf", "a=b", "", "a-b"])
 def test_numbers_and_signs_stay_as_they_are(plain):
-    assert table_text(["x", "y"], [[plain, -1.5]]).splitlines()[1] == f"{plain},-1.5"
+    assert writing.table_text(["x", "y"], [[plain, -1.5]]).splitlines()[1] == f"{plain},-1.5"
 
 
 #: Signs that turn text around, hide or steer a terminal.
@@ -149,10 +150,10 @@ TURNING = (
 
 @pytest.mark.parametrize("sign", TURNING)
 def test_text_neither_turns_around_nor_steers(written, sign):
-    assert inert(f"a{sign}b\nc\u202fd") == "a?b\nc\u202fd"
-    assert table_text([f"a{sign}b"], [[f"a{sign}b"]]) == "a?b\na?b\n"
+    assert errors.inert(f"a{sign}b\nc\u202fd") == "a?b\nc\u202fd"
+    assert writing.table_text([f"a{sign}b"], [[f"a{sign}b"]]) == "a?b\na?b\n"
     code = f"\\u{ord(sign):04x}"
-    assert read_json(written("a.json", f'{{"a{code}b": ["a{code}b"]}}')) == {"a?b": ["a?b"]}
+    assert reading.read_json(written("a.json", f'{{"a{code}b": ["a{code}b"]}}')) == {"a?b": ["a?b"]}
 
 
 #: Files of 100 kB and more that took over a minute each, by the square of a repetition.
@@ -226,7 +227,13 @@ def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, 
     assert (done.returncode, done.stdout) == (0, "read or refused\n"), done.stderr[-2000:]
 
 
-READERS = (History.load, read_measured, read_record, load_scene, read_toml)
+READERS = (
+    History.load,
+    measured.read_measured,
+    recordings.read_record,
+    load_scene,
+    files.read_toml,
+)
 #: What may lie where a file should, and what is said of it.
 NO_FILES = {
     # A pipe would be waited for without end, a device read without end.
@@ -242,7 +249,7 @@ NO_FILES = {
 @pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize("kind", NO_FILES)
 def test_only_regular_files_of_text_are_read(tmp_path, read, kind, fault_of):
-    path = tmp_path / ("a.toml" if read in (load_scene, read_toml) else "a.csv")
+    path = tmp_path / ("a.toml" if read in (load_scene, files.read_toml) else "a.csv")
     make, said = NO_FILES[kind]
     make(path)
     assert re.search(f"{path.name}: {said}", str(fault_of(read, path)))
@@ -253,7 +260,7 @@ def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path, 
     (tmp_path / "h.csv").write_text("t,theta\n0,0\n1,0\n")
     for read, path, beside in (
         (History.load, tmp_path / "h.csv", "h.events.csv"),
-        (Run.load, tmp_path, "run.json"),
+        (results.Run.load, tmp_path, "run.json"),
     ):
         os.mkfifo(tmp_path / beside)
         assert "not a file" in str(fault_of(read, path))
@@ -269,7 +276,12 @@ def test_what_lies_beside_a_history_or_in_a_run_is_a_regular_file_too(tmp_path, 
             "floor = { friction = 0.4 }\n",
             {"name": "b"},
         ),
-        (read_record, "a.csv", "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n", {"time_step": 0.5}),
+        (
+            recordings.read_record,
+            "a.csv",
+            "time_s,acceleration_m_s2\n0.0,0.1\n0.5,0.2\n",
+            {"time_step": 0.5},
+        ),
         (
             History.load,
             "h.csv",
@@ -302,7 +314,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(written, read, name, text, abo
 )
 def test_a_key_of_many_parts_is_refused(written, key, fault_of):
     assert "a key of more than 50 parts" in str(
-        fault_of(read_toml, written("a.toml", key if key.startswith("[") else f"{key} = 1"))
+        fault_of(files.read_toml, written("a.toml", key if key.startswith("[") else f"{key} = 1"))
     )
 
 
@@ -311,10 +323,10 @@ def test_a_key_of_many_parts_is_refused(written, key, fault_of):
     ["a" + ".a" * 48 + " = 1", "a = [" + "0.1, " * 100 + "]", 'a = "' + "two words. " * 100 + '"'],
 )
 def test_a_key_of_few_parts_is_read(written, line):
-    assert read_toml(written("a.toml", line))
+    assert files.read_toml(written("a.toml", line))
 
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path, fault_of):
     (tmp_path / "a.toml").touch()
     os.truncate(tmp_path / "a.toml", 10_000_001)
-    assert "larger than 10000000 bytes" in str(fault_of(read_toml, tmp_path / "a.toml"))
+    assert "larger than 10000000 bytes" in str(fault_of(files.read_toml, tmp_path / "a.toml"))

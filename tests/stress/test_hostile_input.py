@@ -25,13 +25,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import History, InputError, Scene, load_scene
-from rockcheck.scenes.recordings import read_components
-from rockcheck.validation.discrepancy.measured import read_measured
-from rockcheck.validation.execute.models import build
+from rockcheck.scenes import History, InputError, Scene, load_scene, recordings
+from rockcheck.validation.discrepancy import measured
+from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, name_of
-from rockcheck.validation.suite.results import Run
-from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite import results, suites
 
 fuzzed = settings(
     max_examples=1000,
@@ -115,7 +113,7 @@ def stored_files() -> dict[str, bytes]:
             {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}},
         )
         record = (folder / "histories" / "short--ebm--0.json").read_bytes()
-    run = Run(
+    run = results.Run(
         suite="s",
         created="2026-01-01T00:00:00",
         reference="ebm",
@@ -152,7 +150,7 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         (inside / "a.toml").write_text(nasty.SCENE)
         (inside / "h.csv").write_text(nasty.HISTORY)
         for model in ("ebm", "ebm-unilateral", "cm"):  # compiled before an input has its time
-            build(model, {}).simulate(load_scene(inside / "a.toml"))
+            models.build(model, {}).simulate(load_scene(inside / "a.toml"))
     given = content.decode("utf-8", "replace").split(BETWEEN)
     words = ["accept", "no-such-suite"] if "accept" in given else []
     words += [word for word in given if word not in LONG]
@@ -168,7 +166,7 @@ def feed_command_line(content: bytes, folder: Path) -> None:
         assert_one_clear_line(line)
 
 
-feed_record = functools.partial(feed_file, reads=[read_components], check=check_record)
+feed_record = functools.partial(feed_file, reads=[recordings.read_components], check=check_record)
 feed_scene = functools.partial(feed_file, name="a.toml", reads=[load_scene], check=check_scene)
 #: Of each reader: what feeds it, and a valid input.
 READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
@@ -180,17 +178,24 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
     "record_columns": (functools.partial(feed_record, name="a.txt"), lambda: nasty.COLUMNS),
     "scene_toml": (feed_scene, lambda: nasty.SCENE),
     "suite_toml": (
-        functools.partial(feed_file, name="a.toml", reads=[lambda path: load_suite(str(path))]),
+        functools.partial(
+            feed_file, name="a.toml", reads=[lambda path: suites.load_suite(str(path))]
+        ),
         lambda: nasty.SUITE,
     ),
     "history_csv": (
         functools.partial(
-            feed_file, name="h.csv", reads=[History.load, read_measured], check=check_history
+            feed_file,
+            name="h.csv",
+            reads=[History.load, measured.read_measured],
+            check=check_history,
         ),
         lambda: nasty.HISTORY,
     ),
     "stored_run": (
-        functools.partial(feed_file, name="run.json", reads=[lambda path: Run.load(path.parent)]),
+        functools.partial(
+            feed_file, name="run.json", reads=[lambda path: results.Run.load(path.parent)]
+        ),
         lambda: stored_files()["run.json"].decode(),
     ),
     "stored_record": (feed_stored_record, lambda: stored_files()["record"].decode()),
@@ -344,7 +349,7 @@ def test_a_heading_in_quotes(written):
     """Found by fuzzing: a measured history whose heading is quoted, as some programs write it,
     ended in a traceback."""
     path = written("h.csv", '\ufeff"t_s","theta_deg" # a remark\n0.0,90.0\n0.5,0.0\n')
-    assert read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
+    assert measured.read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
 
 
 def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):

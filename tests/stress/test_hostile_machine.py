@@ -18,7 +18,7 @@ import pytest
 from hostile import LIMITED, ROCKCHECK
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes.writing import write_whole
+from rockcheck.scenes import writing
 from rockcheck.validation.execute import pool
 from rockcheck.validation.studies.stress import runs
 from rockcheck.validation.study import run
@@ -148,10 +148,10 @@ def test_interrupted(tmp_path, later):
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
     """A crash between writing and naming leaves the old content."""
-    path = write_whole(tmp_path / "a.json", "old")
+    path = writing.write_whole(tmp_path / "a.json", "old")
     monkeypatch.setattr(os, "replace", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OSError, match="No space"):
-        write_whole(path, "new")
+        writing.write_whole(path, "new")
     assert [(one.name, one.read_text()) for one in tmp_path.iterdir()] == [("a.json", "old")]
 
 

@@ -21,7 +21,7 @@ from rockcheck import (
     Sine,
     Wall,
 )
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.studies.stress import invariants, runs
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,

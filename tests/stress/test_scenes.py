@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rockcheck import EventBasedModel, load_scene
-from rockcheck.scenes.files import read_toml
+from rockcheck.scenes import files
 from rockcheck.validation.studies.stress.generator import (
     ALPHA,
     FRICTION,
@@ -97,7 +97,7 @@ def test_exact_scenes_hold_what_they_are_for():
 
 
 FOLDER = Path(__file__).parents[1] / "data" / "found_faults"
-INDEX = read_toml(FOLDER / "index.toml")
+INDEX = files.read_toml(FOLDER / "index.toml")
 
 
 def test_every_pinned_scene_is_listed():

@@ -8,11 +8,8 @@ import numpy as np
 
 from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
-from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, load_scene
-from rockcheck.scenes.files import scene_text, tables_of
-from rockcheck.scenes.writing import made, write_whole
-from rockcheck.validation.execute.models import not_installed
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, files, writing
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.stress.generator import random_scene
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.studies.stress.runs import (
@@ -67,8 +64,10 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     left = (small.block.homogeneous, small.walls, small.vertical)
     assert left == (True, (Wall(side="right", gap=0.0, restitution=0.0),), Rest())
     assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
-    file = write_whole(tmp_path / "small.toml", scene_text(tables_of(small), "a remark\nanother"))
-    assert load_scene(file).replace(name=small.name) == small
+    file = writing.write_whole(
+        tmp_path / "small.toml", files.scene_text(files.tables_of(small), "a remark\nanother")
+    )
+    assert files.load_scene(file).replace(name=small.name) == small
 
 
 def test_totals_count_what_was_seen():
@@ -82,13 +81,13 @@ def test_totals_count_what_was_seen():
 def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     for runs, quick in ((1003, False), (None, True)):
         work = Stress("runs", quick=quick, runs=runs).tasks({})
-        here = {label for label in PLAYERS if not not_installed(label.split()[0])}
+        here = {label for label in PLAYERS if not models.not_installed(label.split()[0])}
         numbers = [(one.model, n) for one in work for n in range(one.first, one.first + one.count)]
         every = [(label, n) for label in here for n in range(runs or PLAYERS[label].quick)]
         assert sorted(numbers) == sorted(every)
     study = Stress("runs", runs=5, models=("ebm",))
     (whole,) = study.tasks({})
-    done: dict = {whole: Failure("lost")}
+    done: dict = {whole: pool.Failure("lost")}
     halves = study.tasks(done)[1:]
     assert [(half.first, half.count) for half in halves] == [(0, 2), (2, 3)]
     assert halves[1].seconds < whole.seconds
@@ -111,7 +110,7 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
             rules={"settles": 2},
         ),
     )
-    stale = write_whole(made(tmp_path, "failures") / "old.toml", "")
+    stale = writing.write_whole(writing.made(tmp_path, "failures") / "old.toml", "")
     study = Stress("runs", models=("ebm",), runs=12)
     found = run(study, tmp_path, jobs=0)
     page = publish(found, tmp_path).read_text()
@@ -124,7 +123,7 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch):
     assert found.table("choices").records() == [{"model": "ebm", "choices": "settles 24"}]
     assert not stale.exists()
     file = tmp_path / "failures" / scenes[0]["scene"]
-    assert len(load_scene(file).walls) == 1
+    assert len(files.load_scene(file).walls) == 1
     assert f'href="failures/{file.name}"' in page
     assert main(["simulate", str(file), "--model", "ebm", "-o", str(tmp_path / "o.csv")]) == 0
     monkeypatch.setattr(type(PLAYERS["ebm"]), "check", None)  # all is read back
@@ -142,7 +141,7 @@ def test_failures_of_the_program_and_of_engines():
     }
     done = {task: one for task, one in done.items() if one.model == task.model}
     assert (study.gather(done).exit_code, len(study.gather(done).files)) == (0, MOST_FILES)
-    done[lost] = Failure("it hangs")
+    done[lost] = pool.Failure("it hangs")
     found = study.gather(done)
     assert (found.exit_code, found.table("failures").records()[0]["words"]) == (1, "it hangs")
     assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
@@ -173,7 +172,7 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
         else Found(task.line, task.at, task.value, 0.1, fault="sinks")
         for task in work
     }
-    done[work[-1]] = Failure("did not end")
+    done[work[-1]] = pool.Failure("did not end")
     found = study.gather(done)
     publish(found, tmp_path)
     assert {row["0.001"] for row in found.table("steps-size").records()} == {"0.1 sinks"}

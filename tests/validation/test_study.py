@@ -10,7 +10,7 @@ import pytest
 from squares import Squares
 
 from rockcheck.reports.document import block_markdown, csv, publish
-from rockcheck.scenes.progress import announcing
+from rockcheck.scenes import progress
 from rockcheck.validation.execute.store import Store
 from rockcheck.validation.finding import (
     Axis,
@@ -90,7 +90,7 @@ def test_timed_tasks_are_played_here_and_a_damaged_record_again(tmp_path, log):
 )
 def test_a_long_run_says_how_long(tmp_path, log, values, expected, said):
     heard = []
-    with announcing(heard.append):
+    with progress.announcing(heard.append):
         run(Squares(values, log, expected=expected), tmp_path, jobs=0)
     assert [part in words for part, words in zip(said, heard, strict=True)] == [True] * len(said)
 

@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rockcheck.scenes import Block, History, InputError, Scene, kinematics
-from rockcheck.scenes.base import Shown
-from rockcheck.scenes.errors import check_kind
+from rockcheck.scenes import Block, History, InputError, Scene, Shown, errors, kinematics
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
     Figure,
@@ -90,7 +88,7 @@ def compare(
     the histories have no time in common, or, without a `scene`, two different blocks.
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
-        check_kind(history, History, "simulate or History.load", key)
+        errors.check_kind(history, History, "simulate or History.load", key)
     blocks = [one.block for one in (reference, candidate) if one.block is not None]
     if scene is None and len(blocks) == 2:
         _check_same(*blocks)

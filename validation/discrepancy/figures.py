@@ -13,11 +13,9 @@ from itertools import compress
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from rockcheck.scenes import Block, Event, History, Scene, kinematics
-from rockcheck.scenes.base import Frozen
+from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, kinematics
 
 #: Start of the note of a figure that is undefined here, such as a ratio to zero.
 NOT_DEFINED = "not defined here"
@@ -86,7 +84,6 @@ class Figure(Stored):
         return self.measure == "peak_rotation" and bool(self.note)
 
 
-Array = NDArray[np.float64]
 Value = float | tuple[float, str]
 STANDARD_GRAVITY = 9.81
 #: Impacts of two histories are the same impact if they lie within this time, s.
@@ -182,7 +179,7 @@ class WindowedHistory:
         """The scene's gravity, or 9.81 m/s^2."""
         return STANDARD_GRAVITY if self.scene is None else self.scene.gravity
 
-    def channel(self, name: str) -> Array:
+    def channel(self, name: str) -> Floats:
         """One column within the window."""
         if name not in self.history.channels:
             raise Unavailable(f"{self.history.model} has no column {name}")
@@ -210,7 +207,7 @@ class WindowedHistory:
         """The number of impacts that are not weak (`WEAK_IMPACT`)."""
         return float(sum(_strong(self.events(kind))))
 
-    def heights(self) -> Array:
+    def heights(self) -> Floats:
         """Height of the lowest corner above the floor, m."""
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
 
@@ -234,23 +231,23 @@ class Pair:
         t, other = (np.asarray(one.channels["t"], float) for one in (reference, candidate))
         self.start = max(float(t[0]), float(other[0]))
         self.end = min(float(t[-1]), float(other[-1]), until)
-        self.time: Array = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
+        self.time: Floats = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
         known = candidate if reference.alpha is None else reference
         self.known = WindowedHistory(known, scene)
         self.alpha = scene.block.alpha if scene else known.alpha
 
-    def channels(self, name: str) -> Array:
+    def channels(self, name: str) -> Floats:
         """One column of both on `time`: reference and candidate, a row each."""
         both = (WindowedHistory(one) for one in (self.reference, self.candidate))
         return np.array([np.interp(self.time, one.channel("t"), one.channel(name)) for one in both])
 
     @cached_property
-    def theta(self) -> Array:
+    def theta(self) -> Floats:
         """Theta of both, in alpha (in rad where the block is unknown)."""
         return self.channels("theta") / (self.alpha or 1.0)
 
     @property
-    def rocking(self) -> Array:
+    def rocking(self) -> Floats:
         """`theta`; raises `Undefined` where the reference's peak is too small to divide by."""
         floor = Measure.resolution
         if self.alpha is not None and len(self.time) > 1:
@@ -266,19 +263,19 @@ class Pair:
         return self.theta
 
     @cached_property
-    def energies(self) -> Array:
+    def energies(self) -> Floats:
         """Energy per unit mass of both, J/kg."""
         columns = map(self.channels, ("y", "theta", "x_dot", "y_dot", "theta_dot"))
         return np.asarray(kinematics.energy(self.known.block, self.known.gravity, *columns))
 
-    def mean(self, values: Array) -> float:
+    def mean(self, values: Floats) -> float:
         """Mean over time, by the trapezoidal rule."""
         if len(values) == 1:
             return float(values[0])
         steps = np.diff(self.time)
         return float(np.sum(steps * 0.5 * (values[1:] + values[:-1])) / np.sum(steps))
 
-    def rms(self, columns: Array) -> float:
+    def rms(self, columns: Floats) -> float:
         """RMS difference over time, sqrt(mean (candidate - reference)^2)."""
         return math.sqrt(self.mean((columns[1] - columns[0]) ** 2))
 

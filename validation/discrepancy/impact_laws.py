@@ -7,13 +7,12 @@ instant"). This names the one that a history took, without judging it.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import LANDS_FLAT, may_fly
 from rockcheck.ebm.model import ImpactLaw
-from rockcheck.scenes import History, Scene
-from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.scenes import Floats, History, Scene
+from rockcheck.validation.discrepancy import figures
 
 #: The laws that part where a block lands flush against a wall, and where it lands flat; "moreau":
 #: both bottom corners at once.
@@ -28,7 +27,7 @@ SAME, TELLS = 1e-6, 1e-3
 NEAR = 0.25
 
 
-class LawFollowed(Stored):
+class LawFollowed(figures.Stored):
     """The law that a history followed after the first landing at which the laws part, at `t` s.
 
     `law` is the nearest one; "closed or open" where those two cannot be told apart there; "none"
@@ -43,7 +42,7 @@ class LawFollowed(Stored):
     spread: float
 
 
-class Landing(Stored):
+class Landing(figures.Stored):
     """The first landing of a scene at which the laws of impacts part.
 
     `branches` are the rotations (alpha) under each law in the output rows from `start` on. They are
@@ -130,5 +129,5 @@ def _played(scene: Scene, law: ImpactLaw) -> History:
     return EventBasedModel(pivot="unilateral", tolerance=1e-13, impacts=law).simulate(scene)
 
 
-def _rms(values: NDArray[np.float64]) -> float:
+def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))

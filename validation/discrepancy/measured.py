@@ -13,11 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from rockcheck.scenes import History, InputError, Scene
-from rockcheck.scenes.base import Finite, Frozen
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes import Finite, Frozen, History, InputError, Scene, printable, reading
 from rockcheck.scenes.history import check_readable, outcome_of
-from rockcheck.scenes.reading import read_table
 
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.
@@ -110,7 +107,7 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     check_readable(Path(path))
     shown = printable(path)
     # quotes and comments of the heading are read as in the rows
-    heading = read_table(Path(path), header=None, nrows=1, dtype=str, keep_default_na=False)
+    heading = reading.read_table(Path(path), header=None, nrows=1, dtype=str, keep_default_na=False)
     if heading.empty:
         raise InputError(f"{shown}: empty")
     columns: dict[str, tuple[str, float]] = {}

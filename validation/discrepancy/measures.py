@@ -15,20 +15,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Scene, kinematics
-from rockcheck.scenes.block import Pivot
+from rockcheck.scenes import Floats, Pivot, Scene, kinematics
 from rockcheck.validation.criteria import quarter_period
-from rockcheck.validation.discrepancy.figures import (
-    TURNS,
-    Array,
-    Measure,
-    Pair,
-    Unavailable,
-    Undefined,
-    Value,
-    WindowedHistory,
-    by_name,
-)
+from rockcheck.validation.discrepancy import figures
 
 ISO_MOST_SAMPLES = 4000
 
@@ -36,16 +25,16 @@ ISO_MOST_SAMPLES = 4000
 # Differences
 
 
-def _peak(columns: Array) -> float:
+def _peak(columns: Floats) -> float:
     return float(np.max(np.abs(columns[1] - columns[0])))
 
 
-def _peak_ratio(pair: Pair) -> float:
+def _peak_ratio(pair: figures.Pair) -> float:
     reference, candidate = np.max(np.abs(pair.rocking), axis=1).tolist()
     return float(candidate / reference)
 
 
-def _hausdorff(pair: Pair) -> float:
+def _hausdorff(pair: figures.Pair) -> float:
     p = pair.known.block.weaker_pivot.frequency_parameter(pair.known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
     if not (np.all(np.isfinite(first)) and np.all(np.isfinite(second))):
@@ -53,7 +42,7 @@ def _hausdorff(pair: Pair) -> float:
     return max(_farthest(first, second), _farthest(second, first))
 
 
-def _farthest(points: Array, line: Array) -> float:
+def _farthest(points: Floats, line: Floats) -> float:
     """Largest distance from `points` to the broken line through `line`, both of shape (n, 2).
 
     The nearest vertex is looked up in a tree, then the two segments that meet there are measured.
@@ -72,20 +61,20 @@ def _farthest(points: Array, line: Array) -> float:
     return float(np.max(best))
 
 
-def _agree_until(pair: Pair) -> tuple[float, str]:
+def _agree_until(pair: figures.Pair) -> tuple[float, str]:
     matched = pair.impacts
     alone = (pair.reference, matched.only_reference), (pair.candidate, matched.only_candidate)
     found = [(e.t, f"{e.kind} only in {h.model}") for h, events in alone for e in events]
     return min(found, default=(pair.end, "all events agree"))
 
 
-def _unmatched(pair: Pair) -> tuple[float, str]:
+def _unmatched(pair: figures.Pair) -> tuple[float, str]:
     found = pair.impacts
     alone = len(found.only_reference) + len(found.only_candidate)
     return float(alone), f"{len(found.pairs)} impacts matched"
 
 
-def _impact_time(pair: Pair) -> tuple[float, str]:
+def _impact_time(pair: figures.Pair) -> tuple[float, str]:
     pairs = pair.impacts.pairs
     if not pairs:
         return 0.0, "no impact has a counterpart"
@@ -93,7 +82,7 @@ def _impact_time(pair: Pair) -> tuple[float, str]:
     return abs(second.t - first.t), f"{first.kind} at {first.t:.3f} s"
 
 
-def _overturning_time(pair: Pair) -> float:
+def _overturning_time(pair: figures.Pair) -> float:
     first, second = (
         math.inf if one.overturned_at is None else one.overturned_at
         for one in (pair.reference, pair.candidate)
@@ -101,24 +90,24 @@ def _overturning_time(pair: Pair) -> float:
     return 0.0 if first == second else abs(second - first)
 
 
-def _outcome(pair: Pair) -> tuple[float, str]:
+def _outcome(pair: figures.Pair) -> tuple[float, str]:
     first, second = pair.reference.outcome, pair.candidate.outcome
-    fates = {outcome if outcome in TURNS else "stays" for outcome in (first, second)}
+    fates = {outcome if outcome in figures.TURNS else "stays" for outcome in (first, second)}
     return float(len(fates) == 1), first if first == second else f"{first} / {second}"
 
 
-def _iso_18571(pair: Pair) -> float:
+def _iso_18571(pair: figures.Pair) -> float:
     try:
         from objective_rating_metrics.rating import ISO18571
     except ImportError:
-        raise Unavailable(
+        raise figures.Unavailable(
             "needs the package objective-rating-metrics: pip install objective-rating-metrics"
         ) from None
     curves = pair.rocking
     if len(pair.time) < 20 or not all(
         np.all(np.isfinite(curve)) and np.ptp(curve) > 0.0 for curve in curves
     ):
-        raise Unavailable("too short, constant or not finite")
+        raise figures.Unavailable("too short, constant or not finite")
     grid = np.linspace(pair.time[0], pair.time[-1], min(len(pair.time), ISO_MOST_SAMPLES))
     reference, candidate = (
         np.column_stack([grid, np.interp(grid, pair.time, curve)]) for curve in curves
@@ -128,43 +117,43 @@ def _iso_18571(pair: Pair) -> float:
     )
 
 
-DIFFERENCES = by_name(
-    Measure(
+DIFFERENCES = figures.by_name(
+    figures.Measure(
         "theta_rms",
         "RMS difference of rotation",
         "angle",
         "sqrt <d^2> of theta, in alpha.",
         lambda pair: pair.rms(pair.theta),
     ),
-    Measure(
+    figures.Measure(
         "theta_peak",
         "peak difference of rotation",
         "angle",
         "max |d| of theta, in alpha.",
         lambda pair: _peak(pair.theta),
     ),
-    Measure(
+    figures.Measure(
         "x_rms",
         "RMS difference of x",
         "m",
         "sqrt <d^2> of the centroid's x, m.",
         lambda pair: pair.rms(pair.channels("x")),
     ),
-    Measure(
+    figures.Measure(
         "x_peak",
         "peak difference of x",
         "m",
         "max |d| of the centroid's x, m.",
         lambda pair: _peak(pair.channels("x")),
     ),
-    Measure(
+    figures.Measure(
         "slip_rate_rms",
         "RMS difference of slip rate",
         "m/s",
         "sqrt <d^2> of the pivot corner's horizontal velocity V, m/s.",
         lambda pair: pair.rms(pair.channels("slip_rate")),
     ),
-    Measure(
+    figures.Measure(
         "slip_rate_peak",
         "peak difference of slip rate",
         "m/s",
@@ -172,21 +161,21 @@ DIFFERENCES = by_name(
         " jumps, see `theta_hausdorff`.",
         lambda pair: _peak(pair.channels("slip_rate")),
     ),
-    Measure(
+    figures.Measure(
         "energy_rms",
         "RMS difference of energy",
         "J/kg",
         "sqrt <d^2> of kinetic plus potential energy per unit mass, J/kg.",
         lambda pair: pair.rms(pair.energies),
     ),
-    Measure(
+    figures.Measure(
         "energy_peak",
         "peak difference of energy",
         "J/kg",
         "max |d| of kinetic plus potential energy per unit mass, J/kg.",
         lambda pair: _peak(pair.energies),
     ),
-    Measure(
+    figures.Measure(
         "sprague_geers_m",
         "Sprague-Geers M (magnitude)",
         "1",
@@ -194,7 +183,7 @@ DIFFERENCES = by_name(
         " Geers, Commun. Numer. Meth. Engng 20 (2004) 467; Schwer, Engng Comput. 23 (2007) 295.",
         lambda pair: pair.sprague_geers[0],
     ),
-    Measure(
+    figures.Measure(
         "sprague_geers_p",
         "Sprague-Geers P (phase)",
         "1",
@@ -202,14 +191,14 @@ DIFFERENCES = by_name(
         " phase, 1 in opposition.\n\nSource as for M.",
         lambda pair: pair.sprague_geers[1],
     ),
-    Measure(
+    figures.Measure(
         "sprague_geers_c",
         "Sprague-Geers C (both)",
         "1",
         "C = sqrt(M^2 + P^2) of theta. Source as for M.",
         lambda pair: math.hypot(*pair.sprague_geers),
     ),
-    Measure(
+    figures.Measure(
         "peak_ratio",
         "ratio of peak rotations",
         "1",
@@ -217,7 +206,7 @@ DIFFERENCES = by_name(
         _peak_ratio,
         ideal=1.0,
     ),
-    Measure(
+    figures.Measure(
         "theta_hausdorff",
         "Hausdorff distance of rotation's graphs",
         "1",
@@ -228,7 +217,7 @@ DIFFERENCES = by_name(
         " mechanics by the authors of cardillo.",
         _hausdorff,
     ),
-    Measure(
+    figures.Measure(
         "events_agree_until",
         "events agree until",
         "s",
@@ -239,7 +228,7 @@ DIFFERENCES = by_name(
         ideal=None,
         sense="at least",
     ),
-    Measure(
+    figures.Measure(
         "unmatched_impacts",
         "impacts without counterpart",
         "1",
@@ -248,7 +237,7 @@ DIFFERENCES = by_name(
         _unmatched,
         resolution=0.0,
     ),
-    Measure(
+    figures.Measure(
         "impact_time",
         "largest impact-time error",
         "s",
@@ -256,14 +245,14 @@ DIFFERENCES = by_name(
         " `events_agree_until`, s.",
         _impact_time,
     ),
-    Measure(
+    figures.Measure(
         "overturning_time",
         "difference of overturning time",
         "s",
         "|t_c - t_r| of |theta| = pi/2, s; 0 if neither overturns, infinite if only one does.",
         _overturning_time,
     ),
-    Measure(
+    figures.Measure(
         "outcome_agrees",
         "outcome agrees",
         "1",
@@ -274,7 +263,7 @@ DIFFERENCES = by_name(
         resolution=0.0,
         yes_no=True,
     ),
-    Measure(
+    figures.Measure(
         "iso_18571",
         "ISO/TS 18571 rating",
         "1",
@@ -293,13 +282,13 @@ DIFFERENCES = by_name(
 # Figures of one history
 
 
-def _peak_rotation(motion: WindowedHistory) -> Value:
+def _peak_rotation(motion: figures.WindowedHistory) -> figures.Value:
     at = motion.history.overturned_at
     fell = "" if at is None or at > motion.until else f"the block overturned at {at:.3g} s"
     return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha, fell
 
 
-def _deepest(motion: WindowedHistory) -> float:
+def _deepest(motion: figures.WindowedHistory) -> float:
     gaps, scene = [motion.heights()], motion.scene
     if scene is not None:
         place = motion.channel("x"), motion.channel("theta")
@@ -310,8 +299,8 @@ def _deepest(motion: WindowedHistory) -> float:
 
 
 #: A figure without an ideal value is judged by its expected value.
-_quantity = partial(Measure, ideal=None)
-FIGURES = by_name(
+_quantity = partial(figures.Measure, ideal=None)
+FIGURES = figures.by_name(
     _quantity(
         "peak_rotation",
         "peak rotation",
@@ -372,7 +361,7 @@ FIGURES = by_name(
         " flight.",
         lambda motion: float(np.maximum(np.max(motion.heights()), 0.0)),
     ),
-    Measure(
+    figures.Measure(
         "deepest_penetration",
         "deepest penetration",
         "m",
@@ -380,7 +369,7 @@ FIGURES = by_name(
         " known), m.",
         _deepest,
     ),
-    Measure(
+    figures.Measure(
         "energy_gain",
         "largest energy gain at an impact",
         "1",
@@ -395,14 +384,14 @@ FIGURES = by_name(
 # computed on request.
 
 
-def _sliding_distance(motion: WindowedHistory) -> float:
+def _sliding_distance(motion: figures.WindowedHistory) -> float:
     scene, braking = _flat_start(motion, "a block that starts sliding flat", walls=0)
     _stopped(motion, scene, abs(scene.initial_velocity))
     x = motion.channel("x")
     return abs(float(x[-1] - x[0])) - scene.initial_velocity**2 / braking
 
 
-def _wall_rebound(motion: WindowedHistory) -> float:
+def _wall_rebound(motion: figures.WindowedHistory) -> float:
     scene, braking = _flat_start(motion, "a block that slides flat into a wall", walls=1)
     wall = scene.walls[0]
     speed2 = scene.initial_velocity**2 - braking * wall.gap
@@ -413,7 +402,7 @@ def _wall_rebound(motion: WindowedHistory) -> float:
     return from_wall - wall.restitution**2 * speed2 / braking
 
 
-def _bounce_height(motion: WindowedHistory) -> float:
+def _bounce_height(motion: figures.WindowedHistory) -> float:
     scene = _scene(motion)
     height, e = scene.initial_height, scene.floor.restitution
     _need(height > 0.0 and scene.initial_rotation == 0.0, "a block that drops flat")
@@ -425,7 +414,7 @@ def _bounce_height(motion: WindowedHistory) -> float:
     return float(np.max(hop)) - e**2 * height
 
 
-def _quarter_period(motion: WindowedHistory) -> float:
+def _quarter_period(motion: figures.WindowedHistory) -> float:
     scene = _scene(motion)
     pivot = _released(motion)[0]
     impacts = motion.events("floor impact")
@@ -433,7 +422,7 @@ def _quarter_period(motion: WindowedHistory) -> float:
     return impacts[0].t - quarter_period(pivot, scene.gravity, abs(scene.initial_rotation))
 
 
-def _impact_ratio(motion: WindowedHistory) -> float:
+def _impact_ratio(motion: figures.WindowedHistory) -> float:
     scene = _scene(motion)
     old, new = _released(motion)
     impacts = [event.t for event in motion.events("floor impact")]
@@ -449,15 +438,15 @@ def _impact_ratio(motion: WindowedHistory) -> float:
     return after / before - (1.0 - new.share * new.arm * (new.arm + old.arm) / new.radius**2)
 
 
-def _scene(motion: WindowedHistory) -> Scene:
+def _scene(motion: figures.WindowedHistory) -> Scene:
     if motion.scene is None or {motion.scene.excitation.kind, motion.scene.vertical.kind} != {
         "rest"
     }:
-        raise Unavailable("closed forms need a known scene with a base at rest")
+        raise figures.Unavailable("closed forms need a known scene with a base at rest")
     return motion.scene
 
 
-def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> tuple[Scene, float]:
+def _flat_start(motion: figures.WindowedHistory, what: str, *, walls: int) -> tuple[Scene, float]:
     """The scene, and the loss of speed squared by friction on the way, m/s^2.
 
     Raises `Unavailable` unless its block starts sliding flat with `walls` walls.
@@ -468,14 +457,14 @@ def _flat_start(motion: WindowedHistory, what: str, *, walls: int) -> tuple[Scen
     return scene, 2.0 * scene.floor.friction * scene.gravity
 
 
-def _stopped(motion: WindowedHistory, scene: Scene, speed: float) -> None:
+def _stopped(motion: figures.WindowedHistory, scene: Scene, speed: float) -> None:
     """Raises `Undefined` if the window ends before friction has taken `speed` (m/s)."""
     reached = scene.floor.friction * scene.gravity * float(motion.channel("t")[-1])
     if motion.history.overturned_at is None and reached <= speed:
-        raise Undefined("the window ends before the block has stopped")
+        raise figures.Undefined("the window ends before the block has stopped")
 
 
-def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
+def _released(motion: figures.WindowedHistory) -> tuple[Pivot, Pivot]:
     """The pivot on which a block released from a tilt rocks first, and the other one."""
     scene = _scene(motion)
     left, right = scene.block.pivot("left"), scene.block.pivot("right")
@@ -490,11 +479,11 @@ def _released(motion: WindowedHistory) -> tuple[Pivot, Pivot]:
 
 def _need(holds: bool, what: str) -> None:
     if not holds:
-        raise Unavailable(f"{what} is needed")
+        raise figures.Unavailable(f"{what} is needed")
 
 
-_error = partial(Measure, on_request=True, exact=True)
-FIGURES |= by_name(
+_error = partial(figures.Measure, on_request=True, exact=True)
+FIGURES |= figures.by_name(
     _error(
         "sliding_distance_error",
         "error of sliding distance",
@@ -559,7 +548,7 @@ class Sample:
     NaN and "" where it failed.
     """
 
-    peaks: Array
+    peaks: Floats
     outcomes: Sequence[str]
 
     @property
@@ -580,26 +569,28 @@ class Samples:
     reference: Sample
     candidate: Sample
 
-    def log_ratios(self) -> Array:
+    def log_ratios(self) -> Floats:
         """ln(c/r) of the peaks where neither falls and both rock; at least two."""
         r, c = self.reference, self.candidate
         rocks, too = (~sample.fallen & (sample.peaks > SMALLEST_PEAK) for sample in (r, c))
         if np.sum(rocks) < 2:
-            raise Undefined("fewer than two scenes in which the reference rocks and does not fall")
+            raise figures.Undefined(
+                "fewer than two scenes in which the reference rocks and does not fall"
+            )
         usable = rocks & too
         if np.sum(usable) < 2:
-            raise Unavailable("fewer than two scenes in which both rock and neither falls")
+            raise figures.Unavailable("fewer than two scenes in which both rock and neither falls")
         return np.log(c.peaks[usable] / r.peaks[usable])
 
 
-def _distributions(samples: Samples, fallen: float) -> tuple[Array, Array]:
+def _distributions(samples: Samples, fallen: float) -> tuple[Floats, Floats]:
     """The peaks of both (alpha), limited to `fallen`, which is also the value of fallen blocks."""
     r, c = (
         np.where(one.fallen, fallen, np.minimum(one.peaks, fallen))
         for one in (samples.reference, samples.candidate)
     )
     if np.any(np.isnan(r)) or np.any(np.isnan(c)):
-        raise Unavailable("a model failed in some of the scenes")
+        raise figures.Unavailable("a model failed in some of the scenes")
     return r, c
 
 
@@ -653,10 +644,10 @@ def _peak_scatter(samples: Samples) -> tuple[float, str]:
     return scatter, f"[{low:.2g}, {high:.2g}]"
 
 
-_agreement = partial(Measure, ideal=1.0, resolution=1e-3)
+_agreement = partial(figures.Measure, ideal=1.0, resolution=1e-3)
 #: The measures of ensembles: functions of `Samples`.
-STATISTICS = by_name(
-    Measure(
+STATISTICS = figures.by_name(
+    figures.Measure(
         "ks_distance",
         "Kolmogorov-Smirnov distance",
         "1",
@@ -667,7 +658,7 @@ STATISTICS = by_name(
         _ks_distance,
         resolution=1e-3,
     ),
-    Measure(
+    figures.Measure(
         "area_metric",
         "area between the distributions",
         "1",
@@ -704,7 +695,7 @@ STATISTICS = by_name(
             two.reference.fallen & two.candidate.fallen, int(np.sum(two.reference.fallen))
         ),
     ),
-    Measure(
+    figures.Measure(
         "peak_bias",
         "bias of peak rotation",
         "1",
@@ -713,7 +704,7 @@ STATISTICS = by_name(
         _peak_bias,
         resolution=1e-4,
     ),
-    Measure(
+    figures.Measure(
         "peak_scatter",
         "scatter of peak rotation",
         "1",

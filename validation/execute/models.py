@@ -10,11 +10,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene
+from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene, errors, printable
 from rockcheck.scenes.base import MOST
-from rockcheck.scenes.errors import one_of, printable
-from rockcheck.validation.execute.pool import Failure, guarded
-from rockcheck.validation.uncertainty.numerical import failed, numerical_uncertainty
+from rockcheck.validation.execute import pool
+from rockcheck.validation.uncertainty import numerical
 
 
 class Model(Protocol):
@@ -127,7 +126,7 @@ def family(name: str) -> Family:
     module, colon, class_name = name.partition(":")
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
-    return FAMILIES[one_of("model", name, FAMILIES)]
+    return FAMILIES[errors.one_of("model", name, FAMILIES)]
 
 
 def engine_names() -> tuple[str, ...]:
@@ -302,16 +301,16 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
 def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:
     """Peak |theta| (alpha) and outcome of each scene; None and the reason where it failed."""
     began = time.perf_counter()
-    found = [guarded(_end_of, work, scene) for scene in scenes]
-    costs = [one[2] for one in found if not isinstance(one, Failure)]
-    ends = [(None, one.reason) if isinstance(one, Failure) else one[:2] for one in found]
+    found = [pool.guarded(_end_of, work, scene) for scene in scenes]
+    costs = [one[2] for one in found if not isinstance(one, pool.Failure)]
+    ends = [(None, one.reason) if isinstance(one, pool.Failure) else one[:2] for one in found]
     record = {
         "peaks": [peak for peak, _ in ends],
         "outcomes": [outcome for _, outcome in ends],
         "cost": {key: sum(getattr(one, key) for one in costs) for key in SUMMED}
         | {"worker_seconds": time.perf_counter() - began},
     }
-    traces = (one.traceback for one in found if isinstance(one, Failure) and one.traceback)
+    traces = (one.traceback for one in found if isinstance(one, pool.Failure) and one.traceback)
     return Played(record, traceback=next(traces, ""))
 
 
@@ -344,7 +343,9 @@ def _numerical(work: Work, scene: Scene, history: History) -> dict[str, Any] | N
     If a coarser run fails, the result is not converged.
     """
     try:
-        found = numerical_uncertainty(build_own(work.family, work.settings), scene, history)
+        found = numerical.numerical_uncertainty(
+            build_own(work.family, work.settings), scene, history
+        )
     except (ModelFailure, InputError) as error:
-        found = failed(history, f"a coarser run failed: {printable(error)}")
+        found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
     return None if found is None else found.model_dump(mode="json")

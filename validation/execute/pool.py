@@ -28,8 +28,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.util import Finalize
 from typing import Any, Self
 
-from rockcheck.scenes.errors import InputError, ModelFailure, printable
-from rockcheck.scenes.progress import announce_by, announced
+from rockcheck.scenes import InputError, ModelFailure, printable, progress
 
 #: One thread a process: the calls are what runs in parallel.
 ONE_THREAD = dict.fromkeys(
@@ -84,7 +83,8 @@ def guarded(function: Callable[..., Any], *arguments: Any) -> Any:
         return Failure("out of memory")
     except Exception as error:  # a task of whatever kind must not end the run
         return Failure(
-            printable(f"{type(error).__name__}: {error}", 300), traceback=traceback.format_exc()
+            printable(f"{type(error).__name__}: {error}", 300),
+            traceback=traceback.format_exc(),
         )
 
 
@@ -149,7 +149,7 @@ class Pool:
             max_workers=self.jobs,
             context=multiprocessing.get_context("spawn"),
             initializer=prepare,
-            initargs=(self.memory_mb, announced()),
+            initargs=(self.memory_mb, progress.announced()),
         )
         try:
             with _interrupts_held():
@@ -293,7 +293,7 @@ def prepare(memory_mb: float | None, announces: bool = False) -> None:
         threading.Thread(target=_follow, args=(run,), daemon=True).start()
     if announces:
         terminal = os.dup(2)
-        announce_by(lambda words: _write(terminal, f"rockcheck: {words}\n"))
+        progress.announce_by(lambda words: _write(terminal, f"rockcheck: {words}\n"))
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
         os.dup2(nowhere, stream)
@@ -407,7 +407,8 @@ def connected(address: str) -> Iterator[Any]:
         client = Client(address, timeout=10)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            f"{printable(address)!r}: no scheduler answers there: {printable(error)}", "--scheduler"
+            f"{printable(address)!r}: no scheduler answers there: {printable(error)}",
+            "--scheduler",
         ) from None
     with client:
         yield client

@@ -20,11 +20,9 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import Scene
+from rockcheck.scenes import Scene, reading, writing
 from rockcheck.scenes.history import events_path
-from rockcheck.scenes.reading import head_of
-from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.execute.models import FAMILIES, family, home
+from rockcheck.validation.execute import models
 
 #: The package whose code counts where it can be reached; the package of the model itself always
 #: does.
@@ -53,8 +51,10 @@ def cell_key(
                 "model": name,
                 "settings": dict(settings),
                 "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
-                "code": code_digest(home(name), search_path),
-                "libraries": {library: version_of(library) for library in family(name).libraries},
+                "code": code_digest(models.home(name), search_path),
+                "libraries": {
+                    library: version_of(library) for library in models.family(name).libraries
+                },
                 "python": platform.python_version(),
                 "machine": platform.machine(),
             },
@@ -78,7 +78,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     cached for later processes, under a hash of all our sources.
     """
     kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
-    known = head_of(kept, 100).strip() if kept else ""
+    known = reading.head_of(kept, 100).strip() if kept else ""
     if re.fullmatch(r"[0-9a-f]{16}", known):
         return known
     found = digest(
@@ -90,7 +90,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     if kept:
         with contextlib.suppress(OSError):
             kept.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            write_whole(kept, found + "\n")
+            writing.write_whole(kept, found + "\n")
             for old in kept.parent.glob("*.txt"):
                 if time.time() - old.stat().st_mtime > _KEPT:
                     old.unlink(missing_ok=True)
@@ -209,7 +209,7 @@ def version_of(library: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
-    libraries = {library for known in FAMILIES.values() for library in known.libraries}
+    libraries = {library for known in models.FAMILIES.values() for library in known.libraries}
     found = {name: version_of(name) for name in sorted(libraries | {"pandas"})}
     return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {
         name: version for name, version in found.items() if version != "absent"

@@ -24,10 +24,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.history import History
-from rockcheck.scenes.reading import read_bytes, read_json, within
-from rockcheck.scenes.writing import made, write_whole
+from rockcheck.scenes import History, InputError, printable, reading, writing
 
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
@@ -59,7 +56,7 @@ class Store:
     def __post_init__(self) -> None:
         try:
             for kind in self.kinds:
-                made(self.folder, kind)
+                writing.made(self.folder, kind)
         except OSError as error:
             raise InputError(
                 f"{printable(self.folder)}: cannot be used as the output folder: {error.strerror}"
@@ -77,7 +74,7 @@ class Store:
         `history` is the content of the files; if given, it stays in memory.
         """
         for suffix, content in files.items():
-            write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
+            writing.write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
         self.put_record(
             HISTORIES,
             name,
@@ -94,7 +91,7 @@ class Store:
         found = self._recent.get(name)
         if found is None:
             for suffix in SUFFIXES:
-                within(self.folder, HISTORIES, f"{name}{suffix}")
+                reading.within(self.folder, HISTORIES, f"{name}{suffix}")
             found = History.load(self.folder / HISTORIES / f"{name}{TABLE}")
         return self._remember(name, found)
 
@@ -113,7 +110,7 @@ class Store:
             return None
         try:
             whole = all(
-                _hash(read_bytes(within(base, f"{name}{suffix}"))) == expected
+                _hash(reading.read_bytes(reading.within(base, f"{name}{suffix}"))) == expected
                 for suffix, expected in files.items()
             )
         except InputError:
@@ -127,13 +124,13 @@ class Store:
             sort_keys=True,
             separators=(",", ":"),
         )
-        write_whole(self.folder / kind / f"{name}.json", text + "\n")
+        writing.write_whole(self.folder / kind / f"{name}.json", text + "\n")
 
     def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
         """The content of a result that is one record; None where it is missing or damaged."""
         try:
-            path = within(self.folder, kind, f"{name}.json")
-            found = read_json(path)
+            path = reading.within(self.folder, kind, f"{name}.json")
+            found = reading.read_json(path)
             content, seal = found["content"], found["sha256"]
             whole = isinstance(content, dict) and seal == _seal(name, content)
         except (InputError, KeyError, TypeError, ValueError, RecursionError):

@@ -6,8 +6,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Literal
 
-from rockcheck.scenes import Floor, Ricker, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Floor, Ricker, Scene, Wall
 
 FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
     6: ("left", 0.3),

@@ -11,12 +11,8 @@ from typing import Any
 
 import tomlkit
 
-from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.reading import read_text
-from rockcheck.scenes.writing import write_whole
-from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, judge
+from rockcheck.scenes import InputError, printable, reading, writing
+from rockcheck.validation.suite import results, suites, tolerances
 
 #: Limit and drift band of a new line: multiples of a difference from the perfect value, and of a
 #: cell's own figure.
@@ -28,7 +24,7 @@ LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
 
 
 def accept(
-    suite: Suite, run: Run, reason: str | None, *, write: bool = True
+    suite: suites.Suite, run: results.Run, reason: str | None, *, write: bool = True
 ) -> tuple[list[str], list[str]]:
     """Write the figures of `run` into the tolerance file of `suite`.
 
@@ -53,17 +49,20 @@ def accept(
 
 
 def _accepted_in(
-    suite: Suite, checks: Iterable[tuple[Cell, Check]], reason: str | None, write: bool
+    suite: suites.Suite,
+    checks: Iterable[tuple[results.Cell, results.Check]],
+    reason: str | None,
+    write: bool,
 ) -> tuple[list[str], list[str]]:
     path, changes, refused = suite.tolerances_path, list[str](), list[str]()
-    document = tomlkit.parse(read_text(path)) if path.exists() else tomlkit.document()
+    document = tomlkit.parse(reading.read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = (
         document.setdefault("tolerances", tomlkit.table()) if path == suite.path else document
     )
     for cell, check in checks:
-        against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
+        against, line = check.figure.against or tolerances.OWN_FIGURES, _accepted(check, reason)
         where = f"[{cell.scene}.{cell.model}.{against}] {check.figure.windowed}"
-        old = {name: getattr(check, name) for name in Tolerance.model_fields}
+        old = {name: getattr(check, name) for name in tolerances.Tolerance.model_fields}
         if isinstance(line, str):
             refused.append(f"{where}: {line}")
         elif line != old:
@@ -78,13 +77,13 @@ def _accepted_in(
             table[check.figure.windowed] = entry
     if write and changes:
         try:
-            write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
+            writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
         except OSError as error:
             raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     return changes, refused
 
 
-def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
+def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     """The new line of a check, or why there is none."""
     value, new = check.figure.value, check.limit is None
     if value is None or not math.isfinite(value) or check.gap:
@@ -101,22 +100,22 @@ def _accepted(check: Check, reason: str | None) -> dict[str, Any] | str:
         "drift": drift,
         "why": why,
     }
-    again = judge(
+    again = tolerances.judge(
         check.figure,
-        Tolerance(**line),
+        tolerances.Tolerance(**line),
         kind=check.kind,
-        measure=MEASURES[check.figure.measure],
+        measure=tolerances.MEASURES[check.figure.measure],
         floor=check.floor,
     )
     return line if again.verdict == "pass" else again.reason
 
 
-def _bounds(check: Check, value: float) -> tuple[float, float]:
+def _bounds(check: results.Check, value: float) -> tuple[float, float]:
     """Limit and drift band of the new line: the old ones, of a better error tighter if need be.
 
     The room of a first line where there is none, or where the limit is exceeded.
     """
-    measure = MEASURES[check.figure.measure]
+    measure = tolerances.MEASURES[check.figure.measure]
     size, at_least = abs(value - (measure.ideal or 0.0)), measure.sense == "at least"
     room, band = (OWN_ROOM, OWN_DRIFT) if measure.ideal is None else (ROOM, DRIFT)
     limit = _round(max(room * size, LEAST_LIMIT * measure.resolution))
@@ -134,10 +133,10 @@ def _bounds(check: Check, value: float) -> tuple[float, float]:
     return limit, drift
 
 
-def _named(check: Check, line: Mapping[str, Any]) -> str:
+def _named(check: results.Check, line: Mapping[str, Any]) -> str:
     if check.limit is None:
         return "new"
-    at_least = MEASURES[check.figure.measure].sense == "at least"
+    at_least = tolerances.MEASURES[check.figure.measure].sense == "at least"
     if line["limit"] < check.limit if at_least else line["limit"] > check.limit:
         return "loosened"
     return "tightened" if check.weighs == "pass" else "moved"

@@ -25,9 +25,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError
 
-from rockcheck.scenes.errors import InputError, from_validation, printable
-from rockcheck.scenes.experience import Trust
-from rockcheck.scenes.reading import read_text
+from rockcheck.scenes import InputError, errors, experience, printable, reading
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.finding import (
     Axis,
@@ -41,8 +39,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.suite.results import Cell, Run, value_of
-from rockcheck.validation.suite.tolerances import MEASURES
+from rockcheck.validation.suite import results, tolerances
 
 #: A figure has moved if it differs by more than this share, and by more than its measure's
 #: resolution.
@@ -75,7 +72,7 @@ class Change(Stored):
         return abs(self.after - self.before) / max(abs(self.before), abs(self.after))
 
 
-def changes(before: Run, after: Run) -> list[Change]:
+def changes(before: results.Run, after: results.Run) -> list[Change]:
     """All differences: verdicts, cells, outcomes, then figures, the largest change first.
 
     Raises `InputError` for runs of two suites.
@@ -100,7 +97,7 @@ def changes(before: Run, after: Run) -> list[Change]:
     return sorted(found, key=lambda change: (order.index(change.what), -change.size))
 
 
-def difference(before: Run, after: Run) -> Finding:
+def difference(before: results.Run, after: results.Run) -> Finding:
     """The finding on the changes between two finished runs of a suite.
 
     Its table has at most `MOST_MOVED` of the figures that moved, its data has all. Exit code 1 if a
@@ -143,7 +140,7 @@ def difference(before: Run, after: Run) -> Finding:
     )
 
 
-def _of_cell(old: Cell, new: Cell) -> Iterator[Change]:
+def _of_cell(old: results.Cell, new: results.Cell) -> Iterator[Change]:
     place = {"scene": old.scene, "model": old.model}
     said: list[dict[tuple[Any, str], str]] = [
         {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
@@ -174,7 +171,7 @@ def _moved(title: str, was: float | None, now: float | None) -> bool:
     """
     if was is None or now is None:
         return was is not now
-    measure = MEASURES.get(re.split("[@ ]", title.rpartition(": ")[2])[0])
+    measure = tolerances.MEASURES.get(re.split("[@ ]", title.rpartition(": ")[2])[0])
     least = measure.resolution if measure else 0.0
     return abs(now - was) > max(least, ROUNDING * max(abs(was), abs(now)))
 
@@ -195,7 +192,7 @@ class Moment(Stored):
     not_passed: tuple[str, ...] = ()
 
 
-def moment_of(run: Run, folder: Path) -> Moment:
+def moment_of(run: results.Run, folder: Path) -> Moment:
     """A run as a line of a history; the suite lies in `folder`."""
     names = [
         (f"{cell.scene}, {cell.model}: {check.figure.title}", check) for cell, check in run.checks()
@@ -257,14 +254,15 @@ def remember(path: Path, moment: Moment) -> list[Moment]:
 def read_history(path: Path) -> list[Moment]:
     """The runs of a history. Raises `InputError`, naming the line, for an unusable line."""
     found = []
-    for n, line in enumerate(read_text(path).splitlines(), 1):
+    for n, line in enumerate(reading.read_text(path).splitlines(), 1):
         if not line.strip():
             continue
         try:
             found.append(Moment.model_validate_json(line))
         except ValidationError as error:
             raise InputError(
-                f"{printable(path)}, line {n}: not a run of a history: {from_validation(error)}"
+                f"{printable(path)}, line {n}: not a run of a history:"
+                f" {errors.from_validation(error)}"
             ) from None
     return found
 
@@ -339,7 +337,7 @@ def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment])
 LEAST, FEWEST = 1e-3, 5
 
 
-def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
+def pairs_of(runs: Iterable[results.Run]) -> dict[str, list[tuple[float, float]]]:
     """Peak rotations (reference's, model's) of all scenes by model, if both allow a ratio.
 
     Both must be finite and larger than `LEAST`. Blocks that fall have no peak: they are left out,
@@ -349,7 +347,11 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     for run in runs:
         # by model, scene and number in its ensemble
         ends = [
-            ((cell.model, cell.scene, 0), cell.outcome, value_of(cell.figures, "peak_rotation"))
+            (
+                (cell.model, cell.scene, 0),
+                cell.outcome,
+                results.value_of(cell.figures, "peak_rotation"),
+            )
             for cell in run.cells
             if cell.status == "done"
         ] + [
@@ -369,12 +371,12 @@ def pairs_of(runs: Iterable[Run]) -> dict[str, list[tuple[float, float]]]:
     return found
 
 
-def trust_in(pairs: Sequence[tuple[float, float]]) -> Trust | None:
+def trust_in(pairs: Sequence[tuple[float, float]]) -> experience.Trust | None:
     """Bias and scatter of (E, M) pairs, see the module; None for fewer than `FEWEST`."""
     if len(pairs) < FEWEST:
         return None
     ratios = np.log([m / e for e, m in pairs])
     scatter = float(np.std(ratios, ddof=1))
-    return Trust(
+    return experience.Trust(
         bias=math.exp(float(np.mean(ratios)) + 0.5 * scatter**2), scatter=scatter, count=len(pairs)
     )

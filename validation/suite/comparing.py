@@ -14,22 +14,19 @@ from typing import Any, NamedTuple, TypeVar
 
 from pydantic import TypeAdapter, field_validator
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.horizon import may_fly, other_laws, predictability_horizon
-from rockcheck.scenes import History, InputError, ModelFailure, Scene
-from rockcheck.scenes.files import UncertainScene
+from rockcheck.ebm import EventBasedModel, predictability_horizon
+from rockcheck.ebm.horizon import may_fly, other_laws
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, files
+from rockcheck.validation.discrepancy import impact_laws
 from rockcheck.validation.discrepancy.compare import compare, describe, too_short
 from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
-from rockcheck.validation.discrepancy.impact_laws import Landing, LawFollowed, parting_landing
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.study import Task
-from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import Cell, CostRecord, value_of
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES
+from rockcheck.validation.suite import motions, results, tolerances
+from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import INPUTS, Explanation, Numerical, explain
-from rockcheck.validation.uncertainty.population import Inputs, propagate
 
 T = TypeVar("T")
 #: Measures judged by the nearest law. Histories are judged up to the horizon, which ends where the
@@ -50,7 +47,7 @@ class Planned(Task):
     model: str
     key: str
     uncertainty: bool = field(default=False, compare=False)
-    ensemble: Ensemble | None = field(default=None, compare=False)
+    ensemble: motions.Ensemble | None = field(default=None, compare=False)
     numbers: range = field(default=range(0), compare=False)
 
     @property
@@ -92,7 +89,7 @@ class CellRecord(Stored):
     settings: dict[str, Any]
     uncertainty: dict[str, float]
     numerical: Numerical | None
-    cost: CostRecord
+    cost: results.CostRecord
 
 
 class BatchRecord(Stored):
@@ -103,7 +100,7 @@ class BatchRecord(Stored):
 
     peaks: tuple[float | None, ...]
     outcomes: tuple[str, ...]
-    cost: CostRecord
+    cost: results.CostRecord
 
 
 class Compared(NamedTuple):
@@ -118,13 +115,13 @@ class ComparisonRecord(Stored):
     """All figures of a cell, its own and those against each reference."""
 
     figures: tuple[Compared, ...]
-    impact_law: LawFollowed | None = None
+    impact_law: impact_laws.LawFollowed | None = None
     overturned_at: float | None = None
 
     @field_validator("figures")
     @classmethod
     def _known(cls, figures: tuple[Compared, ...]) -> tuple[Compared, ...]:
-        if unknown := {one.figure.measure for one in figures} - MEASURES.keys():
+        if unknown := {one.figure.measure for one in figures} - tolerances.MEASURES.keys():
             raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
         return figures
 
@@ -154,26 +151,26 @@ def _of_scene(
     return kept(store, name_of(scene.name, what, key), kind, compute)
 
 
-def inputs_of(store: Store, given: UncertainScene) -> Inputs:
+def inputs_of(store: Store, given: files.UncertainScene) -> population.Inputs:
     """The effect of the spread of a scene's inputs on its figures; kept in the store."""
     return _of_scene(
         store,
         given.scene,
         "inputs",
         "validation.uncertainty.population",
-        Inputs,
-        lambda: propagate(given).inputs,
+        population.Inputs,
+        lambda: population.propagate(given).inputs,
         spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
         correlation=given.correlation.tolist(),
     )
 
 
-def landing_of(store: Store, scene: Scene) -> Landing | None:
+def landing_of(store: Store, scene: Scene) -> impact_laws.Landing | None:
     """The first landing of a scene at which the laws part, None without one; kept in the store."""
 
-    def landing() -> Landing | None:
+    def landing() -> impact_laws.Landing | None:
         with suppress(InputError, ModelFailure):  # it is not a scene for that model
-            return parting_landing(scene)
+            return impact_laws.parting_landing(scene)
         return None
 
     if not may_fly(scene):
@@ -183,7 +180,7 @@ def landing_of(store: Store, scene: Scene) -> Landing | None:
         scene,
         "impact-laws",
         "validation.discrepancy.impact_laws",
-        Landing | None,
+        impact_laws.Landing | None,
         landing,
     )
 
@@ -251,9 +248,16 @@ def compared(
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
     """
     horizon = None  # s; up to it, histories can be compared point by point
-    if any(what.endswith(f"@{HORIZON}") for _, extra in asked.values() for what in extra):
+    if any(
+        what.endswith(f"@{tolerances.HORIZON}") for _, extra in asked.values() for what in extra
+    ):
         horizon = _of_scene(
-            store, scene, HORIZON, "ebm.horizon", float, lambda: predictability_horizon(scene)
+            store,
+            scene,
+            tolerances.HORIZON,
+            "ebm.horizon",
+            float,
+            lambda: predictability_horizon(scene),
         )
     against = [
         [name, reference.key if reference else "", extra]
@@ -299,7 +303,7 @@ def _windows(
     for what in extra:
         name, _, window = what.partition("@")
         found.setdefault(window, []).append(name)
-    ends = {"": None, HORIZON: horizon}
+    ends = {"": None, tolerances.HORIZON: horizon}
     for window, measures in found.items():
         yield window, ends[window] if window in ends else float(window[:-1]), measures
 
@@ -310,10 +314,10 @@ QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
 
 def explanations(
     scene: Scene,
-    cell: Cell,
-    references: Iterable[Cell],
+    cell: results.Cell,
+    references: Iterable[results.Cell],
     scatters: Mapping[str, Mapping[str, float]],
-    inputs: Inputs | None,
+    inputs: population.Inputs | None,
 ) -> Iterator[Explanation]:
     """The verdict on each quantity of a cell against each reference.
 
@@ -347,15 +351,15 @@ def explanations(
             )
 
 
-def _difference(name: str, figures: Sequence[Figure], other: Cell) -> float | None:
+def _difference(name: str, figures: Sequence[Figure], other: results.Cell) -> float | None:
     if name == "theta_rms":
-        return value_of(figures, name, other.model)
-    mine, theirs = value_of(figures, name), value_of(other.figures, name)
+        return results.value_of(figures, name, other.model)
+    mine, theirs = results.value_of(figures, name), results.value_of(other.figures, name)
     return None if mine is None or theirs is None else abs(mine - theirs)
 
 
 def _other_outcome(
-    against: str, mine: Numerical, other: Numerical | None, inputs: Inputs | None
+    against: str, mine: Numerical, other: Numerical | None, inputs: population.Inputs | None
 ) -> Explanation:
     """The verdict on two different outcomes; a falling block's peaks and slips do not compare."""
     reasons = [reason for found in (mine, other) if found for reason in found.reasons]

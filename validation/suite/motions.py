@@ -46,20 +46,29 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
-from rockcheck.scenes import Floor, InputError, Record, Ricker, Scene, Wall
-from rockcheck.scenes.base import Finite, Frozen, NonNegative, Positive
-from rockcheck.scenes.errors import unknown_name
-from rockcheck.scenes.files import UncertainScene, uncertain_scene
-from rockcheck.scenes.recordings import Reading
+from rockcheck.scenes import (
+    Finite,
+    Floor,
+    Frozen,
+    NonNegative,
+    Positive,
+    Record,
+    Ricker,
+    Scene,
+    Wall,
+    errors,
+    files,
+    recordings,
+)
+from rockcheck.scenes.recordings import sets
 from rockcheck.scenes.recordings.recording import Word
-from rockcheck.scenes.recordings.sets import Odd, files_of, motions_of, verticals_of
 
 #: Longest name of a scene, and of the part of it that is the record's.
 _LONGEST, _LONGEST_RECORD = 100, 60
 _Path = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
-class RecordSet(Reading):
+class RecordSet(recordings.Reading):
     """A table `[[records]]`: files, scale of their accelerations, scenes and reading options.
 
     With `vertical` the base also moves vertically, as recorded in the same file or in the one of
@@ -73,19 +82,21 @@ class RecordSet(Reading):
 
 
 def under_records(
-    scenes: Mapping[str, UncertainScene], sets: Sequence[RecordSet], folder: Path
-) -> tuple[dict[str, UncertainScene], list[str]]:
+    scenes: Mapping[str, files.UncertainScene], sets: Sequence[RecordSet], folder: Path
+) -> tuple[dict[str, files.UncertainScene], list[str]]:
     """The scenes, with those of a set once per motion; and the vertical components left out.
 
     A scene is then named `<scene>, <record>`. Raises `InputError` for files that cannot be read,
     and for unknown scenes.
     """
-    found: dict[str, UncertainScene] = {}
+    found: dict[str, files.UncertainScene] = {}
     left_out: list[str] = []
     shaken: set[str] = set()
     for given in sets:
         if unknown := [name for name in given.scenes if name not in scenes]:
-            raise InputError(str(unknown_name("scene", unknown[0], scenes)), "records.scenes")
+            raise errors.InputError(
+                str(errors.unknown_name("scene", unknown[0], scenes)), "records.scenes"
+            )
         motions, others = _motions(given, folder)
         left_out += others
         chosen = given.scenes or tuple(scenes)
@@ -93,7 +104,7 @@ def under_records(
         for name, (label, change) in product(chosen, motions):
             one = _shaken(scenes[name], label, change)
             if one.scene.name in found:
-                raise InputError(
+                raise errors.InputError(
                     f"scene {one.scene.name!r} is named twice: two records have one name",
                     "records.files",
                 )
@@ -105,11 +116,11 @@ def _motions(
     given: RecordSet, folder: Path
 ) -> tuple[list[tuple[str, dict[str, Record]]], list[str]]:
     """The motions of a set by their labels, as what they replace; and what is left out."""
-    files = files_of(given.files, folder)
-    motions, left_out = motions_of(files, given)
-    upward = verticals_of(files, given) if given.vertical else {}
+    files = sets.files_of(given.files, folder)
+    motions, left_out = sets.motions_of(files, given)
+    upward = sets.verticals_of(files, given) if given.vertical else {}
     if given.vertical:
-        left_out = [one for one in left_out if isinstance(one, Odd)]
+        left_out = [one for one in left_out if isinstance(one, sets.Odd)]
     found = []
     for label, (name, across) in zip(_labels([name for name, _ in motions]), motions, strict=True):
         parts = {"excitation": (label, across)}
@@ -125,14 +136,16 @@ def _motions(
     return found, left_out
 
 
-def _shaken(base: UncertainScene, label: str, change: Mapping[str, Record]) -> UncertainScene:
+def _shaken(
+    base: files.UncertainScene, label: str, change: Mapping[str, Record]
+) -> files.UncertainScene:
     """A scene under one motion, horizontal and perhaps vertical.
 
     Spreads of the excitation that it replaces are dropped.
     """
     scene = base.scene
     if base.spreads and not base.independent:
-        raise InputError(
+        raise errors.InputError(
             "correlated numbers cannot be given together with [[records]]", "correlation"
         )
     spreads = {
@@ -142,7 +155,7 @@ def _shaken(base: UncertainScene, label: str, change: Mapping[str, Record]) -> U
     }
     name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
     duration = max(scene.duration, change["excitation"].quiet_after)
-    return uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
+    return files.uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
 
 
 def _labels(names: Sequence[str]) -> list[str]:
@@ -168,9 +181,9 @@ class Distribution(Frozen):
     @model_validator(mode="after")
     def _one(self) -> Distribution:
         if (self.uniform is None) == (self.lognormal is None):
-            raise InputError("give exactly one of uniform, lognormal")
+            raise errors.InputError("give exactly one of uniform, lognormal")
         if self.uniform is not None and self.uniform[0] > self.uniform[1]:
-            raise InputError("the lower end comes first", "uniform")
+            raise errors.InputError("the lower end comes first", "uniform")
         return self
 
     def draw(self, chance: np.random.Generator) -> float:
@@ -184,7 +197,7 @@ class Distribution(Frozen):
 def _bounded(given: Distribution | None, *, positive: bool = False) -> Distribution | None:
     low = given.uniform[0] if given and given.uniform else math.inf
     if low < 0.0 or (positive and low == 0.0):
-        raise InputError(
+        raise errors.InputError(
             f"the lower end must be {'more than 0' if positive else '0 or more'}", "uniform"
         )
     return given
@@ -256,7 +269,7 @@ class Ensemble(Frozen):
     @model_validator(mode="after")
     def _one_motion(self) -> Ensemble:
         if self.pulse is not None and self.noise is not None:
-            raise InputError("cannot be given together with pulse", "noise")
+            raise errors.InputError("cannot be given together with pulse", "noise")
         return self
 
     def drawn(self, base: Scene, number: int) -> Scene:

@@ -25,16 +25,11 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
-from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.errors import from_validation, printable, suggestion
-from rockcheck.scenes.history import Cost
-from rockcheck.scenes.reading import read_json, within
-from rockcheck.scenes.writing import made, write_whole
+from rockcheck.scenes import Cost, InputError, Scene, errors, printable, reading, writing
+from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
-from rockcheck.validation.discrepancy.impact_laws import LawFollowed
-from rockcheck.validation.discrepancy.measures import Sample
+from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
-from rockcheck.validation.uncertainty.population import Inputs
 
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
@@ -151,7 +146,7 @@ class Cell(Stored):
     checks: tuple[Check, ...] = ()
     numerical: Numerical | None = None
     explanations: tuple[Explanation, ...] = ()
-    impact_law: LawFollowed | None = None
+    impact_law: impact_laws.LawFollowed | None = None
 
     @field_validator("history")
     @classmethod
@@ -210,10 +205,10 @@ class EnsembleRecord(Stored):
     outcomes: dict[str, tuple[str, ...]]
 
     @cached_property
-    def samples(self) -> dict[str, Sample]:
+    def samples(self) -> dict[str, measures.Sample]:
         """By model: peaks (alpha, NaN where it failed) and outcomes of all scenes."""
         return {
-            model: Sample(np.array(peaks, dtype=float), self.outcomes[model])
+            model: measures.Sample(np.array(peaks, dtype=float), self.outcomes[model])
             for model, peaks in self.peaks.items()
         }
 
@@ -247,7 +242,7 @@ class Run(Stored):
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()
     #: By scene, the effect of the spread of its inputs on its figures.
-    inputs: dict[str, Inputs] = Field(default_factory=dict)
+    inputs: dict[str, population.Inputs] = Field(default_factory=dict)
     #: Scenes whose figure for a paper is drawn.
     printed: tuple[str, ...] = ()
 
@@ -331,11 +326,13 @@ class Run(Stored):
 
         Makes the folder if need be. Returns the path of `run.json`.
         """
-        write_whole(
-            made(folder) / SCHEMA_FILE,
+        writing.write_whole(
+            writing.made(folder) / SCHEMA_FILE,
             json.dumps(self.model_json_schema(), indent=1, sort_keys=True) + "\n",
         )
-        return write_whole(folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())) + "\n")
+        return writing.write_whole(
+            folder / RUN_FILE, _by_line(json.loads(self.model_dump_json())) + "\n"
+        )
 
     @classmethod
     def load(cls, folder: str | Path) -> Run:
@@ -343,7 +340,7 @@ class Run(Stored):
         path = Path(folder) / RUN_FILE
         if not path.exists():
             raise InputError(f"{printable(path)}: no finished run here")
-        data = read_json(within(path.parent, RUN_FILE))
+        data = reading.read_json(reading.within(path.parent, RUN_FILE))
         if isinstance(data, dict) and data.get("format") != FORMAT:
             found = (
                 f"format {printable(data['format'])}; this version reads {FORMAT}"
@@ -354,7 +351,7 @@ class Run(Stored):
         try:
             run = cls.model_validate(data)
         except ValidationError as error:
-            raise InputError(f"{printable(path)}: {from_validation(error)}") from None
+            raise InputError(f"{printable(path)}: {errors.from_validation(error)}") from None
         for key, names, allowed in (
             ("reference", {run.reference}, {*run.models}),
             ("cells.model", {cell.model for cell in run.cells}, {*run.models}),
@@ -367,7 +364,7 @@ class Run(Stored):
             if unknown := sorted(names - allowed):
                 raise InputError(
                     f"{printable(path)}: {key}: {printable(unknown[0])!r} is not in the"
-                    f" run{suggestion(unknown[0], allowed)}"
+                    f" run{errors.suggestion(unknown[0], allowed)}"
                 )
         return run
 

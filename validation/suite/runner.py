@@ -11,57 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import Scene
-from rockcheck.scenes.progress import OnProgress, unheard
-from rockcheck.scenes.writing import made, write_whole
+from rockcheck.scenes import Scene, progress, writing
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
-from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import (
-    Played,
-    Work,
-    compiles,
-    family,
-    has_wheel,
-    is_own,
-    not_installed,
-)
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import FAULTS, Study, run
-from rockcheck.validation.suite.comparing import (
-    Asked,
-    BatchRecord,
-    CellRecord,
-    Compared,
-    Planned,
-    compared,
-    explanations,
-    inputs_of,
-)
-from rockcheck.validation.suite.motions import Ensemble
-from rockcheck.validation.suite.results import (
-    Cell,
-    Check,
-    CostRecord,
-    EnsembleRecord,
-    Kind,
-    Run,
-    Strict,
-)
-from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import (
-    MEASURES,
-    OWN_FIGURES,
-    Place,
-    floor_of,
-    judge,
-    measure_of,
-)
-from rockcheck.validation.uncertainty import numerical
-from rockcheck.validation.uncertainty.population import Inputs
+from rockcheck.validation.suite import comparing, motions, results, suites, tolerances
+from rockcheck.validation.uncertainty import numerical, population
 
 #: Parts of the cost that add up over the batches of an ensemble.
 ADDED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations", "worker_seconds")
@@ -72,15 +31,15 @@ SHIFTS = (
 
 
 def run_suite(
-    suite: Suite,
+    suite: suites.Suite,
     folder: Path,
     *,
     jobs: int | None = None,
     force: bool = False,
-    strict: Strict = False,
+    strict: results.Strict = False,
     scheduler: str | None = None,
-    on_progress: OnProgress = unheard,
-) -> Run:
+    on_progress: progress.OnProgress = progress.unheard,
+) -> results.Run:
     """Play, compare and judge every cell of a suite; see `validation.study.run`.
 
     A cell that fails is a failed cell of the run, never an exception. Raises `InputError` where
@@ -96,7 +55,7 @@ def run_suite(
     )
     if not found.complete:
         raise KeyboardInterrupt
-    finished: Run = found.data["run"]
+    finished: results.Run = found.data["run"]
     return finished.model_copy(
         update={
             "strict": strict,
@@ -114,30 +73,35 @@ class SuiteStudy(Study):
     name = "suite"
     kinds = (HISTORIES, COMPARISONS)
 
-    def __init__(self, suite: Suite, folder: Path) -> None:
+    def __init__(self, suite: suites.Suite, folder: Path) -> None:
         self.suite, self.store, self.own = suite, Store(folder), suite.owners
         self.memory_mb = max((part.given.limits.memory_mb for part in suite.parts), default=None)
         #: By scene or ensemble, and by model: the cell, or the batches of it.
-        self.planned: dict[str, dict[str, list[Planned]]] = {}
+        self.planned: dict[str, dict[str, list[comparing.Planned]]] = {}
         for scene, variant, ensemble in suite.cells():
             found = list(self._planned(scene, variant, ensemble))
             self.planned.setdefault(found[0].place, {})[variant.label] = found
         self.items = [
-            item for models in self.planned.values() for found in models.values() for item in found
+            item
+            for by_model in self.planned.values()
+            for found in by_model.values()
+            for item in found
         ]
         #: The record of each that has ended, or why it has none.
-        self.ended: dict[Planned, Any] = {
-            item: Failure(missing)
+        self.ended: dict[comparing.Planned, Any] = {
+            item: pool.Failure(missing)
             for item in self.items
-            if (missing := not_installed(item.variant.family))
+            if (missing := models.not_installed(item.variant.family))
         }
         self.playable = in_order([item for item in self.items if item not in self.ended])
-        self.read_back: set[Planned] = set()
+        self.read_back: set[comparing.Planned] = set()
         #: Batches of which some scenes failed without a result.
-        self.traces: set[Planned] = set()
-        self.compared: dict[str, list[Cell]] = {}
+        self.traces: set[comparing.Planned] = set()
+        self.compared: dict[str, list[results.Cell]] = {}
 
-    def _planned(self, scene: Scene, variant: Work, ensemble: Ensemble | None) -> Iterator[Planned]:
+    def _planned(
+        self, scene: Scene, variant: models.Work, ensemble: motions.Ensemble | None
+    ) -> Iterator[comparing.Planned]:
         """A cell, or the batches of an ensemble.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
@@ -156,7 +120,7 @@ class SuiteStudy(Study):
                 for n in (every[k : k + ensemble.batch] for k in every[:: ensemble.batch])
             ]
         for numbers, depends in parts:
-            yield Planned(
+            yield comparing.Planned(
                 scene,
                 variant,
                 variant.label,
@@ -167,10 +131,10 @@ class SuiteStudy(Study):
                 ensemble,
                 numbers,
                 seconds=own.given.limits.seconds,
-                compiles=compiles(kind, variant.settings),
+                compiles=models.compiles(kind, variant.settings),
             )
 
-    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[comparing.Planned]:
         """All cells and batches of models that are installed."""
         return self.playable
 
@@ -183,21 +147,23 @@ class SuiteStudy(Study):
         found = store.get_record(COMPARISONS, task.name) if task.ensemble else store.get(task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            kind = BatchRecord if task.ensemble else CellRecord
+            kind = comparing.BatchRecord if task.ensemble else comparing.CellRecord
             self.ended[task] = kind.model_validate(found)
             self.read_back.add(task)
         return self.ended.get(task)
 
-    def keep(self, store: Store, task: Any, record: Played) -> None:
+    def keep(self, store: Store, task: Any, record: models.Played) -> None:
         """Keep a history or a batch; compare a scene's cells once the last of them is kept.
 
         So scenes are compared while others are still played.
         """
-        kind = BatchRecord if task.ensemble else CellRecord
+        kind = comparing.BatchRecord if task.ensemble else comparing.CellRecord
         self.ended[task] = kind.model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
-            write_whole(made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback)
+            writing.write_whole(
+                writing.made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback
+            )
         elif task.ensemble is None:
             self.store.put(task.name, record.files, record.record, record.history)
             self._compare(task.place)
@@ -205,7 +171,7 @@ class SuiteStudy(Study):
             self.store.put_record(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
-        cells, found = self.planned[scene], dict[str, Cell]()
+        cells, found = self.planned[scene], dict[str, results.Cell]()
         if scene in self.compared or not all(cell in self.ended for (cell,) in cells.values()):
             return
         reference = self.own[scene].given.reference
@@ -216,12 +182,14 @@ class SuiteStudy(Study):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The run, as the data of a finding."""
         suite = self.suite
-        self.ended |= {task: one for task, one in done.items() if isinstance(one, Failure)}
+        self.ended |= {task: one for task, one in done.items() if isinstance(one, pool.Failure)}
         if any(item not in self.ended for item in self.items):
             return Finding(self.name, suite.name, "interrupted", complete=False)
-        inputs = {name: inputs_of(self.store, given) for name, given in suite.uncertain.items()}
-        cells: list[Cell] = []
-        ensembles: list[EnsembleRecord] = []
+        inputs = {
+            name: comparing.inputs_of(self.store, given) for name, given in suite.uncertain.items()
+        }
+        cells: list[results.Cell] = []
+        ensembles: list[results.EnsembleRecord] = []
         for place in self.planned:
             if place in suite.ensembles:
                 record, of_ensemble = self._ensemble(place)
@@ -231,7 +199,7 @@ class SuiteStudy(Study):
                 self._compare(place)
                 cells += self._explained(place, inputs.get(place))
         there = {(cell.scene, cell.model) for cell in cells}
-        finished = Run(
+        finished = results.Run(
             suite=suite.name,
             description=suite.given.description,
             created=datetime.now(UTC).isoformat(timespec="seconds"),
@@ -250,7 +218,7 @@ class SuiteStudy(Study):
             ),
             measures=tuple(
                 MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula)
-                for m in MEASURES.values()
+                for m in tolerances.MEASURES.values()
             ),
             versions=provenance.versions(),
             hardware=provenance.hardware(),
@@ -265,12 +233,12 @@ class SuiteStudy(Study):
             exit_code=finished.exit_code,
         )
 
-    def _about(self, parts: Sequence[Planned], reason: str = "") -> dict[str, Any]:
+    def _about(self, parts: Sequence[comparing.Planned], reason: str = "") -> dict[str, Any]:
         """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
         first, variant = parts[0], parts[0].variant
         status = "failed" if reason else "done"
-        if missing := not_installed(variant.family):
-            status = "absent" if has_wheel(variant.family) else "unavailable"
+        if missing := models.not_installed(variant.family):
+            status = "absent" if models.has_wheel(variant.family) else "unavailable"
         traced = [
             f"{FAULTS}/{part.name}.txt"
             for part in parts
@@ -288,23 +256,27 @@ class SuiteStudy(Study):
             "read_back": all(part in self.read_back for part in parts),
             "traceback": traced[0] if traced else "",
             # in a user's own model an exception is that model's fault, not rockcheck's
-            "unexpected": bool(traced) and not is_own(variant.family),
+            "unexpected": bool(traced) and not models.is_own(variant.family),
         }
 
-    def _cell(self, parts: Sequence[Planned], reference: Cell | None) -> Cell:
+    def _cell(
+        self, parts: Sequence[comparing.Planned], reference: results.Cell | None
+    ) -> results.Cell:
         (planned,), record = parts, self.ended[parts[0]]
-        if isinstance(record, Failure):
-            return Cell(**self._about(parts, record.reason))
+        if isinstance(record, pool.Failure):
+            return results.Cell(**self._about(parts, record.reason))
         scene, own = planned.scene, self.own[planned.place]
         required = own.required(scene.name, planned.model)
-        found = compared(self.store, scene, planned, self._asked(planned, required))
-        floor = partial(floor_of, scene=scene, numerical=record.numerical)
+        found = comparing.compared(self.store, scene, planned, self._asked(planned, required))
+        floor = partial(tolerances.floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
-        same_equations = Place(scene.name, planned.model, own.given.reference, "theta_rms")
+        same_equations = tolerances.Place(
+            scene.name, planned.model, own.given.reference, "theta_rms"
+        )
         if moved and reference and own.kind(same_equations) == "numerical":
             checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
-        return Cell(
+        return results.Cell(
             **self._about(parts)
             | {
                 "settings": record.settings,
@@ -320,12 +292,14 @@ class SuiteStudy(Study):
             }
         )
 
-    def _asked(self, planned: Planned, required: Iterable[Place]) -> dict[str, Asked]:
+    def _asked(
+        self, planned: comparing.Planned, required: Iterable[tolerances.Place]
+    ) -> dict[str, comparing.Asked]:
         """What a cell is compared with: its own figures, and the references that finished."""
-        there: dict[str, Planned | None] = {OWN_FIGURES: None} | {
+        there: dict[str, comparing.Planned | None] = {tolerances.OWN_FIGURES: None} | {
             name: one
             for name, (one,) in self.planned[planned.place].items()
-            if one is not planned and not isinstance(self.ended[one], Failure)
+            if one is not planned and not isinstance(self.ended[one], pool.Failure)
         }
         return {
             name: (
@@ -333,14 +307,15 @@ class SuiteStudy(Study):
                 sorted(
                     p.what
                     for p in required
-                    if p.against == name and ("@" in p.what or measure_of(p.what).on_request)
+                    if p.against == name
+                    and ("@" in p.what or tolerances.measure_of(p.what).on_request)
                 ),
             )
             for name in self.own[planned.place].yardsticks(required)
             if name in there
         }
 
-    def _explained(self, scene: str, inputs: Inputs | None) -> Iterator[Cell]:
+    def _explained(self, scene: str, inputs: population.Inputs | None) -> Iterator[results.Cell]:
         """The cells of a scene with the verdicts on their differences from the references.
 
         Only of those that finished, and whose numerical error is known.
@@ -352,13 +327,13 @@ class SuiteStudy(Study):
         for cell in self.compared[scene]:
             against = {own.given.reference, own.given.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
-            found = explanations(own.scenes[scene], cell, references, scatters, inputs)
+            found = comparing.explanations(own.scenes[scene], cell, references, scatters, inputs)
             yield cell.model_copy(update={"explanations": tuple(found)})
 
-    def _ensemble(self, name: str) -> tuple[EnsembleRecord, list[Cell]]:
+    def _ensemble(self, name: str) -> tuple[results.EnsembleRecord, list[results.Cell]]:
         planned, (ensemble, _) = self.planned[name], self.suite.ensembles[name]
         played = {label: list(map(self._batch, batches)) for label, batches in planned.items()}
-        whole = EnsembleRecord(
+        whole = results.EnsembleRecord(
             name=name,
             description=ensemble.description,
             definition=ensemble.model_dump(mode="json", exclude_none=True),
@@ -372,40 +347,44 @@ class SuiteStudy(Study):
             for label, some in played.items()
         ]
 
-    def _batch(self, planned: Planned) -> BatchRecord:
+    def _batch(self, planned: comparing.Planned) -> comparing.BatchRecord:
         """The record of a batch; of one that failed, each scene has its reason."""
         found, count = self.ended[planned], len(planned.numbers)
-        if isinstance(found, Failure):
-            found = BatchRecord(
-                peaks=(None,) * count, outcomes=(found.reason,) * count, cost=CostRecord()
+        if isinstance(found, pool.Failure):
+            found = comparing.BatchRecord(
+                peaks=(None,) * count, outcomes=(found.reason,) * count, cost=results.CostRecord()
             )
         return found
 
     def _ensemble_cell(
         self,
-        batches: Sequence[Planned],
-        costs: Sequence[CostRecord],
-        samples: Mapping[str, Sample],
-    ) -> Cell:
+        batches: Sequence[comparing.Planned],
+        costs: Sequence[results.CostRecord],
+        samples: Mapping[str, measures.Sample],
+    ) -> results.Cell:
         name, label = batches[0].place, batches[0].model
         mine, reason = samples[label], ""
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
         about = self._about(batches, reason) | {
-            "cost": CostRecord(**{key: sum(getattr(one, key) for one in costs) for key in ADDED})
+            "cost": results.CostRecord(
+                **{key: sum(getattr(one, key) for one in costs) for key in ADDED}
+            )
         }
         if about["status"] != "done":
-            return Cell(**about)
+            return results.Cell(**about)
         own = self.own[name]
         required = own.required(name, label)
         figures = [
-            Compared(evaluate(measure, Samples(samples[other], mine), "alpha", against=other))
+            comparing.Compared(
+                evaluate(measure, measures.Samples(samples[other], mine), "alpha", against=other)
+            )
             for other in own.yardsticks(required)
             if other in samples and other != label
-            for measure in STATISTICS.values()
+            for measure in measures.STATISTICS.values()
         ]
-        return Cell(
+        return results.Cell(
             **about,
             outcome=f"{int(np.sum(mine.fallen))} of {len(mine.peaks)} overturned",
             figures=tuple(one.figure for one in figures),
@@ -414,20 +393,22 @@ class SuiteStudy(Study):
 
 
 def _checks(
-    own: Suite,
-    required: Mapping[Place, Kind],
-    figures: Sequence[Compared],
+    own: suites.Suite,
+    required: Mapping[tolerances.Place, results.Kind],
+    figures: Sequence[comparing.Compared],
     floor: Callable[[Measure], float],
     beside: Mapping[str, float | None] = MappingProxyType({}),
-) -> Iterator[Check]:
+) -> Iterator[results.Check]:
     """The judged figures of a cell; none if its suite judges nothing.
 
     `beside` has the reference's own figures, by "measure@window", where these are yardsticks.
     """
-    known = {(one.figure.against or OWN_FIGURES, one.figure.windowed): one for one in figures}
+    known = {
+        (one.figure.against or tolerances.OWN_FIGURES, one.figure.windowed): one for one in figures
+    }
     for place, kind in required.items() if own.judged else ():
-        line, measure = own.tolerances.get(place), measure_of(place.what)
-        itself = place.against == OWN_FIGURES
+        line, measure = own.tolerances.get(place), tolerances.measure_of(place.what)
+        itself = place.against == tolerances.OWN_FIGURES
         nothing = Figure(  # without a value, so that the check cannot pass
             measure=measure.name,
             label=measure.label,
@@ -437,9 +418,9 @@ def _checks(
             window=place.what.partition("@")[2],
             note="not computed" if itself else f"{place.against} failed in this scene",
         )
-        found = known.get((place.against, place.what), Compared(nothing))
+        found = known.get((place.against, place.what), comparing.Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap
-        yield judge(
+        yield tolerances.judge(
             found.figure,
             line,
             kind=kind,
@@ -450,7 +431,7 @@ def _checks(
         )
 
 
-def as_expected(reference: Cell) -> dict[str, float | None]:
+def as_expected(reference: results.Cell) -> dict[str, float | None]:
     """The reference's own figures by "measure@window", but for those not as expected.
 
     One that is not as expected itself is no yardstick.
@@ -462,7 +443,7 @@ def as_expected(reference: Cell) -> dict[str, float | None]:
     return own
 
 
-def in_order(items: Sequence[Planned]) -> list[Planned]:
+def in_order(items: Sequence[comparing.Planned]) -> list[comparing.Planned]:
     """The order in which cells begin.
 
     First one cell for each compiled code, since the others with that code wait for it; then the
@@ -474,7 +455,7 @@ def in_order(items: Sequence[Planned]) -> list[Planned]:
         items,
         key=lambda item: (
             not item.compiles or first[item.compiles] is not item,
-            family(item.variant.family).compiled != "",
+            models.family(item.variant.family).compiled != "",
             -item.scene.duration * (1 + len(item.scene.walls)),
         ),
     )

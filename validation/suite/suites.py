@@ -61,19 +61,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.base import Frozen, Positive
-from rockcheck.scenes.errors import one_of, printable, unknown_name
-from rockcheck.scenes.files import (
-    UncertainScene,
-    load_uncertain_scene,
-    named_scenes,
-    read_toml,
-    scene_from,
-    uncertain_scene,
-    uncertain_scene_from,
-)
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
+from rockcheck.scenes import Frozen, Positive, Scene, errors, files, printable
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.execute.models import (
     PAPER_MODEL,
     REFERENCE,
@@ -83,8 +72,7 @@ from rockcheck.validation.execute.models import (
     family,
     is_own,
 )
-from rockcheck.validation.suite.motions import Ensemble, RecordSet, under_records
-from rockcheck.validation.suite.results import Kind
+from rockcheck.validation.suite import motions, results
 from rockcheck.validation.suite.tolerances import (
     HORIZON,
     OWN_FIGURES,
@@ -140,11 +128,11 @@ class SuiteFile(Frozen):
     scenes: tuple[str, ...] = ()
     scene: tuple[dict[str, Any], ...] = ()
     grid: tuple[Grid, ...] = ()
-    records: tuple[RecordSet, ...] = ()
+    records: tuple[motions.RecordSet, ...] = ()
     models: dict[str, dict[str, Any]] = Field(default_factory=dict)
     require: Require = Require()
     limits: Limits = Limits()
-    ensemble: tuple[Ensemble, ...] = ()
+    ensemble: tuple[motions.Ensemble, ...] = ()
     tolerances: dict[str, Any] | None = None
     #: Whether the numerical error of each cell is estimated (three coarser runs a cell).
     uncertainty: bool = False
@@ -167,11 +155,11 @@ class Suite:
     #: `[tolerances]`.
     tolerances_path: Path = Path()
     #: Ensembles with the scene that each is drawn from.
-    ensembles: Mapping[str, tuple[Ensemble, Scene]] = field(default_factory=dict)
+    ensembles: Mapping[str, tuple[motions.Ensemble, Scene]] = field(default_factory=dict)
     #: The suites that this one joins.
     included: tuple[Suite, ...] = ()
     #: Scenes with uncertain numbers, by name.
-    uncertain: Mapping[str, UncertainScene] = field(default_factory=dict)
+    uncertain: Mapping[str, files.UncertainScene] = field(default_factory=dict)
     #: Vertical components of its records, which are not played, and whether anything is judged.
     left_out: tuple[str, ...] = ()
     judged: bool = True
@@ -193,7 +181,7 @@ class Suite:
         """The part that each scene or ensemble comes from."""
         return {place: part for part in self.parts for place in (*part.scenes, *part.ensembles)}
 
-    def cells(self) -> Iterator[tuple[Scene, Work, Ensemble | None]]:
+    def cells(self) -> Iterator[tuple[Scene, Work, motions.Ensemble | None]]:
         """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
         for kind in ("scenes", "ensembles"):
             for part in self.parts:
@@ -205,7 +193,7 @@ class Suite:
         """The suite with one cell, and the references that it is compared with."""
         own = self.owners.get(scene, self)
         for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
-            one_of(f"{what} of the suite", name, known)
+            errors.one_of(f"{what} of the suite", name, known)
         tolerances = {
             place: line
             for place, line in own.tolerances.items()
@@ -220,7 +208,7 @@ class Suite:
             tolerances=tolerances,
         )
 
-    def required(self, place: str, model: str) -> dict[Place, Kind]:
+    def required(self, place: str, model: str) -> dict[Place, results.Kind]:
         """The checks of a cell, with their kinds: those required or given a tolerance.
 
         `place` is a scene or an ensemble of this very suite, not of one that it joins.
@@ -245,7 +233,7 @@ class Suite:
         usual = OWN_FIGURES, self.given.reference, self.given.model_form
         return list(dict.fromkeys((*usual, *(place.against for place in checks))))
 
-    def kind(self, place: Place) -> Kind:
+    def kind(self, place: Place) -> results.Kind:
         """The kind of a check.
 
         With a wall, a bouncing floor or an initial height, a model that cannot fly differs in form
@@ -282,20 +270,20 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     shipped = str(source) in known
     path = known[str(source)] if shipped else Path(source)
     if path.suffix.lower() != ".toml":
-        raise InputError(
-            f"{unknown_name('suite', str(source), known)}; or the path of a .toml file"
+        raise errors.InputError(
+            f"{errors.unknown_name('suite', str(source), known)}; or the path of a .toml file"
         )
-    tables = read_toml(path)
+    tables = files.read_toml(path)
     if "block" in tables:
-        raise InputError(
+        raise errors.InputError(
             f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and"
             f" a suite is a file with scenes = [{printable(path.name)!r}], and tables [models.NAME]"
         )
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
-    except InputError as error:
+    except errors.InputError as error:
         told = str(error).startswith((printable(path.parent), f"{printable(path)}: "))
-        raise InputError(str(error) if told else f"{printable(path)}: {error}") from None
+        raise errors.InputError(str(error) if told else f"{printable(path)}: {error}") from None
 
 
 def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
@@ -305,10 +293,12 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
         label: _variant(label, settings, path.parent, allow_code)
         for label, settings in given.models.items()
     }
-    uncertain, left_out = under_records(_scenes(given, path.parent), given.records, path.parent)
+    uncertain, left_out = motions.under_records(
+        _scenes(given, path.parent), given.records, path.parent
+    )
     scenes = {name: found.scene for name, found in uncertain.items()}
     ensembles = {
-        e.name: (e, scene_from(e.scene, folder=path.parent, default_name=e.name))
+        e.name: (e, files.scene_from(e.scene, folder=path.parent, default_name=e.name))
         for e in given.ensemble
     }
     _check_names(given, models, scenes, ensembles)
@@ -319,13 +309,15 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     )
     tables, tolerances_path = given.tolerances, path
     if tables is None:
-        tables, tolerances_path = read_toml(beside) if beside.exists() else {}, beside
+        tables, tolerances_path = files.read_toml(beside) if beside.exists() else {}, beside
     try:
         tolerances = parse_tolerances(tables, _played(scenes, models))
         for at in tolerances:
-            one_of(f"reference of [{at.scene}.{at.model}]", at.against, [OWN_FIGURES, *models])
-    except InputError as error:
-        raise InputError(f"{printable(tolerances_path)}: {error}") from None
+            errors.one_of(
+                f"reference of [{at.scene}.{at.model}]", at.against, [OWN_FIGURES, *models]
+            )
+    except errors.InputError as error:
+        raise errors.InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(
         name=path.stem,
         path=path,
@@ -344,7 +336,7 @@ def scene_suite(
     source: str,
     models: Mapping[str, Mapping[str, Any]],
     *,
-    records: Sequence[RecordSet] = (),
+    records: Sequence[motions.RecordSet] = (),
     allow_code: Container[str] = (),
 ) -> Suite:
     """One scene (a name or a .toml file) by some models, perhaps under records: nothing is judged.
@@ -353,7 +345,7 @@ def scene_suite(
     model without it. User-defined models are looked for in the working folder. Raises `InputError`
     as `load_suite`.
     """
-    known = named_scenes()
+    known = files.named_scenes()
     path = Path(f"{source}.toml" if source in known else source)
     reference = REFERENCE if REFERENCE in models else next(iter(models))
     given = SuiteFile(
@@ -381,7 +373,8 @@ def is_scene(source: str) -> bool:
     """
     path = Path(source)
     return source not in named_suites() and (
-        source in named_scenes() or (path.suffix.lower() == ".toml" and "block" in read_toml(path))
+        source in files.named_scenes()
+        or (path.suffix.lower() == ".toml" and "block" in files.read_toml(path))
     )
 
 
@@ -400,12 +393,14 @@ def _check_names(
         *((n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()),
     ):
         if wrong:
-            raise InputError(said, key)
+            raise errors.InputError(said, key)
     for key, texts in given.require:
-        book = {"figures": FIGURES, "ensemble": STATISTICS}.get(key, DIFFERENCES)
+        book = {"figures": measures.FIGURES, "ensemble": measures.STATISTICS}.get(
+            key, measures.DIFFERENCES
+        )
         for text in texts:
             if measure_of(text).name not in book:
-                raise unknown_name(f"measure of require.{key}", text, book)
+                raise errors.unknown_name(f"measure of require.{key}", text, book)
 
 
 def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
@@ -429,9 +424,11 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
     if twice := [name for name, count in names.items() if count > 1]:
-        raise InputError(f"scene {twice[0]!r} is in two of the suites", "include")
+        raise errors.InputError(f"scene {twice[0]!r} is in two of the suites", "include")
     if others := [one.name for one in included if one.given.reference != first.given.reference]:
-        raise InputError(f"{others[0]} and {first.name} have different references", "include")
+        raise errors.InputError(
+            f"{others[0]} and {first.name} have different references", "include"
+        )
     whole: dict[str, Any] = {
         what: {key: one for suite in included for key, one in getattr(suite, what).items()}
         for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
@@ -469,33 +466,35 @@ def _variant(
         return Work(label=label, family=name, settings=settings)
     try:
         check_allowed(name, allow_code)
-    except InputError as error:
-        raise InputError(error.reason, f"models.{printable(label)}") from None
+    except errors.InputError as error:
+        raise errors.InputError(error.reason, f"models.{printable(label)}") from None
     return Work(label=label, family=name, settings=settings, search_path=(str(folder.absolute()),))
 
 
-def _scenes(given: SuiteFile, folder: Path) -> dict[str, UncertainScene]:
-    found: dict[str, UncertainScene] = {}
+def _scenes(given: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
+    found: dict[str, files.UncertainScene] = {}
     for scene in itertools.chain(
         (
-            load_uncertain_scene(
-                name if name in named_scenes() or Path(name).suffix != ".toml" else folder / name
+            files.load_uncertain_scene(
+                name
+                if name in files.named_scenes() or Path(name).suffix != ".toml"
+                else folder / name
             )
             for name in given.scenes
         ),
         (
-            uncertain_scene_from(table, folder=folder, default_name=f"scene {n}")
+            files.uncertain_scene_from(table, folder=folder, default_name=f"scene {n}")
             for n, table in enumerate(given.scene, 1)
         ),
         (
-            uncertain_scene(scene, {}, {})
+            files.uncertain_scene(scene, {}, {})
             for grid in given.grid
             for scene in _combined(grid, folder)
         ),
     ):
         name = scene.scene.name
         if name in found:
-            raise InputError(f"scene {name!r} is named twice", "scenes")
+            raise errors.InputError(f"scene {name!r} is named twice", "scenes")
         found[name] = scene
     return found
 
@@ -504,10 +503,12 @@ def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
     for choice in itertools.product(*grid.axes):
         for alternative in choice:
             if not isinstance(alternative.get("name"), str):
-                raise InputError("each alternative needs a name", "grid.axes")
+                raise errors.InputError("each alternative needs a name", "grid.axes")
         names = [str(part["name"]) for part in (grid.scene, *choice) if "name" in part]
         table = functools.reduce(_merged, choice, grid.scene)
-        yield scene_from({**table, "name": "-".join(names)}, folder=folder, default_name="scene")
+        yield files.scene_from(
+            {**table, "name": "-".join(names)}, folder=folder, default_name="scene"
+        )
 
 
 def _merged(base: Any, change: Any) -> Any:

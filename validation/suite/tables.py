@@ -5,34 +5,22 @@ import re
 from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.writing import Case, junit_text, markdown_table
-from rockcheck.validation.discrepancy.figures import Figure, value_words
+from rockcheck.scenes import printable, writing
+from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, text
-from rockcheck.validation.suite.results import (
-    MISSING,
-    SEVERITY,
-    Cell,
-    Check,
-    Run,
-    Strict,
-    Verdict,
-    value_of,
-    worst,
-)
-from rockcheck.validation.suite.tolerances import HORIZON, MEASURES, apart
+from rockcheck.validation.suite import results, tolerances
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
 #: Measures whose figure is yes or no.
-YES_NO = {measure.name for measure in MEASURES.values() if measure.yes_no}
+YES_NO = {measure.name for measure in tolerances.MEASURES.values() if measure.yes_no}
 OUTCOMES = (
     "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
     " predictability; in alpha"
 )
 
 
-def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
+def shown(run: results.Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
     """The scenes and ensembles shown one by one, in the suite's order: the worst `most`, or all.
 
     The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are
@@ -46,21 +34,23 @@ def shown(run: Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
     def badness(place: str) -> tuple[int, float]:
         of_place = cells[place].values()
         shares = (used(check) for cell in of_place for check in cell.checks)
-        return SEVERITY.index(worst([cell.verdict for cell in of_place])), max(shares, default=0.0)
+        return results.SEVERITY.index(results.worst([cell.verdict for cell in of_place])), max(
+            shares, default=0.0
+        )
 
     scenes = [place for place in cells if place not in ensembles]
     chosen = ensembles | set(sorted(scenes, key=badness, reverse=True)[:most])
     return tuple(place for place in cells if place in chosen)
 
 
-def not_shown(run: Run) -> list[str]:
+def not_shown(run: results.Run) -> list[str]:
     """A line with the number of scenes that are not `shown`; empty if there are none."""
     more = len(run.by_scene()) - len(shown(run))
     said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
     return [said] if more else []
 
 
-def finding_of(run: Run) -> Finding:
+def finding_of(run: results.Run) -> Finding:
     """A run on a terminal: verdicts, or outcomes if nothing is judged, and why it does not pass."""
     wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
     if not run.judged:
@@ -84,7 +74,7 @@ def finding_of(run: Run) -> Finding:
     return Finding("run", run.suite, f"verdict: {run.words}", blocks)
 
 
-def verdict_table(run: Run) -> Table:
+def verdict_table(run: results.Run) -> Table:
     """A row per cell: the check nearest to its limit, the used share of the limit, the verdict.
 
     Of a large run, the scenes that are `shown`.
@@ -107,7 +97,7 @@ def verdict_table(run: Run) -> Table:
     )
 
 
-def _verdict_row(cell: Cell) -> list[Any]:
+def _verdict_row(cell: results.Cell) -> list[Any]:
     # a yes-or-no measure, or a limit of 0, is never near its limit
     weighed = [
         one
@@ -118,7 +108,7 @@ def _verdict_row(cell: Cell) -> list[Any]:
     unsure = ", not converged" if cell.converged is False else ""
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
     idle = cell.status == "done" and not cell.checks
-    state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
+    state: results.Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
     return [
         cell.model,
         judged if cell.status == "done" else cell.reason or "failed",
@@ -127,13 +117,13 @@ def _verdict_row(cell: Cell) -> list[Any]:
     ]
 
 
-def _limit_used(check: Check) -> float | str:
+def _limit_used(check: results.Check) -> float | str:
     if check.figure.measure in YES_NO:
-        return value_words(check.figure.value, yes_no=True)
+        return figures.value_words(check.figure.value, yes_no=True)
     return "-" if check.words == "no tolerance yet" else used(check)
 
 
-def outcome_tables(run: Run) -> Iterator[Table]:
+def outcome_tables(run: results.Run) -> Iterator[Table]:
     """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
     for scene, cells in run.by_scene().items():
@@ -152,7 +142,7 @@ def outcome_tables(run: Run) -> Iterator[Table]:
         yield Table("outcomes", columns, rows, scene)
 
 
-def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
+def outcome_row(cell: results.Cell, reference: str) -> dict[str, Any]:
     """The result of a cell in plain values; `peak_rotation_alpha` is None for a block that fell."""
     return {
         "scene": cell.scene,
@@ -162,13 +152,13 @@ def outcome_row(cell: Cell, reference: str) -> dict[str, Any]:
         "overturned_at_s": cell.overturned_at,
         "peak_rotation_alpha": None
         if cell.outcome.startswith("overturned")
-        else value_of(cell.figures, "peak_rotation"),
-        "apart_alpha": value_of(cell.figures, "theta_rms", reference, HORIZON),
+        else results.value_of(cell.figures, "peak_rotation"),
+        "apart_alpha": results.value_of(cell.figures, "theta_rms", reference, tolerances.HORIZON),
         "wall_seconds": cell.cost.wall_seconds,
     }
 
 
-def summary(run: Run) -> dict[str, Any]:
+def summary(run: results.Run) -> dict[str, Any]:
     """The verdicts of the run and its cells in plain values, with the reasons of each non-pass.
 
     Where nothing is judged, the outcome of each cell.
@@ -207,13 +197,13 @@ def summary(run: Run) -> dict[str, Any]:
     }
 
 
-def verdict_lines(run: Run) -> Iterator[str]:
+def verdict_lines(run: results.Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.faults
-    absent = {cell.model: cell.reason for cell in run.cells if cell.status in MISSING}
+    absent = {cell.model: cell.reason for cell in run.cells if cell.status in results.MISSING}
     yield from (f"{model}: {reason}" for model, reason in absent.items())
     for cell in run.cells:
-        if cell.status not in MISSING:
+        if cell.status not in results.MISSING:
             yield from cell_lines(cell)
     if run.judged and not any(
         cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks)
@@ -222,7 +212,7 @@ def verdict_lines(run: Run) -> Iterator[str]:
         yield "nothing was judged: no measure that is defined here is required or has a tolerance"
 
 
-def improvements(run: Run) -> Iterator[str]:
+def improvements(run: results.Run) -> Iterator[str]:
     """The figures that are better than expected, a line each."""
     yield from (
         f"{cell.scene}, {cell.model}: {check.figure.title}: {check.reason}"
@@ -231,7 +221,7 @@ def improvements(run: Run) -> Iterator[str]:
     )
 
 
-def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
+def cell_lines(cell: results.Cell, strict: results.Strict = True) -> Iterator[str]:
     """Why a cell does not pass in a run of that strictness, a line each."""
     place = f"{cell.scene}, {cell.model}"
     if cell.status != "done":
@@ -243,7 +233,7 @@ def cell_lines(cell: Cell, strict: Strict = True) -> Iterator[str]:
     )
 
 
-def used(check: Check) -> float:
+def used(check: results.Check) -> float:
     """Share of its limit that a check uses: above 1 only where it is out.
 
     Infinite where that cannot be said. 0 for a check that is not defined, of a yes-or-no measure,
@@ -260,18 +250,18 @@ def used(check: Check) -> float:
     return part if fails else min(1.0, part)
 
 
-def _part(check: Check, value: float, limit: float) -> float:
+def _part(check: results.Check, value: float, limit: float) -> float:
     if check.ideal is None:  # an "at least" measure: the needed share of the value
         return limit / value if value > 0.0 else math.inf
-    role = getattr(MEASURES.get(check.figure.measure), "role", "error")
-    return apart(value, check.ideal, 0.0 if role == "error" else check.floor) / limit
+    role = getattr(tolerances.MEASURES.get(check.figure.measure), "role", "error")
+    return tolerances.apart(value, check.ideal, 0.0 if role == "error" else check.floor) / limit
 
 
-def share(check: Check) -> str:
+def share(check: results.Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
     if figure.measure in YES_NO:
-        return f"{figure.windowed} {value_words(figure.value, yes_no=True)}"
+        return f"{figure.windowed} {figures.value_words(figure.value, yes_no=True)}"
     value = (
         "-"
         if figure.value is None
@@ -283,12 +273,12 @@ def share(check: Check) -> str:
     return f"{figure.windowed} {value} / {limit}"
 
 
-def files_of(run: Run) -> Iterator[Table]:
+def files_of(run: results.Run) -> Iterator[Table]:
     """All checks, a row each; and all figures, judged or not."""
     place = ("scene", "model", "against", "measure", "window", "value", "unit")
     tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
 
-    def row(cell: Cell, figure: Figure) -> list[Any]:
+    def row(cell: results.Cell, figure: figures.Figure) -> list[Any]:
         return [cell.scene, cell.model, *(getattr(figure, name) for name in place[2:])]
 
     yield Table(
@@ -309,24 +299,26 @@ def files_of(run: Run) -> Iterator[Table]:
 MARKS = {"pass": "✅", "incomplete": "⚪", "changed": "🟡", "fail": "❌", "error": "💥"}
 
 
-def junit(run: Run) -> str:
+def junit(run: results.Run) -> str:
     """JUnit XML: a test suite per scene, a test case per check and one for each cell's run.
 
     A failed run is an error. A figure that changed within its limit, and a model that is not
     installed, are failures only in a strict run; a better figure only if the run is strict both
     ways. A check that is not defined is skipped.
     """
-    suites: list[tuple[str, list[Case]]] = [
+    suites: list[tuple[str, list[writing.Case]]] = [
         (scene, [case for cell in cells.values() for case in _cases(cell, run.strict)])
         for scene, cells in run.by_scene().items()
     ]
-    faults: list[Case] = [("tolerances", fault, "failed", fault, "", None) for fault in run.faults]
-    return junit_text(
+    faults: list[writing.Case] = [
+        ("tolerances", fault, "failed", fault, "", None) for fault in run.faults
+    ]
+    return writing.junit_text(
         f"rockcheck {run.suite}", [*suites, *([("tolerances", faults)] if faults else [])]
     )
 
 
-def _cases(cell: Cell, strict: Strict) -> Iterator[Case]:
+def _cases(cell: results.Cell, strict: results.Strict) -> Iterator[writing.Case]:
     place = f"{cell.scene}.{cell.model}"
     came: Mapping[str, Any] = {
         "failed": "error",
@@ -344,7 +336,7 @@ def _cases(cell: Cell, strict: Strict) -> Iterator[Case]:
         yield place, check.figure.title, found, check.reason, check.verdict, None
 
 
-def markdown(run: Run) -> str:
+def markdown(run: results.Run) -> str:
     """A summary for a job's page: the verdict, the reasons, and a table of scenes by models."""
     parts = [
         f"## {MARKS[run.verdict]} rockcheck {_plain(run.suite)}: {run.words}",
@@ -364,11 +356,11 @@ def markdown(run: Run) -> str:
         (_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models))
         for scene in places
     )
-    parts += [markdown_table(("scene", *map(_plain, run.models)), rows), *not_shown(run)]
+    parts += [writing.markdown_table(("scene", *map(_plain, run.models)), rows), *not_shown(run)]
     return "\n\n".join([*parts, *_laws(run, places)]) + "\n"
 
 
-def _laws(run: Run, places: Container[str]) -> Iterator[str]:
+def _laws(run: results.Run, places: Container[str]) -> Iterator[str]:
     """The law of impacts that each model followed, for scenes with a landing at which laws part.
 
     It is not judged.
@@ -386,10 +378,10 @@ def _laws(run: Run, places: Container[str]) -> Iterator[str]:
     )
     if told:
         yield "The law of impacts followed at the first landing at which laws part (not judged):"
-        yield markdown_table(("scene", "landing", *map(_plain, models)), rows)
+        yield writing.markdown_table(("scene", "landing", *map(_plain, models)), rows)
 
 
-def _entry(cell: Cell | None, judged: bool) -> str:
+def _entry(cell: results.Cell | None, judged: bool) -> str:
     if cell is None:
         return ""
     sure = " (not converged)" if cell.converged is False else ""
@@ -400,7 +392,7 @@ def _entry(cell: Cell | None, judged: bool) -> str:
     return f"{MARKS[cell.verdict]} {_plain(worst_of)}{sure}".strip()
 
 
-def _known_and_bad(check: Check) -> tuple[bool, bool, float]:
+def _known_and_bad(check: results.Check) -> tuple[bool, bool, float]:
     return check.verdict == "fail", check.figure.value is not None, used(check)
 
 

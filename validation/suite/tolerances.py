@@ -39,15 +39,14 @@ from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.base import Finite, Frozen, NonNegative
-from rockcheck.scenes.errors import one_of, printable
-from rockcheck.validation.discrepancy.figures import Figure, Measure, between_rows
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES, STATISTICS
-from rockcheck.validation.suite.results import Check, CheckVerdict, Kind
+from rockcheck.scenes import Finite, Frozen, InputError, NonNegative, Scene, errors, printable
+from rockcheck.validation.discrepancy import figures, measures
+from rockcheck.validation.suite import results
 from rockcheck.validation.uncertainty.numerical import Numerical
 
-MEASURES: Mapping[str, Measure] = ChainMap(DIFFERENCES, FIGURES, STATISTICS)
+MEASURES: Mapping[str, figures.Measure] = ChainMap(
+    measures.DIFFERENCES, measures.FIGURES, measures.STATISTICS
+)
 #: The third name of a table of a cell's own figures, in place of a reference model.
 OWN_FIGURES = "figures"
 HORIZON = "horizon"
@@ -57,13 +56,13 @@ EVERY = "*"
 STANDS_FOR = {"angle": "theta_rms", "m": "last_slip", "s": "end_time"}
 
 
-def measure_of(what: str) -> Measure:
+def measure_of(what: str) -> figures.Measure:
     """The measure of "theta_rms", "theta_rms@8s" or "theta_rms@horizon".
 
     Raises `InputError` for an unknown measure or bad window.
     """
     name, at, window = what.partition("@")
-    one_of("measure", name, MEASURES)
+    errors.one_of("measure", name, MEASURES)
     if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
         raise InputError(
             f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
@@ -110,7 +109,7 @@ def parse_tolerances(
             if not isinstance(line, Mapping):
                 raise InputError("must be a table { expected, limit, drift, why }")
             tolerance = Tolerance(**line)
-            if (measure.name in FIGURES) != (place.against == OWN_FIGURES):
+            if (measure.name in measures.FIGURES) != (place.against == OWN_FIGURES):
                 raise InputError(
                     f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}"
                 )
@@ -160,7 +159,7 @@ def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Any]
             raise InputError(f"{printable('.'.join(path))}: must be tables [scene.model.reference]")
 
 
-def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> float:
+def floor_of(measure: figures.Measure, scene: Scene, numerical: Numerical | None) -> float:
     """Smallest meaningful value of a cell's figure, in the measure's unit; 0 for a count.
 
     The largest of the measure's resolution, the run's numerical uncertainty if known, and, for a
@@ -175,20 +174,24 @@ def floor_of(measure: Measure, scene: Scene, numerical: Numerical | None) -> flo
         else []
     )
     p, step = scene.frequency_parameter, scene.output_step
-    rows = between_rows(measure.unit, p, scene.gravity, step) if measure.role == "quantity" else 0.0
+    rows = (
+        figures.between_rows(measure.unit, p, scene.gravity, step)
+        if measure.role == "quantity"
+        else 0.0
+    )
     return max(measure.resolution, rows, next((u for u in known if u is not None), 0.0))
 
 
 def judge(
-    figure: Figure,
+    figure: figures.Figure,
     tolerance: Tolerance | None,
     *,
-    kind: Kind,
-    measure: Measure,
+    kind: results.Kind,
+    measure: figures.Measure,
     gap: str = "",
     floor: float | None = None,
     beside: float | None = None,
-) -> Check:
+) -> results.Check:
     """The verdict on a figure: a missing, infinite or incompletely compared one never passes.
 
     `floor` is the figure's (None: its measure's resolution), `beside` the reference's same figure,
@@ -197,7 +200,7 @@ def judge(
     given = tolerance or Tolerance(limit=0.0)
     least = measure.resolution if floor is None else floor
     value = figure.value
-    verdict: CheckVerdict = "fail"
+    verdict: results.CheckVerdict = "fail"
     if figure.undefined:
         verdict, reason = "not defined", figure.note
     elif value is None or not math.isfinite(value):
@@ -207,7 +210,7 @@ def judge(
     else:
         perfect = measure.ideal if measure.role == "error" else beside
         verdict, reason = _verdict(figure, value, tolerance, measure, least, kind, perfect)
-    return Check(
+    return results.Check(
         figure=figure,
         kind=kind,
         verdict=verdict,
@@ -224,14 +227,14 @@ def judge(
 
 
 def _verdict(
-    figure: Figure,
+    figure: figures.Figure,
     value: float,
     line: Tolerance,
-    measure: Measure,
+    measure: figures.Measure,
     floor: float,
-    kind: Kind,
+    kind: results.Kind,
     perfect: float | None,
-) -> tuple[CheckVerdict, str]:
+) -> tuple[results.CheckVerdict, str]:
     """The verdict by the table at the top of this module, and why the figure is no plain pass.
 
     `perfect`: the value to which a better one is nearer, None where it is not known.
@@ -258,7 +261,9 @@ def _verdict(
     )
 
 
-def _outside(figure: Figure, value: float, line: Tolerance, measure: Measure, moved: float) -> str:
+def _outside(
+    figure: figures.Figure, value: float, line: Tolerance, measure: figures.Measure, moved: float
+) -> str:
     """Why a figure is beyond its limit, empty if not; `moved` is its distance from `expected`."""
     limit, unit = line.limit, "" if figure.unit == "1" else f" {figure.unit}"
     if measure.sense == "at least":

@@ -17,12 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.files import UncertainScene
+from rockcheck.scenes import Floats, InputError, Scene, files
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.discrepancy.measures import CONFIDENCE
 
-Floats = NDArray[np.float64]
 #: Median and dispersion where no lognormal curve fits.
 NO_FIT = math.nan, math.nan
 
@@ -127,7 +125,7 @@ def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Float
         variance = motions / (motions - 1) * ((hits - share * decided) ** 2).sum(axis=0) / runs**2
         effective = np.clip(share * (1.0 - share) / variance, motions, runs)
         count = np.where(variance > 0.0, effective, motions)
-        z2 = NormalDist().inv_cdf(0.5 + 0.5 * CONFIDENCE) ** 2 / count
+        z2 = NormalDist().inv_cdf(0.5 + 0.5 * measures.CONFIDENCE) ** 2 / count
         middle = (share + 0.5 * z2) / (1.0 + z2)
         half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
     return share, middle - half, middle + half
@@ -242,7 +240,7 @@ class Propagated:
 
 
 def propagate(
-    given: UncertainScene,
+    given: files.UncertainScene,
     *,
     model: EventBasedModel | None = None,
     samples: int = SAMPLES,
@@ -271,7 +269,9 @@ def propagate(
     own = play_ensemble([given.scene], model)
     peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
     bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
-    share = binomtest(int(np.sum(fallen)), count).proportion_ci(CONFIDENCE, method="wilson")
+    share = binomtest(int(np.sum(fallen)), count).proportion_ci(
+        measures.CONFIDENCE, method="wilson"
+    )
     return Propagated(
         Inputs(
             samples=count,
@@ -310,7 +310,11 @@ def propagate(
 
 
 def sensitivities(
-    given: UncertainScene, model: EventBasedModel, *, samples: int = SAMPLES, seed: int = _SEED
+    given: files.UncertainScene,
+    model: EventBasedModel,
+    *,
+    samples: int = SAMPLES,
+    seed: int = _SEED,
 ) -> tuple[Sensitivity, ...]:
     """First and total Sobol indices of the peak rotation, largest total first.
 
@@ -343,7 +347,9 @@ def sensitivities(
 
 
 def _ends(values: Floats | list[float]) -> tuple[float, float]:
-    low, high = np.quantile(values, (0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE))
+    low, high = np.quantile(
+        values, (0.5 - 0.5 * measures.CONFIDENCE, 0.5 + 0.5 * measures.CONFIDENCE)
+    )
     return float(low), float(high)
 
 

@@ -24,8 +24,7 @@ from stepping import ROCKS, TILTED, run_at, setting_of
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, ground, guards, modes, motion, series, steps
 from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
-from rockcheck.scenes import Floor, Record, Rest, Ricker, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Wall
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)

@@ -9,7 +9,8 @@ import pytest
 from stepping import block_of, run_at, setting_of
 
 from rockcheck.ebm.core import contact_impacts as ci, impacts
-from rockcheck.ebm.core.names import CONTACTS, Branch, Contact, Found, Landing
+from rockcheck.ebm.core.impacts import Branch, Landing
+from rockcheck.ebm.core.names import CONTACTS, Contact, Found
 from rockcheck.scenes import Block
 
 approx = pytest.approx

@@ -15,6 +15,7 @@ from rockcheck.ebm.core import names
 from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead
 from rockcheck.ebm.core.lanes import LANES
 from rockcheck.scenes import (
+    PAPER_BLOCK,
     Block,
     Floor,
     Record,
@@ -24,14 +25,12 @@ from rockcheck.scenes import (
     Sine,
     Wall,
     compiled,
-    load_scene,
+    files,
+    progress,
 )
-from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.progress import ONE_RUN, within
-from rockcheck.scenes.scene import PAPER_BLOCK
 
 CHOICES = Path(__file__).parents[2] / "data" / "modelling_choices"
-PINNED = read_toml(CHOICES / "index.toml")["choices"]
+PINNED = files.read_toml(CHOICES / "index.toml")["choices"]
 SQUAT = Block(half_width=0.1, half_height=0.05)
 TALL = Block(half_width=0.2, half_height=1.0)
 SETTINGS = (
@@ -284,7 +283,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
 
     monkeypatch.setattr(compiled._Inner, "__call__", watched)
     monkeypatch.setattr(packed, "is_ready", lambda *given: False)
-    with within(ONE_RUN, True):  # which is interpreted, before it is compiled
+    with progress.within(progress.ONE_RUN, True):  # which is interpreted, before it is compiled
         EventBasedModel(pivot="unilateral", tolerance=1e-8).simulate(SCENES["wedged"])
     assert len(seen) > 30
 
@@ -317,5 +316,8 @@ def test_every_modelling_choice_has_a_pinned_scene():
 
 @pytest.mark.parametrize("slug", PINNED)
 def test_a_modelling_choice_is_made_in_its_scene(slug):
-    model, scene = EventBasedModel(**PINNED[slug]["model"]), load_scene(CHOICES / f"{slug}.toml")
+    model, scene = (
+        EventBasedModel(**PINNED[slug]["model"]),
+        files.load_scene(CHOICES / f"{slug}.toml"),
+    )
     assert model.simulate(scene).cost.rules[PINNED[slug]["name"]] > 0

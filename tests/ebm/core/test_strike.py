@@ -11,8 +11,7 @@ from stepping import ROCKS, run_at, setting_of, six
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, settle, strike
 from rockcheck.ebm.core.names import Family, Guard, Pivot, Rule
-from rockcheck.scenes import Floor, Scene, Wall
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Floor, Scene, Wall
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])

@@ -14,14 +14,14 @@ from rockcheck import (
     engines,
 )
 from rockcheck.engines import stepping
-from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.discrepancy.impact_laws import LawFollowed, parting_landing
+from rockcheck.scenes import PAPER_BLOCK
+from rockcheck.validation.discrepancy import impact_laws
 
 UNILATERAL = EventBasedModel(pivot="unilateral")
 
 
-def law_followed(scene: Scene, history: History) -> LawFollowed | None:
-    return (landing := parting_landing(scene)) and landing.followed_by(history, scene)
+def law_followed(scene: Scene, history: History) -> impact_laws.LawFollowed | None:
+    return (landing := impact_laws.parting_landing(scene)) and landing.followed_by(history, scene)
 
 
 def flush_landing(restitution: float, side: str = "left") -> Scene:
@@ -168,7 +168,7 @@ def test_a_tilt_that_is_next_to_nothing_says_which_corner_is_first(
 def test_a_flat_landing_is_told_from_one_without_slip_and_one_that_tips(change, flat) -> None:
     scene = FLAT.replace(**change)
     assert UNILATERAL.simulate(scene).cost.rules.get("flat landing") == flat
-    assert parting_landing(scene) is None
+    assert impact_laws.parting_landing(scene) is None
 
 
 def test_a_block_that_a_wall_has_struck_lands_flat() -> None:
@@ -182,7 +182,7 @@ def test_a_block_that_a_wall_has_struck_lands_flat() -> None:
         excitation=Ricker(amplitude=14.520221522782801, period=0.6777755218716803),
         duration=2.0,
     )
-    landing = parting_landing(scene)
+    landing = impact_laws.parting_landing(scene)
     assert landing.t == pytest.approx(1.8439, abs=scene.output_step)
     soft, stiff = (
         landing.followed_by(ContinuousModel(penetration=depth).simulate(scene), scene)

@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 
 from rockcheck import Event, EventBasedModel, load_scene
-from rockcheck.scenes.observation import observe
-from rockcheck.validation.discrepancy.measured import (
-    Measured,
-    mean_history,
-    read_measured,
-    time_shift,
-)
-from rockcheck.validation.execute.provenance import cell_key
+from rockcheck.scenes import observation
+from rockcheck.validation.discrepancy import measured
+from rockcheck.validation.execute import provenance
+from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
 
 SUITE = """
 reference = "ebm"
@@ -50,7 +45,7 @@ def write(path, head, *columns):
 
 def test_units_of_columns(tmp_path):
     t, head = np.arange(5.0), "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain"
-    history = read_measured(write(tmp_path / "a.csv", head, *[t] * 6), offset=0.25)
+    history = measured.read_measured(write(tmp_path / "a.csv", head, *[t] * 6), offset=0.25)
     expected = {"theta": np.deg2rad(t), "x": 1e-3 * t, "slip_rate": 1e-2 * t, "y": t}
     expected["t"] = 1e-3 * t + 0.25
     assert (history.model, history.channels) == (
@@ -81,15 +76,15 @@ ROWS = "\n0,0,0\n1,1,1\n2,2,2\n"
 def test_faults_are_named(tmp_path, fault_of, written, name, content, fault):
     if content is not None:
         written(name, content)
-    assert fault in str(fault_of(read_measured, tmp_path / name))
+    assert fault in str(fault_of(measured.read_measured, tmp_path / name))
 
 
 def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
     path = written("mine.toml", SUITE)
-    truth = EventBasedModel().simulate(load_suite(path).scenes["tilt"])
+    truth = EventBasedModel().simulate(suites.load_suite(path).scenes["tilt"])
     t, theta = (truth.channels[name][truth.channels["t"] <= 1.6] for name in ("t", "theta"))
     write(tmp_path / "table.csv", "time_s,theta_deg", t + 0.4, np.rad2deg(theta))
-    run = run_suite(load_suite(path), tmp_path / "out", jobs=1)
+    run = run_suite(suites.load_suite(path), tmp_path / "out", jobs=1)
     assert run.cell("other", "table") is None
     assert [
         (check.figure.window, check.kind, check.verdict, check.reason)
@@ -105,7 +100,11 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
         ),
     ]
     write(tmp_path / "table.csv", "time_s,theta_deg", [0.3, 0.9], [0.0, 0.0])
-    assert not run_suite(load_suite(path), tmp_path / "out", jobs=1).cell("tilt", "table").read_back
+    assert (
+        not run_suite(suites.load_suite(path), tmp_path / "out", jobs=1)
+        .cell("tilt", "table")
+        .read_back
+    )
     truth.save(tmp_path / "truth.csv")
     typed(
         *("compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"),
@@ -128,9 +127,12 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     state = np.zeros((301, 6))
     state[:, 2] = np.linspace(0.0, 1.5, 301)
     given = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
-    observe(scene, "measured", state, events=given).save(tmp_path / "a.csv")
-    assert [e.t for e in read_measured(tmp_path / "a.csv", offset=-0.5).event_list] == [-0.3, 2.495]
-    history = Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
+    observation.observe(scene, "measured", state, events=given).save(tmp_path / "a.csv")
+    assert [e.t for e in measured.read_measured(tmp_path / "a.csv", offset=-0.5).event_list] == [
+        -0.3,
+        2.495,
+    ]
+    history = measured.Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
         scene.replace(duration=duration)
     )
     assert (history.outcome, history.overturned_at, [e.t for e in history.event_list]) == (
@@ -148,18 +150,18 @@ def swing(scale=1.0, delay=0.0):
     t = scene.output_times - 1.2 - delay
     state = np.zeros((len(t), 6))
     state[:, 2] = 0.1 * scale * np.exp(-4.0 * t**2) * np.cos(3.0 * t)
-    return observe(scene, "measured", state)
+    return observation.observe(scene, "measured", state)
 
 
 @pytest.mark.parametrize("delay", [0.0, 0.35, 1.0])
 def test_a_shift_in_time_is_found(delay):
-    assert time_shift(swing(), swing(delay=delay)) == pytest.approx(-delay, abs=2e-3)
+    assert measured.time_shift(swing(), swing(delay=delay)) == pytest.approx(-delay, abs=2e-3)
 
 
 def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     truth = swing().peak_rotation
     scales = 1.0 + 0.1 * np.random.default_rng(3).standard_normal((400, 4))
-    means = [mean_history([swing(scale) for scale in repeats]) for repeats in scales]
+    means = [measured.mean_history([swing(scale) for scale in repeats]) for repeats in scales]
     inside = [abs(m.peak_rotation - truth) <= m.uncertainty["peak_rotation"] for m in means]
     assert 0.92 <= np.mean(inside) <= 0.98
 
@@ -171,11 +173,11 @@ FALLS = replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, 
     ("call", "fault"),
     [
         (
-            lambda: Measured(files={}).simulate(load_scene("bookcase")),
+            lambda: measured.Measured(files={}).simulate(load_scene("bookcase")),
             "no measured history of scene 'bookcase'",
         ),
-        (lambda: time_shift(swing(), swing(scale=0.0)), "no rotation"),
-        (lambda: mean_history([swing(), FALLS]), "1 of 2 tests overturn"),
+        (lambda: measured.time_shift(swing(), swing(scale=0.0)), "no rotation"),
+        (lambda: measured.mean_history([swing(), FALLS]), "1 of 2 tests overturn"),
     ],
 )
 def test_what_cannot_be_is_named(fault_of, call, fault):
@@ -186,6 +188,6 @@ def test_other_events_beside_a_measured_history_make_another_cell(tmp_path):
     scene = load_scene("bookcase")
     EventBasedModel().simulate(scene).save(tmp_path / "table.csv")
     given = {"files": {scene.name: str(tmp_path / "table.csv")}}
-    key, events = cell_key(scene, "measured", given), tmp_path / "table.events.csv"
+    key, events = provenance.cell_key(scene, "measured", given), tmp_path / "table.events.csv"
     events.write_text(events.read_text("utf-8").replace("floor", "wall"), "utf-8")
-    assert cell_key(scene, "measured", given) != key
+    assert provenance.cell_key(scene, "measured", given) != key

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from rockcheck import Event, EventBasedModel, Floor, compare, load_scene
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import describe
 from rockcheck.validation.discrepancy.figures import Pair, match_impacts
-from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
-from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite import suites
 
 T = np.linspace(0.0, 10.0, 4001)
 WAVE = 0.3 * np.sin(2 * np.pi * T)
@@ -40,7 +40,7 @@ def test_a_history_agrees_with_itself(made):
     assert {figure.measure: figure.value for figure in found.figures} == pytest.approx(
         {
             measure.name: 10.0 if measure.sense == "at least" else measure.ideal
-            for measure in DIFFERENCES.values()
+            for measure in measures.DIFFERENCES.values()
             if not measure.on_request
         },
         abs=1e-7,
@@ -235,7 +235,9 @@ def test_figures_of_one_history(made):
     theta, events = 0.5 * np.sin(np.pi * T), [impact(1.0), impact(2.0, 0.001), impact(3.0)]
     history = made(theta, T, x=np.linspace(0, 0.1, len(T)), events=events)
     values, y = figures(history), history.channels["y"]
-    assert set(values) == {name for name, measure in FIGURES.items() if not measure.on_request}
+    assert set(values) == {
+        name for name, measure in measures.FIGURES.items() if not measure.on_request
+    }
     expected = {"peak_rotation": 0.5, "last_x": 0.1, "floor_impacts": 2, "highest_hop": 0.0}
     assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-12)
     for name, rise in (("highest_hop", 0.004), ("deepest_penetration", -0.002)):
@@ -299,7 +301,9 @@ def described(scene, measures, **change):
 @pytest.mark.parametrize("name", FORMS)
 def test_the_event_based_model_meets_the_closed_forms_of_its_kind_of_scene(name):
     every = [form for forms in FORMS.values() for form in forms]
-    found = {one.measure: one for one in described(load_suite("engines").scenes[name], every)}
+    found = {
+        one.measure: one for one in described(suites.load_suite("engines").scenes[name], every)
+    }
     assert {form: (found[form].value, "needed" in found[form].note) for form in every} == {
         form: (pytest.approx(0.0, abs=5e-7), False) if form in FORMS[name] else (None, True)
         for form in every
@@ -310,13 +314,13 @@ def test_the_event_based_model_meets_the_closed_forms_of_its_kind_of_scene(name)
 @pytest.mark.parametrize(("friction", "duration"), [(0.2, 0.2), (0.2, 0.25), (0.0, 1.0)])
 def test_a_block_that_still_slides_has_no_place_where_it_stops(name, friction, duration):
     change = {"floor": Floor(friction=friction), "duration": duration}
-    (figure,) = described(load_suite("engines").scenes[name].replace(**change), FORMS[name])
+    (figure,) = described(suites.load_suite("engines").scenes[name].replace(**change), FORMS[name])
     assert figure.undefined
     assert "before the block has stopped" in figure.note
 
 
 def test_a_wrong_history_is_seen():
     (figure,) = described(
-        load_suite("engines").scenes["rocking"], ["quarter_period_error"], gravity=9.8
+        suites.load_suite("engines").scenes["rocking"], ["quarter_period_error"], gravity=9.8
     )
     assert figure.value == pytest.approx(0.5 * 0.01 / 9.81 * 0.733, rel=0.01)

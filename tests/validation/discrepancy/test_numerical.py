@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
-from rockcheck.scenes.observation import observe
-from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
+from rockcheck.scenes import observation
+from rockcheck.validation.uncertainty import numerical
 
 BOOKCASE = Scene(
     name="bookcase",
@@ -41,7 +41,7 @@ class Made:
         theta = 0.5 * alpha * np.sin(t) * self.factor(self.step)
         slip = np.where(t == t[len(t) // 2], self.slid(self.step) * alpha * radius, 0.0)
         made = {"theta": theta, "slip": slip, "y": radius * np.cos(alpha - np.abs(theta))}
-        still = observe(scene, "made", np.zeros((len(t), 6)))
+        still = observation.observe(scene, "made", np.zeros((len(t), 6)))
         rows = self.rows(self.step)
         return replace(
             still,
@@ -51,7 +51,7 @@ class Made:
 
 
 def judged(model, scene=BOOKCASE):
-    return {q.name: q for q in numerical_uncertainty(model, scene).quantities}
+    return {q.name: q for q in numerical.numerical_uncertainty(model, scene).quantities}
 
 
 @pytest.mark.parametrize("order", [0.52, 0.6, 1.0, 2.0, 2.5])
@@ -109,7 +109,7 @@ def test_the_run_at_3h_tells_convergence_from_chance(at, u_num):
 def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
     """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
     given, finer = (Made(lambda step, wrong=wrong: 1.0 + wrong) for wrong in (1e-2, 1e-4))
-    found = numerical_uncertainty(
+    found = numerical.numerical_uncertainty(
         SimpleNamespace(simulate=given.simulate, finer=lambda: finer), BOOKCASE
     )
     assert found.converged
@@ -207,7 +207,9 @@ def test_a_slip_pinned_at_the_gap_is_not_taken_for_sure(name, value_of):
 
 
 def test_an_outcome_that_changes_with_the_step_is_not_converged():
-    found = numerical_uncertainty(Made(lambda h: 1.0, falls=lambda h: h > 3.5e-3), BOOKCASE)
+    found = numerical.numerical_uncertainty(
+        Made(lambda h: 1.0, falls=lambda h: h > 3.5e-3), BOOKCASE
+    )
     assert ({(q.verdict, q.u_num) for q in found.quantities}, found.converged, found.reasons) == (
         {("not converged", None)},
         False,
@@ -216,7 +218,7 @@ def test_an_outcome_that_changes_with_the_step_is_not_converged():
 
 
 def test_a_model_without_a_step_is_not_judged():
-    assert numerical_uncertainty(object(), BOOKCASE) is None
+    assert numerical.numerical_uncertainty(object(), BOOKCASE) is None
 
 
 def test_the_interval_covers_as_often_as_it_says():
@@ -245,7 +247,7 @@ def test_event_based_and_continuous_models_are_within_their_own_error(model):
         excitation=Ricker(amplitude=3.0, period=1.0), floor=Floor(friction=0.6), duration=4.0
     )
     truth = EventBasedModel(pivot="unilateral", tolerance=1e-13).simulate(scene)
-    found, history = numerical_uncertainty(model, scene), model.simulate(scene)
+    found, history = numerical.numerical_uncertainty(model, scene), model.simulate(scene)
     error = abs(history.peak_rotation - truth.peak_rotation) / BOOKCASE.block.alpha
     assert found.converged
     assert error <= found.u_num("peak_rotation") + 1e-12

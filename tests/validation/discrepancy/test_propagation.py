@@ -7,21 +7,15 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
-from rockcheck.scenes.files import Spread, uncertain_scene
-from rockcheck.validation.uncertainty.population import (
-    SAMPLES,
-    Inputs,
-    Interval,
-    propagate,
-    sensitivities,
-)
+from rockcheck.scenes import files
+from rockcheck.validation.uncertainty import population
 
 BLOCK = Block(half_width=0.3, half_height=1.0)
 NORMAL = 1.959964
 
 
 ALPHA = BLOCK.alpha
-FRICTION = {"floor.friction": Spread(low=0.9, high=1.1)}
+FRICTION = {"floor.friction": files.Spread(low=0.9, high=1.1)}
 
 
 def tilted(tilt, correlations=None, duration=1.0, given=None):
@@ -34,8 +28,8 @@ def tilted(tilt, correlations=None, duration=1.0, given=None):
         initial_rotation=tilt * ALPHA,
     )
     if given is None:
-        given = {"initial_rotation": Spread(value=tilt * ALPHA, sd=0.05 * ALPHA)} | FRICTION
-    return uncertain_scene(scene, given, correlations or {})
+        given = {"initial_rotation": files.Spread(value=tilt * ALPHA, sd=0.05 * ALPHA)} | FRICTION
+    return files.uncertain_scene(scene, given, correlations or {})
 
 
 def span(one):
@@ -43,7 +37,7 @@ def span(one):
 
 
 def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
-    found = propagate(tilted(0.5), indices=False)
+    found = population.propagate(tilted(0.5), indices=False)
     inputs = found.inputs
     peak = pytest.approx((0.5, 0.5 - 0.05 * NORMAL, 0.5 + 0.05 * NORMAL), abs=2e-3)
     assert [(one.name, one.unit, span(one)) for one in inputs.figures] == [
@@ -53,12 +47,12 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
     sure = [inputs.u_input(name) for name in ("peak_rotation", "end_time")]
     assert (sure, inputs.samples, inputs.model, inputs.sensitivities) == (
         [pytest.approx(0.05 * NORMAL, abs=2e-3), None],
-        SAMPLES,
+        population.SAMPLES,
         "ebm-unilateral",
         (),
     )
     assert not found.fallen.any()
-    wilson = NORMAL**2 / (SAMPLES + NORMAL**2)
+    wilson = NORMAL**2 / (population.SAMPLES + NORMAL**2)
     assert span(inputs.overturns) == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
     # At the start the bands are the quantiles of a normal number.
     assert found.bands[:, 0] == pytest.approx(
@@ -71,19 +65,21 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
 
 @pytest.mark.parametrize("value", [0.5, 0.7])
 def test_a_figure_lies_within_its_farther_end(value):
-    one = Interval(name="a", unit="", value=value, low=0.4, high=0.8)
-    assert Inputs(
+    one = population.Interval(name="a", unit="", value=value, low=0.4, high=0.8)
+    assert population.Inputs(
         samples=2, model="", names=(), figures=(one,), overturns=one, sensitivities=()
     ).u_input("a") == pytest.approx(0.3)
 
 
-@pytest.mark.parametrize(("asked", "drawn"), [(33, 64), (2, 2), (SAMPLES, SAMPLES)])
+@pytest.mark.parametrize(
+    ("asked", "drawn"), [(33, 64), (2, 2), (population.SAMPLES, population.SAMPLES)]
+)
 def test_draws_of_sobol_are_balanced(asked, drawn):
-    assert propagate(tilted(0.5), samples=asked, indices=False).inputs.samples == drawn
+    assert population.propagate(tilted(0.5), samples=asked, indices=False).inputs.samples == drawn
 
 
 def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
-    found = propagate(
+    found = population.propagate(
         tilted(1.0, duration=6.0), model=EventBasedModel(tolerance=1e-8), indices=False
     ).inputs
     assert span(found.overturns) == (
@@ -101,25 +97,31 @@ def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
 
 @pytest.mark.parametrize(("tilt", "all_fall"), [(1.05, False), (1.3, True)])
 def test_where_the_scenes_own_block_falls_nothing_is_said_of_a_slip(tilt, all_fall):
-    drawn = propagate(tilted(tilt, duration=3.0), samples=64, indices=False)
+    drawn = population.propagate(tilted(tilt, duration=3.0), samples=64, indices=False)
     names = [one.name for one in drawn.inputs.figures]
     assert (drawn.fallen.all(), names) == (all_fall, ["peak_rotation"])
 
 
 def test_what_the_peak_does_not_depend_on_has_no_index():
-    found = propagate(tilted(0.5), samples=64).inputs
+    found = population.propagate(tilted(0.5), samples=64).inputs
     assert found.note == ""
     assert {one.name: (one.first, one.total) for one in found.sensitivities} == {
         "initial_rotation": pytest.approx((1.0, 1.0), abs=0.05),
         "floor.friction": pytest.approx((0.0, 0.0), abs=0.02),
     }
-    assert sensitivities(tilted(0.5, given=FRICTION), EventBasedModel(), samples=16) == ()
+    assert (
+        population.sensitivities(tilted(0.5, given=FRICTION), EventBasedModel(), samples=16) == ()
+    )
 
 
 def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
-    assert "no number of this scene is uncertain" in str(fault_of(propagate, tilted(0.5, given={})))
+    assert "no number of this scene is uncertain" in str(
+        fault_of(population.propagate, tilted(0.5, given={}))
+    )
 
 
 def test_correlated_inputs_have_no_indices_and_a_note_says_so():
-    found = propagate(tilted(0.5, {"initial_rotation, floor.friction": 0.5}), samples=64).inputs
+    found = population.propagate(
+        tilted(0.5, {"initial_rotation, floor.friction": 0.5}), samples=64
+    ).inputs
     assert (found.sensitivities, "correlated" in found.note) == ((), True)

@@ -20,16 +20,10 @@ from rockcheck import (
     load_scene,
 )
 from rockcheck.ebm.batch import pack, run_batch
-from rockcheck.scenes.experience import Range, axes_of, expected, outside
-from rockcheck.scenes.files import load_uncertain_scene
-from rockcheck.validation.suite.across import trust_in
-from rockcheck.validation.suite.comparing import explanations
-from rockcheck.validation.suite.results import Cell
+from rockcheck.scenes import experience, files
+from rockcheck.validation.suite import across, comparing, results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.tables import markdown
-from rockcheck.validation.uncertainty import numerical
-from rockcheck.validation.uncertainty.population import Inputs, Interval, propagate, sensitivities
+from rockcheck.validation.uncertainty import numerical, population
 
 BOOKCASE = Scene(
     name="bookcase",
@@ -81,7 +75,7 @@ def uncertain(written):
 
 
 def test_a_scene_file_says_what_is_not_known(uncertain):
-    given = load_uncertain_scene(uncertain)
+    given = files.load_uncertain_scene(uncertain)
     assert load_scene(uncertain) == given.scene
     assert given.names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
     values = given.values(np.random.default_rng(1).random((20000, 3)))
@@ -120,13 +114,13 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
 )
 def test_faults_of_the_file_are_one_line(written, fault_of, old, new, said):
     assert said in str(
-        fault_of(load_uncertain_scene, written("shelf.toml", UNCERTAIN.replace(old, new)))
+        fault_of(files.load_uncertain_scene, written("shelf.toml", UNCERTAIN.replace(old, new)))
     )
 
 
 @pytest.mark.slow
 def test_sobol_indices_agree_with_brute_force(written):
-    given = load_uncertain_scene(written("bookcase.toml", FIVE))
+    given = files.load_uncertain_scene(written("bookcase.toml", FIVE))
     model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
     chance = np.random.default_rng(5)
 
@@ -138,7 +132,7 @@ def test_sobol_indices_agree_with_brute_force(written):
 
     points = chance.random((100_000, len(given.names)))
     found = peaks(points)
-    shares = {row.name: (row.first, row.total) for row in sensitivities(given, model)}
+    shares = {row.name: (row.first, row.total) for row in population.sensitivities(given, model)}
     for k, name in enumerate(given.names):
         inside = [found[(points[:, k] * 50).astype(int) == n] for n in range(50)]
         noise = np.mean([np.var(one, ddof=1) / len(one) for one in inside])
@@ -152,10 +146,10 @@ def test_sobol_indices_agree_with_brute_force(written):
 def test_the_interval_of_the_share_that_falls_covers(uncertain):
     """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as
     often as they should: some fall, and count as 1, so that only its lower end leaves draws out."""
-    given = load_uncertain_scene(uncertain)
-    many = propagate(given, samples=8192, seed=99, indices=False).inputs
+    given = files.load_uncertain_scene(uncertain)
+    many = population.propagate(given, samples=8192, seed=99, indices=False).inputs
     peak = many.figures[0]
-    few = [propagate(given, samples=32, seed=seed, indices=False) for seed in range(60)]
+    few = [population.propagate(given, samples=32, seed=seed, indices=False) for seed in range(60)]
     shares = [one.inputs.overturns for one in few]
     assert np.mean([one.low <= many.overturns.value <= one.high for one in shares]) >= 0.9
     assert peak.high == 1.0
@@ -191,12 +185,12 @@ def test_bias_and_scatter_are_recovered_and_cover():
     chance = np.random.default_rng(2)
     truth = chance.uniform(0.1, 0.9, 4000)
     model = 1.1 * truth * np.exp(0.05 * chance.standard_normal(4000) - 0.5 * 0.05**2)
-    trust = trust_in(list(zip(truth[:2000], model[:2000], strict=True)))
+    trust = across.trust_in(list(zip(truth[:2000], model[:2000], strict=True)))
     assert (trust.bias, trust.scatter) == (
         pytest.approx(1.1, rel=5e-3),
         pytest.approx(0.05, rel=0.05),
     )
-    ranges = [expected(trust, value) for value in model[2000:]]
+    ranges = [experience.expected(trust, value) for value in model[2000:]]
     inside = [one.low <= e <= one.high for e, one in zip(truth[2000:], ranges, strict=True)]
     assert 0.93 <= np.mean(inside) <= 0.97
 
@@ -222,10 +216,13 @@ def test_nothing_is_claimed_for_settings_that_the_suites_do_not_have(model, clai
 
 
 def test_the_domain_names_the_axis_that_leaves_it():
-    inside = {axis: Range(low=min(v), high=max(v)) for axis, v in axes_of(BOOKCASE).items()}
+    inside = {
+        axis: experience.Range(low=min(v), high=max(v))
+        for axis, v in experience.axes_of(BOOKCASE).items()
+    }
     slippery = BOOKCASE.replace(floor=Floor(friction=0.9))
     said = ["friction is 0.9; the suites cover 0.3 to 0.3"]
-    assert [outside(one, inside) for one in (BOOKCASE, slippery)] == [[], said]
+    assert [experience.outside(one, inside) for one in (BOOKCASE, slippery)] == [[], said]
 
 
 # --- in a suite
@@ -247,7 +244,7 @@ time_step = 4e-3
 
 def test_a_suite_explains_its_differences(uncertain, written, tmp_path):
     suite = written("suite.toml", SUITE)
-    run, again = (run_suite(load_suite(suite), tmp_path / "out", jobs=1) for _ in range(2))
+    run, again = (run_suite(suites.load_suite(suite), tmp_path / "out", jobs=1) for _ in range(2))
     cells = {cell.model: cell for cell in run.cells}
     assert (cells["cm"].converged, cells["coarse"].converged) == (True, False)
     said = {e.quantity: e for e in cells["cm"].explanations if e.against == "ebm-unilateral"}
@@ -255,17 +252,17 @@ def test_a_suite_explains_its_differences(uncertain, written, tmp_path):
     assert said["theta_rms"].u_input > 0.0
     assert {e.verdict for e in cells["coarse"].explanations} == {numerical.NOT_CONVERGED}
     assert run.inputs["shelf"].names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
-    assert "not converged" in markdown(run)
+    assert "not converged" in tables.markdown(run)
     read_back = [cell.explanations for cell in again.cells]
     assert (again.up_to_date, read_back) == (4, [cell.explanations for cell in run.cells])
 
 
-FALL_IN_PART = Inputs(
+FALL_IN_PART = population.Inputs(
     samples=64,
     model="ebm-unilateral",
     names=("floor.friction",),
     figures=(),
-    overturns=Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4),
+    overturns=population.Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4),
     sensitivities=(),
 )
 
@@ -276,7 +273,7 @@ FALL_IN_PART = Inputs(
 def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, verdict):
     outcome = numerical.Quantity(name="outcome", unit="", value="", verdict="converged")
     own, other = (
-        Cell(
+        results.Cell(
             scene="s",
             model="ebm",
             status="done",
@@ -285,7 +282,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, verdict):
         )
         for ends in ("at rest", "overturned left")
     )
-    (found,) = explanations(BOOKCASE, own, [other], {}, inputs)
+    (found,) = comparing.explanations(BOOKCASE, own, [other], {}, inputs)
     assert (found.verdict.startswith(verdict), found.u_val) == (True, 0.0)
 
 

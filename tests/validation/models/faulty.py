@@ -7,9 +7,7 @@ import time
 
 import numpy as np
 
-from rockcheck.scenes import Event, History, ModelFailure, Scene
-from rockcheck.scenes.base import Frozen
-from rockcheck.scenes.observation import observe
+from rockcheck.scenes import Event, Frozen, History, ModelFailure, Scene, observation
 
 
 class Still(Frozen):
@@ -21,7 +19,7 @@ class Still(Frozen):
         state = np.zeros((len(scene.output_times), 6))
         state[:, 1] = scene.block.half_height
         state[:, 2] = self.offset
-        return observe(scene, "still", state)
+        return observation.observe(scene, "still", state)
 
 
 class NotFinite(Frozen):
@@ -73,7 +71,7 @@ class Falls(Frozen):
         state = np.zeros((len(t), 6))
         state[:, 1] = scene.block.half_height
         state[:, 2] = np.minimum(t, 2.0)
-        return observe(
+        return observation.observe(
             scene,
             "falls",
             state,

@@ -61,10 +61,10 @@ def agree(monkeypatch):
         for name, value in {
             "CANDIDATES": models,
             "MAP_SIZE": map_size,
-            "not_installed": lambda model: "",
             "PLAYED_SHARE": {"dart": 0.2, "drake": 0.2},
         }.items():
             monkeypatch.setattr(agreement, name, value)
+        monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda model: "")
         book = Answers(letter)
         return agreement.agree(book, spectra, Request(20), 40), book.played
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from rockcheck import load_scene
-from rockcheck.scenes.files import Spread, UncertainScene
+from rockcheck.scenes import files
 from rockcheck.validation.discrepancy.compare import Motion
 from rockcheck.validation.finding import Mark, Text
 from rockcheck.validation.studies.population.answers import Assessment, Found, finding_of
 from rockcheck.validation.studies.population.runs import LAW, Played, Ran, Sure
-from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
+from rockcheck.validation.uncertainty import numerical
 
 
 def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
@@ -20,14 +20,14 @@ def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
 
 
 def sure(u_num, **more):
-    peak = Quantity(
+    peak = numerical.Quantity(
         name="peak_rotation",
         unit="alpha",
         value=0.2,
         u_num=u_num,
         verdict="not converged" if u_num is None else "converged",
     )
-    return Sure(numerical=Numerical(method="by hand", quantities=(peak,)), **more)
+    return Sure(numerical=numerical.Numerical(method="by hand", quantities=(peak,)), **more)
 
 
 RUNS = {
@@ -46,7 +46,9 @@ ENDS = {"a": 4.0, "b": 2.0, "c": 1.0}
 
 def found_of(cases, own, samples=0, **more):
     scene = load_scene("fig5a")
-    given = UncertainScene(scene, {"floor.friction": Spread(value=0.4, sd=0.04)}, np.eye(1))
+    given = files.UncertainScene(
+        scene, {"floor.friction": files.Spread(value=0.4, sd=0.04)}, np.eye(1)
+    )
     asked = {"models": ("ebm-unilateral", "cm"), "gaps": (0.0, 0.1), "sides": ("right",)}
     return finding_of(
         Found(

@@ -11,7 +11,7 @@ import pytest
 from dask.distributed import LocalCluster
 
 from rockcheck import Event, EventBasedModel, Record, load_scene
-from rockcheck.scenes.files import load_uncertain_scene
+from rockcheck.scenes import files
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.compare import motion_of, wall_speeds
 from rockcheck.validation.finding import Text
@@ -206,7 +206,7 @@ def test_a_gap_on_a_side_without_a_wall_puts_one_there(assess):
 
 def test_a_gap_that_was_not_played_is_not_called_safe(folder):
     """As where Ctrl-C ended the runs, or all of them failed; nor is such a run called unsure."""
-    own = load_uncertain_scene(folder / "cabinet.toml")
+    own = files.load_uncertain_scene(folder / "cabinet.toml")
     study = Assessment(own=own, cases={"cabinet": own}, gaps=(0.05, 0.1), sides=("right",))
     found = study.gather({task: task.play() for task in study.parts["shown"]["cabinet"]})
     assert (found.data["gaps"], found.exit_code) == ([], 0)
@@ -265,7 +265,7 @@ def test_a_model_that_knows_no_floor_that_bounces_ends_with_3(assess, words):
 
 
 def test_the_records_are_judged_by_what_the_suites_cover_and_not_what_they_replace(folder):
-    own = load_uncertain_scene(folder / "cabinet.toml")
+    own = files.load_uncertain_scene(folder / "cabinet.toml")
     record = noise(0)
     shaken = {
         name: replace(own, scene=own.scene.replace(excitation=record.scaled(most / record.peak)))
@@ -282,7 +282,7 @@ def notes_of(found):
 
 def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monkeypatch):
     monkeypatch.setattr("rockcheck.validation.studies.population.runs.MOST_RUNS", 4)
-    own = load_uncertain_scene(folder / "uncertain.toml")
+    own = files.load_uncertain_scene(folder / "uncertain.toml")
     study = Assessment(own=own, cases=dict.fromkeys("abc", own), samples=8, recorded=True)
     done = {task: task.play() for case in study.cases for task in study.parts["shown"][case]}
     assert study.gather(done).data["runs"] == 3, "no draws: each as it is"

@@ -15,9 +15,8 @@ from junitparser import JUnitXml
 
 from rockcheck import InputError, ModelFailure, MuJoCo, engines, load_scene
 from rockcheck.commands.cli import main
-from rockcheck.scenes.writing import json_text
-from rockcheck.validation.execute.models import engine_names, not_installed
-from rockcheck.validation.execute.pool import guarded
+from rockcheck.scenes import writing
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
 from rockcheck.validation.studies.conformance.study import (
     KNOBS,
@@ -32,12 +31,12 @@ from rockcheck.validation.studies.conformance.study import (
 )
 
 RIGHT, CONVEX = MuJoCo(time_step=1e-3), MuJoCo(time_step=1e-3, cone_correction=False)
-HERE = [name for name in engine_names() if not not_installed(name)]
+HERE = [name for name in models.engine_names() if not models.not_installed(name)]
 
 
 def played(player):
     conformance = Conformance((player,))
-    return conformance.gather({t: guarded(Conformance.play, t) for t in conformance.tasks({})})
+    return conformance.gather({t: pool.guarded(Conformance.play, t) for t in conformance.tasks({})})
 
 
 def verdicts(found, *wanted):
@@ -49,7 +48,7 @@ def verdicts(found, *wanted):
 def planted(monkeypatch):
     def gather(play):
         monkeypatch.setattr(
-            "rockcheck.validation.studies.conformance.study.build_own",
+            "rockcheck.validation.execute.models.build_own",
             lambda *_: SimpleNamespace(simulate=play),
         )
         return played(Player("planted", "best", 1e-3, "planted:Planted", {}, "1"))
@@ -184,12 +183,12 @@ def test_what_goes_wrong_in_a_scene_costs_what_needs_it(planted, histories):
 
 def test_what_changed_between_versions(planted, histories, written, tmp_path):
     run = planted(lambda scene: histories[scene.name]).as_dict()
-    path = written("run.json", json_text(run))
+    path = written("run.json", writing.json_text(run))
     assert changes(tmp_path, path).table("changes").rows == []
     rows = run["tables"]["rows"]
     rows[0] |= {"version": "2", "value": 2.0, "verdict": "fail"}
     rows[8] |= {"value": rows[8]["value"] + 0.5 * rows[8]["limit"]}
-    newer = written("newer.json", json_text(run))
+    newer = written("newer.json", writing.json_text(run))
     found = changes(tmp_path, newer)
     wanted = ("id", "verdict_before", "verdict_after", "version_before", "version_after", "worse")
     assert [tuple(row[name] for name in wanted) for row in found.table("changes").records()] == [

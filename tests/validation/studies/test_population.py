@@ -20,9 +20,8 @@ from rockcheck import (
     Wall,
     load_scene,
 )
-from rockcheck.scenes.files import UncertainScene
-from rockcheck.scenes.recordings import Recording
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.scenes import files, recordings
+from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.population.answers import Assessment
 from rockcheck.validation.studies.population.study import (
@@ -33,7 +32,7 @@ from rockcheck.validation.studies.population.study import (
     ida,
     measure_of,
 )
-from rockcheck.validation.uncertainty.population import curve_of, fit_lognormal
+from rockcheck.validation.uncertainty import population
 
 SCENE = Scene(
     name="rack",
@@ -49,10 +48,10 @@ TOML = (
 )
 
 
-def motion(gain: float, rate: float = 3.0) -> Recording:
+def motion(gain: float, rate: float = 3.0) -> recordings.Recording:
     t = 0.02 * np.arange(200)
     samples = gain * np.sin(rate * t) * np.exp(-0.2 * t)
-    return Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
+    return recordings.Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
 
 
 MOTIONS = [("H1", motion(1.0)), ("H2", motion(2.5, 5.0)), ("H3", motion(0.3, 2.0))]
@@ -159,8 +158,8 @@ def test_measures_have_the_units_of_engineers(name, unit):
 def test_what_failed_says_nothing_and_ends_the_command_so():
     study = ida(SCENE, MOTIONS, LEVELS, capacities=[1.0])
     done, whole = played(study)
-    done[list(done)[-1]] = Failure("did not end")
-    own = UncertainScene(SCENE, {}, np.eye(0))
+    done[list(done)[-1]] = pool.Failure("did not end")
+    own = files.UncertainScene(SCENE, {}, np.eye(0))
     part = Assessment(own=own, cases={"rack": own}, levels=study).gather(done)
     assert part.exit_code == 3
     names = [{row[0] for row in found.table("ida").rows} for found in (whole, part)]
@@ -239,7 +238,7 @@ def test_a_set_that_is_none_is_refused(asked, said):
 def test_the_lognormal_curve_is_found_again():
     intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
     counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
-    assert fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
+    assert population.fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
         (2.5, 0.4), rel=1e-3
     )
 
@@ -248,7 +247,7 @@ def test_a_curve_is_found_where_few_overturn_and_none_where_shares_do_not_rise()
     counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
     intensities = np.linspace(0.02, 2.0, 40)
     found, *none = (
-        fit_lognormal(intensities, one, np.full(40, 12))
+        population.fit_lognormal(intensities, one, np.full(40, 12))
         for one in (counts, counts[::-1], 0 * counts, np.full(40, 12))
     )
     assert found == (pytest.approx(2.15, abs=0.25), pytest.approx(0.35, abs=0.15))
@@ -260,10 +259,10 @@ def test_a_fitted_median_lies_inside_its_interval():
     is none."""
     hit = np.array([[[True] * 6] * 2, [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
     never = np.zeros_like(hit)
-    curve = curve_of("made", hit, never, LEVELS, 200)
+    curve = population.curve_of("made", hit, never, LEVELS, 200)
     chance = np.random.default_rng(8)
     draws = [hit[chance.integers(3, size=3)].sum(axis=(0, 1)) for _ in range(400)]
-    medians = [fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
+    medians = [population.fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
     assert [curve.low, curve.high] == pytest.approx(
         np.nanquantile(medians, [0.025, 0.975]).tolist(), rel=0.2
     )
@@ -271,13 +270,15 @@ def test_a_fitted_median_lies_inside_its_interval():
     assert [point[4] for point in curve.points] == pytest.approx(
         norm.cdf(np.log(LEVELS / curve.median) / curve.dispersion).tolist()
     )
-    assert math.isnan(curve_of("made", ~never, never, LEVELS, 200).low)
+    assert math.isnan(population.curve_of("made", ~never, never, LEVELS, 200).low)
 
 
 def test_the_band_holds_the_binomial_spread():
     hit = np.zeros((100, 2, 3), dtype=bool)
     hit[:50, :, 1] = hit[:, :, 2] = True  # directions alike: no more is known than from 100 runs
-    none, half, _ = curve_of("made", hit, np.zeros_like(hit), np.array([1.0, 2.0, 3.0])).points
+    none, half, _ = population.curve_of(
+        "made", hit, np.zeros_like(hit), np.array([1.0, 2.0, 3.0])
+    ).points
     assert half[1:4] == pytest.approx([0.5, 0.5 - 1.96 * 0.05, 0.5 + 1.96 * 0.05], abs=0.015)
     assert none[1:4] == pytest.approx(
         [0.0, 0.0, 3.8415 / 103.8415], rel=1e-4
@@ -299,7 +300,7 @@ def test_the_band_covers_as_often_as_it_says(motions, shared):
         alone = math.sqrt(0.4**2 - shared**2) * chance.standard_normal((motions, 2))
         capacity = 1.5 * np.exp(shared * chance.standard_normal((motions, 1)) + alone)
         hit = intensities > capacity[:, :, None]
-        points = np.array(curve_of("", hit, np.zeros_like(hit), intensities).points)
+        points = np.array(population.curve_of("", hit, np.zeros_like(hit), intensities).points)
         inside.append((points[:, 2] <= truth) & (truth <= points[:, 3]))
     assert np.mean(inside) >= 0.94
     assert np.min(np.mean(inside, axis=0)) >= 0.9
@@ -314,7 +315,7 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
     some[2:, :, 1] = some[0, 0, 2] = True
     all_at_2 = some | (np.arange(3) == 1)
     plain, curve, nowhere, nothing = (
-        curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
+        population.curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
         for failed in (np.zeros_like(hit), some, all_at_2, np.ones_like(hit))
     )
     assert [[point[1] for point in one.points] for one in (plain, curve, nowhere)] == [

@@ -22,7 +22,7 @@ from rockcheck import (
     overturning_spectrum,
 )
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.spectrum.study import KEPT_AN_AXIS, Spectra
 from rockcheck.validation.studies.spectrum.tiles import (
@@ -30,7 +30,6 @@ from rockcheck.validation.studies.spectrum.tiles import (
     PARTS,
     Book,
     Request,
-    build,
     differing,
     nodes_of,
 )
@@ -90,7 +89,7 @@ def test_tiles_make_the_spectrum_of_one_batch(tmp_path, monkeypatch):
 
 def test_a_task_that_failed_leaves_its_nodes_undecided():
     study = Spectra((PANELS["figure-8-gap-3-e-0"],), Request(4))
-    done = {study.tasks({})[0]: Failure("crashed")}
+    done = {study.tasks({})[0]: pool.Failure("crashed")}
     spectrum = Book(done).spectrum(study.panels[0], study.request)
     found = (len(spectrum.undecided), spectrum.safe_area, study.gather(done).exit_code)
     assert found == (16, 0.0, 3)
@@ -151,7 +150,7 @@ def test_motions_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path):
     assert (len(nodes), nodes[0], nodes[-1]) == (KEPT_AN_AXIS**2, [0, 0], [19, 19])
     rows = np.frombuffer(base64.b64decode(played["rows"]), "<f4").reshape(-1, 4)
     parts = np.split(rows.astype(float), played["ends"][:-1])
-    model = build("ebm", study.request.settings)
+    model = models.build("ebm", study.request.settings)
     for number in (0, 1, 100, 255):
         i, j = nodes[number]
         node = study.request.amplitudes[i], study.request.frequencies[j]

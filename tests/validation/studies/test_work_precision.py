@@ -8,8 +8,7 @@ import pandas as pd
 import pytest
 
 from rockcheck.reports.document import publish
-from rockcheck.validation.execute.models import not_installed
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.work_precision.runs import (
     DURATION,
     FAMILIES,
@@ -185,7 +184,7 @@ def test_quantiles_are_those_of_the_sample_and_failed_runs_infinitely_wrong(good
 
 def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not_timed():
     tasks = [task for task in WorkPrecision("models").tasks({}) if isinstance(task, Play)]
-    lines = [line for line in LINES.values() if not not_installed(line.model)]
+    lines = [line for line in LINES.values() if not models.not_installed(line.model)]
     settings = sum(len(line.values) for line in lines)
     assert len(set(tasks)) == len(tasks) == MEMBERS * len(FAMILIES) * settings
     assert {task for task in tasks if task.where == "worker"} == {
@@ -198,9 +197,7 @@ def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not
     [("drake", {name for name in WALLS if not name.endswith("e 0.5")}), ("mujoco", set(WALLS))],
 )
 def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch, line, scenes):
-    monkeypatch.setattr(
-        "rockcheck.validation.studies.work_precision.study.not_installed", lambda model: ""
-    )
+    monkeypatch.setattr("rockcheck.validation.execute.models.not_installed", lambda model: "")
     tasks = [task for task in WorkPrecision("convergence").tasks({}) if isinstance(task, Play)]
     assert {task.family for task in tasks if task.line == line} == scenes
     assert len(WALLS) == len(PULSES) * len(GAPS) * len(RESTITUTIONS) == 18
@@ -213,7 +210,7 @@ def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch, line, s
         for line in LINES.values()
         for scene in TWO_WALLS
         if line.converge
-        and not not_installed(line.model)
+        and not models.not_installed(line.model)
         and (line.label, scene) != ("drake", TWO_WALLS[0])  # Drake has no restitution
     ],
 )
@@ -273,7 +270,7 @@ def test_the_finding_holds_every_table(tmp_path):
     )
     done: dict[object, object] = {
         **{task: task.play() for task in tasks},
-        Play("free", 0, "pybullet", 1e-2): Failure("it blew up <fast>"),
+        Play("free", 0, "pybullet", 1e-2): pool.Failure("it blew up <fast>"),
         Measure("batch", "friction"): batch_times("friction", 6),
         Measure("size", "3", 20): [batch_size(20, 3)],
         Measure("saving", "made"): [Saving("cm", "wall", "ms", 2.0, 1.0)],

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
+from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.measures import STATISTICS, Sample, Samples
+from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
 
 OWN = [
     f"faulty:{name}" for name in ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
@@ -50,7 +50,7 @@ overturning_accuracy = { expected = 1.0, limit = 0.0, drift = 0.0, why = "none f
 
 @pytest.fixture
 def loaded(written, faulty):
-    return lambda text=SUITE: load_suite(written("mine.toml", text), allow_code=OWN)
+    return lambda text=SUITE: suites.load_suite(written("mine.toml", text), allow_code=OWN)
 
 
 def test_scenes_are_drawn_alike_whatever_the_count(loaded):
@@ -68,8 +68,11 @@ def test_scenes_are_drawn_alike_whatever_the_count(loaded):
 
 
 def test_the_order_of_blocks_that_hardly_rock_is_no_distance():
-    still, noise = (Sample(np.full(10, size), ["at rest"] * 10) for size in (1e-12, 1e-9))
-    assert STATISTICS["ks_distance"].evaluate(Samples(still, noise)) == (0.0, "p = 1")
+    still, noise = (measures.Sample(np.full(10, size), ["at rest"] * 10) for size in (1e-12, 1e-9))
+    assert measures.STATISTICS["ks_distance"].evaluate(measures.Samples(still, noise)) == (
+        0.0,
+        "p = 1",
+    )
 
 
 def test_noise_has_the_spectrum_that_it_states(loaded):
@@ -90,9 +93,9 @@ def test_noise_has_the_spectrum_that_it_states(loaded):
 
 def test_statistics_of_a_sample_against_itself():
     peaks = np.exp(0.3 * np.random.default_rng(3).standard_normal(4000) - 1.5)
-    sample = Sample(peaks, tuple(np.where(peaks > 0.4, "overturned left", "at rest")))
-    same = Samples(sample, sample)
-    assert {name: measure.evaluate(same)[0] for name, measure in STATISTICS.items()} == {
+    sample = measures.Sample(peaks, tuple(np.where(peaks > 0.4, "overturned left", "at rest")))
+    same = measures.Samples(sample, sample)
+    assert {name: measure.evaluate(same)[0] for name, measure in measures.STATISTICS.items()} == {
         "ks_distance": 0.0,
         "area_metric": 0.0,
         "overturning_accuracy": 1.0,
@@ -104,14 +107,22 @@ def test_statistics_of_a_sample_against_itself():
 
 
 def test_statistics_of_known_outcomes():
-    reference = Sample(np.ones(4), ("overturned left", "at rest", "moving", "overturned right"))
-    other = Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving"))
+    reference = measures.Sample(
+        np.ones(4), ("overturned left", "at rest", "moving", "overturned right")
+    )
+    other = measures.Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving"))
     names = ("overturning_accuracy", "overturning_precision", "overturning_recall", "ks_distance")
-    found = [STATISTICS[name].evaluate(Samples(reference, other))[0] for name in names]
+    found = [
+        measures.STATISTICS[name].evaluate(measures.Samples(reference, other))[0] for name in names
+    ]
     assert found == [0.5, 0.5, 0.5, 0.0]
-    lost = Sample(np.array([1.0, math.nan, math.inf, 1.0]), ("moving", "", *reference.outcomes[:2]))
+    lost = measures.Sample(
+        np.array([1.0, math.nan, math.inf, 1.0]), ("moving", "", *reference.outcomes[:2])
+    )
     assert (lost.failures, list(lost.fallen)) == (2, [False, False, True, False])
-    unknown = evaluate(STATISTICS["ks_distance"], Samples(reference, lost), "alpha")
+    unknown = evaluate(
+        measures.STATISTICS["ks_distance"], measures.Samples(reference, lost), "alpha"
+    )
     assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
 
@@ -148,17 +159,17 @@ def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
         ["[crowd.near.still] ks_distance", "[crowd.near.still] overturning_accuracy"],
         [],
     )
-    accepted = load_suite(tmp_path / "mine.toml", allow_code=OWN)
+    accepted = suites.load_suite(tmp_path / "mine.toml", allow_code=OWN)
     assert run_suite(accepted, tmp_path / "out", jobs=0).cell("crowd", "near").verdict == "pass"
 
 
 def samples(
     reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()
-) -> Samples:
+) -> measures.Samples:
     """Peaks of both; in the scenes `fallen` the candidate falls."""
     ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
-    safe = Sample(np.array(reference), ("at rest",) * len(reference))
-    return Samples(safe, Sample(np.array(candidate), ends))
+    safe = measures.Sample(np.array(reference), ("at rest",) * len(reference))
+    return measures.Samples(safe, measures.Sample(np.array(candidate), ends))
 
 
 @pytest.mark.parametrize(
@@ -196,7 +207,7 @@ def test_what_no_scene_can_have_is_refused_at_once(loaded, fault_of, old, new, s
 def test_the_fallen_are_beyond_all_others(reference, apart):
     """Two of four rock less than any of the reference and two fall: the distributions part by a
     half; as peaks of 0 by the whole. Peaks of rounding are 0."""
-    value, remark = STATISTICS["ks_distance"].evaluate(
+    value, remark = measures.STATISTICS["ks_distance"].evaluate(
         samples(reference, [0.05, 0.06, 0.1, 0.2], fallen=(2, 3))
     )
     assert value == pytest.approx(apart)
@@ -210,13 +221,13 @@ def test_bias_and_scatter_by_student_and_chi_squared():
     ratios = np.log(np.array(candidate) / reference)
     bias = np.mean(ratios)
     interval = ttest_1samp(ratios, 0.0).confidence_interval(0.95)
-    assert STATISTICS["peak_bias"].evaluate(samples(reference, candidate)) == (
+    assert measures.STATISTICS["peak_bias"].evaluate(samples(reference, candidate)) == (
         pytest.approx(bias),
         f"[{interval.low:.2g}, {interval.high:.2g}], 4 scenes",
     )
     scatter = np.sqrt(np.sum((ratios - bias) ** 2) / 3.0)
     # chi-squared with 3 degrees of freedom has its 2.5 % and 97.5 % points at 0.2158 and 9.3484
-    assert STATISTICS["peak_scatter"].evaluate(samples(reference, candidate)) == (
+    assert measures.STATISTICS["peak_scatter"].evaluate(samples(reference, candidate)) == (
         pytest.approx(scatter),
         f"[{scatter * np.sqrt(3.0 / 9.3484):.2g}, {scatter * np.sqrt(3.0 / 0.2158):.2g}]",
     )
@@ -230,7 +241,7 @@ def test_only_scenes_in_which_both_rock_have_a_ratio():
 
 @pytest.mark.parametrize("name", ["peak_bias", "peak_scatter"])
 def test_of_fewer_than_two_ratios_there_is_no_bias_and_no_scatter(name):
-    found = evaluate(STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
+    found = evaluate(measures.STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
     assert (found.value, found.note) == (
         None,
         "fewer than two scenes in which both rock and neither falls",
@@ -244,26 +255,26 @@ def test_shares_have_wilsons_interval():
     middle = (p + z * z / (2 * n)) / (1 + z * z / n)
     half = z / (1 + z * z / n) * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
     assert {
-        name: STATISTICS[f"overturning_{name}"].evaluate(one_falls)
+        name: measures.STATISTICS[f"overturning_{name}"].evaluate(one_falls)
         for name in ("accuracy", "recall")
     } == {
         "accuracy": (0.75, f"[{middle - half:.3f}, {middle + half:.3f}], 3 of 4"),
         "recall": (1.0, "none fall"),
     }
-    assert STATISTICS["overturning_precision"].evaluate(one_falls)[0] == 0.0
+    assert measures.STATISTICS["overturning_precision"].evaluate(one_falls)[0] == 0.0
 
 
 def test_what_a_statistic_tells_apart():
     shares = {"ks_distance", "overturning_accuracy", "overturning_precision", "overturning_recall"}
-    assert {name: one.resolution for name, one in STATISTICS.items()} == {
-        name: 1e-3 if name in shares else 1e-4 for name in STATISTICS
+    assert {name: one.resolution for name, one in measures.STATISTICS.items()} == {
+        name: 1e-3 if name in shares else 1e-4 for name in measures.STATISTICS
     }
 
 
 BIAS, SCATTER, AGREE = 0.05, 0.2, 0.9
 
 
-def made_up(chance) -> Samples:
+def made_up(chance) -> measures.Samples:
     """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no
     ratio."""
     peaks = chance.uniform(0.2, 0.8, 60)
@@ -271,7 +282,9 @@ def made_up(chance) -> Samples:
     other = np.where(outcomes == "at rest", "overturned left", "at rest")
     theirs = np.where(chance.random(60) < AGREE, outcomes, other)
     ratios = np.exp(BIAS + SCATTER * chance.standard_normal(60))
-    return Samples(Sample(peaks, list(outcomes)), Sample(peaks * ratios, list(theirs)))
+    return measures.Samples(
+        measures.Sample(peaks, list(outcomes)), measures.Sample(peaks * ratios, list(theirs))
+    )
 
 
 @pytest.mark.parametrize(
@@ -281,7 +294,7 @@ def made_up(chance) -> Samples:
 def test_the_interval_in_the_remark_covers(name, truth):
     chance, inside = np.random.default_rng(11), 0
     for _ in range(600):
-        _, remark = STATISTICS[name].evaluate(made_up(chance))
+        _, remark = measures.STATISTICS[name].evaluate(made_up(chance))
         low, high = map(float, re.match(r"\[(-?[\d.e-]+), (-?[\d.e-]+)\]", remark).groups())
         inside += low <= truth <= high
     assert 0.92 <= inside / 600 <= 0.98

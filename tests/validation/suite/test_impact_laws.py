@@ -5,13 +5,10 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.validation.execute.models import Work
+from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite.comparing import by_any, landing_of, under_other_laws
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite import comparing, results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.tables import markdown, summary
 
 FLAT = "moreau or leading-first"
 # Under "moreau" the first block stays and under "floor-first" it falls; the second stands beside no
@@ -75,7 +72,7 @@ def suite_file(tmp_path_factory, block):
 
 @pytest.fixture(scope="module")
 def run(suite_file):
-    return run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
+    return run_suite(suites.load_suite(suite_file), suite_file.parent / "out", jobs=0)
 
 
 @pytest.mark.parametrize(
@@ -119,30 +116,32 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law_and_histories_until_th
 
 
 def test_the_summary_names_the_laws_and_nothing_depends_on_them(run, suite_file, tmp_path):
-    assert "not judged" in markdown(run)
-    laws = {(one["scene"], one["model"]): one["impact_law"] for one in summary(run)["cells"]}
+    assert "not judged" in tables.markdown(run)
+    laws = {(one["scene"], one["model"]): one["impact_law"] for one in tables.summary(run)["cells"]}
     assert (laws["of the law", "mujoco"], laws["plastic", "mujoco"]) == ("closed", None)
     silent = tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)
     untold = run.model_copy(update={"cells": silent})
-    assert "not judged" not in markdown(untold)
+    assert "not judged" not in tables.markdown(untold)
     assert untold.verdict == run.verdict
     run.save(tmp_path)
-    assert Run.load(tmp_path) == run
-    again = run_suite(load_suite(suite_file), suite_file.parent / "out", jobs=0)
+    assert results.Run.load(tmp_path) == run
+    again = run_suite(suites.load_suite(suite_file), suite_file.parent / "out", jobs=0)
     assert [(cell.read_back, cell.figures) for cell in again.cells] == [
         (True, cell.figures) for cell in run.cells
     ]
 
 
 def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file, tmp_path, monkeypatch):
-    scene, store = load_suite(suite_file).scenes["of the law"], Store(tmp_path)
-    first = landing_of(store, scene)
+    scene, store = suites.load_suite(suite_file).scenes["of the law"], Store(tmp_path)
+    first = comparing.landing_of(store, scene)
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
-        patched.setattr("rockcheck.validation.suite.comparing.parting_landing", lambda scene: None)
-        assert landing_of(store, scene) == first
+        patched.setattr(
+            "rockcheck.validation.discrepancy.impact_laws.parting_landing", lambda scene: None
+        )
+        assert comparing.landing_of(store, scene) == first
     store.put_record(COMPARISONS, kept.stem, {"kept": {"t": 1.0}})
-    assert landing_of(store, scene) == first
+    assert comparing.landing_of(store, scene) == first
 
 
 @pytest.mark.parametrize(
@@ -155,16 +154,18 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file, tmp_path
     ],
 )
 def test_only_a_reference_with_a_law_to_choose_has_another(suite_file, name, others):
-    suite = load_suite(suite_file)
-    model = suite.models.get(name, Work(label="paper", family="ebm", settings={}))
-    assert list(under_other_laws(suite.scenes["of the law"], model)) == others
+    suite = suites.load_suite(suite_file)
+    model = suite.models.get(name, models.Work(label="paper", family="ebm", settings={}))
+    assert list(comparing.under_other_laws(suite.scenes["of the law"], model)) == others
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file):
-    scene = load_suite(suite_file).scenes["of the law"]
+    scene = suites.load_suite(suite_file).scenes["of the law"]
     one, other = (
         EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
         for law in ("moreau", "floor-first")
     )
-    found = by_any(one, one, {"floor-first": other}, scene, ["outcome_agrees", "peak_ratio"])
+    found = comparing.by_any(
+        one, one, {"floor-first": other}, scene, ["outcome_agrees", "peak_ratio"]
+    )
     assert [(figure.value, gap) for figure, gap, _ in found] == [(1.0, ""), (1.0, "")]

@@ -8,12 +8,9 @@ from pathlib import Path
 import pytest
 
 from rockcheck import Block, Floor, Rest, Scene, compare
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.suite.across import _moved
-from rockcheck.validation.suite.results import Cell, Check, Run
-from rockcheck.validation.suite.tables import improvements, junit, used, verdict_lines
-from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, floor_of, judge
-from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
+from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.suite import across, results, tables, tolerances
+from rockcheck.validation.uncertainty import numerical
 
 SCENE = Scene(
     name="s",
@@ -28,24 +25,26 @@ SCENE = Scene(
 def check(
     measure: str,
     value: float | None,
-    line: Tolerance | None,
+    line: tolerances.Tolerance | None,
     *,
     kind: str = "numerical",
     note: str = "",
     **more: float,
-) -> Check:
-    figure = Figure(measure=measure, label=measure, unit="1", value=value, against="r", note=note)
-    return judge(figure, line, kind=kind, measure=MEASURES[measure], **more)
+) -> results.Check:
+    figure = figures.Figure(
+        measure=measure, label=measure, unit="1", value=value, against="r", note=note
+    )
+    return tolerances.judge(figure, line, kind=kind, measure=tolerances.MEASURES[measure], **more)
 
 
-def run_of(*checks: Check, **more: object) -> Run:
-    return Run(
+def run_of(*checks: results.Check, **more: object) -> results.Run:
+    return results.Run(
         suite="mine",
         created="",
         reference="r",
         scenes={"s": {}},
         models=("r", "m"),
-        cells=(Cell(scene="s", model="m", status="done", checks=checks),),
+        cells=(results.Cell(scene="s", model="m", status="done", checks=checks),),
         **more,
     )
 
@@ -57,7 +56,12 @@ FLOOR = {"floor": 2.3e-5}
     ("measure", "line", "more", "values"),
     [
         *(
-            (measure, line, FLOOR if MEASURES[measure].role == "quantity" else {}, values)
+            (
+                measure,
+                line,
+                FLOOR if tolerances.MEASURES[measure].role == "quantity" else {},
+                values,
+            )
             for measure, line, values in (
                 # A quantity counts by what it has beyond its floor, on either side of zero; far
                 # from zero the floor says nothing.
@@ -157,7 +161,7 @@ FLOOR = {"floor": 2.3e-5}
     ],
 )
 def test_the_rule(measure, line, more, values):
-    tolerance = Tolerance(**dict(zip(("expected", "limit", "drift"), line, strict=True)))
+    tolerance = tolerances.Tolerance(**dict(zip(("expected", "limit", "drift"), line, strict=True)))
     assert {value: check(measure, value, tolerance, **more).verdict for value in values} == values
 
 
@@ -180,19 +184,23 @@ def test_the_rule(measure, line, more, values):
     ],
 )
 def test_the_share_of_its_limit_that_a_figure_uses(measure, line, shares):
-    tolerance = line and Tolerance(**line)
-    assert {value: used(check(measure, value, tolerance, beside=0.0)) for value in shares} == shares
+    tolerance = line and tolerances.Tolerance(**line)
+    assert {
+        value: tables.used(check(measure, value, tolerance, beside=0.0)) for value in shares
+    } == shares
 
 
 def test_floors_come_from_the_rows_and_from_u_num():
     """p = sqrt(3 g/(4 R)): what a block turns beyond a chord between two rows, (p h)^2/8 in alpha;
     g h^2/8 in m; a row in time."""
     p2 = 0.75 * 9.81 / (0.2**2 + 1.0) ** 0.5
-    known = Numerical(
+    known = numerical.Numerical(
         method="",
         quantities=[
-            Quantity(name="theta_rms", unit="alpha", value=1.0, u_num=3e-4, verdict="converged"),
-            Quantity(
+            numerical.Quantity(
+                name="theta_rms", unit="alpha", value=1.0, u_num=3e-4, verdict="converged"
+            ),
+            numerical.Quantity(
                 name="peak_rotation", unit="alpha", value=1.0, u_num=0.1, verdict="not converged"
             ),
         ],
@@ -207,12 +215,15 @@ def test_floors_come_from_the_rows_and_from_u_num():
         "floor_impacts": (0.0, 0.0),
     }
     assert {
-        name: tuple(floor_of(MEASURES[name], SCENE, of) for of in (None, known)) for name in floors
+        name: tuple(
+            tolerances.floor_of(tolerances.MEASURES[name], SCENE, of) for of in (None, known)
+        )
+        for name in floors
     } == {name: pytest.approx(values) for name, values in floors.items()}
 
 
 BETTER, PASSES, CHANGED = (
-    check("theta_rms", value, Tolerance(expected=0.1, limit=0.2, drift=0.01))
+    check("theta_rms", value, tolerances.Tolerance(expected=0.1, limit=0.2, drift=0.01))
     for value in (1e-3, 0.1, 0.15)
 )
 NOTHING = check("peak_ratio", None, None, note="not defined here: the reference does not rotate")
@@ -224,12 +235,12 @@ NOTHING = check("peak_ratio", None, None, note="not defined here: the reference 
 def test_what_is_better_passes_unless_both_are_asked_for(strict, codes, failures):
     better = run_of(BETTER, PASSES, strict=strict)
     assert (better.exit_code, run_of(CHANGED, strict=strict).exit_code) == codes
-    (line,) = improvements(better)
+    (line,) = tables.improvements(better)
     assert line.startswith("s, m: theta_rms against r: 0.001 was 0.1")
     assert (
         better.verdict,
-        list(verdict_lines(better)),
-        ET.fromstring(junit(better)).get("failures"),
+        list(tables.verdict_lines(better)),
+        ET.fromstring(tables.junit(better)).get("failures"),
     ) == ("pass", [], str(failures))
 
 
@@ -255,7 +266,7 @@ def test_a_ratio_to_nothing_is_not_defined(made, reference, candidate, defined):
 
 
 def test_what_is_not_defined_neither_passes_nor_fails():
-    line = Tolerance(expected=1.0, limit=0.1, drift=0.01)
+    line = tolerances.Tolerance(expected=1.0, limit=0.1, drift=0.01)
     assert NOTHING.words == "not defined"
     notes = (NOTHING.reason, "m has no column theta")
     verdicts = [check("peak_ratio", None, line, note=note).verdict for note in notes]
@@ -265,7 +276,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
         run.verdict,
         run.exit_code,
         run.without_tolerance,
-        ET.fromstring(junit(run)).get("skipped"),
+        ET.fromstring(tables.junit(run)).get("skipped"),
     ) == ("pass", 0, 0, "1")
     assert run_of(NOTHING).verdict == "fail", "a run that judges nothing does not pass"
 
@@ -275,7 +286,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
     ("values", "moved"), [((1e-15, -3e-17), False), ((1e-15, 1e-3), True), ((0.0, None), True)]
 )
 def test_what_moves_within_its_resolution_is_no_trend(name, values, moved):
-    assert _moved(name, *values) == moved
+    assert across._moved(name, *values) == moved
 
 
 SUITE = """

@@ -17,10 +17,8 @@ import pytest
 
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.suite.results import Run
+from rockcheck.validation.suite import results, suites, tables
 from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
-from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.tables import junit, verdict_lines
 
 OWN_NAMES = ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
 OWN = [f"faulty:{name}" for name in OWN_NAMES]
@@ -64,15 +62,17 @@ def run(tmp_path, faulty):
         sys.modules.pop("faulty", None)
         provenance.code_digest.cache_clear()
         provenance._source_of.cache_clear()
-        return run_suite(load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options)
+        return run_suite(
+            suites.load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options
+        )
 
     return run
 
 
 def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
-    first = run_suite(load_suite("smoke"), tmp_path, jobs=2)
+    first = run_suite(suites.load_suite("smoke"), tmp_path, jobs=2)
     shutil.rmtree(tmp_path / "comparisons")
-    again = run_suite(load_suite("smoke"), tmp_path, jobs=2)
+    again = run_suite(suites.load_suite("smoke"), tmp_path, jobs=2)
     assert again.up_to_date == sum(cell.status == "done" for cell in again.cells) > 0
     assert [cell.figures for cell in again.cells] == [cell.figures for cell in first.cells]
 
@@ -104,7 +104,7 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
     accept. What has no wheel for this Python is named too, and weighs nothing."""
     monkeypatch.setattr("rockcheck.engines.PyBullet.last_python", python)
     monkeypatch.setattr(
-        "rockcheck.validation.suite.runner.not_installed",
+        "rockcheck.validation.execute.models.not_installed",
         lambda name: "not installed: so" * (name == "pybullet"),
     )
     fine = FINE.format(model="a") + FINE.format(model="pybullet")
@@ -115,12 +115,12 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
     }
     failed = int(strict and status == "absent")
     verdict = "incomplete" if status == "absent" else "pass"
-    assert (done.verdict, done.exit_code, list(verdict_lines(done))) == (
+    assert (done.verdict, done.exit_code, list(tables.verdict_lines(done))) == (
         verdict,
         failed,
         ["pybullet: not installed: so"],
     )
-    (suite,) = ElementTree.fromstring(junit(done))
+    (suite,) = ElementTree.fromstring(tables.junit(done))
     assert [int(suite.get(name)) for name in ("skipped", "failures")] == [1 - failed, failed]
 
 
@@ -233,7 +233,7 @@ def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
     done = run(write_suite(tmp_path, STILL, FINE.format(model="a")))
     out = tmp_path / "out"
     done.save(out)
-    assert (Run.load(out), done.exit_code) == (done, 0)
+    assert (results.Run.load(out), done.exit_code) == (done, 0)
     text = (out / "run.json").read_text()
     assert set(json.loads(text)) == set(
         json.loads((out / "run.schema.json").read_text())["properties"]
@@ -284,7 +284,7 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
-    cells = in_order(SuiteStudy(load_suite("paper"), tmp_path).items)
+    cells = in_order(SuiteStudy(suites.load_suite("paper"), tmp_path).items)
     begun = [(cell.variant.label, cell.place) for cell in cells]
     assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
     assert {model for model, _ in begun[3:10]} == {"mujoco", "pybullet"}
@@ -308,5 +308,5 @@ def test_time_to_compile_does_not_count_for_a_cells_limit(
 ):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
-    cells = SuiteStudy(load_suite(path, allow_code=OWN), tmp_path / "out").items
+    cells = SuiteStudy(suites.load_suite(path, allow_code=OWN), tmp_path / "out").items
     assert {cell.compiles for cell in cells if cell.variant.label == "a"} == {compiled}

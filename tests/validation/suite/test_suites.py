@@ -2,7 +2,7 @@
 
 import pytest
 
-from rockcheck.validation.suite.suites import load_suite
+from rockcheck.validation.suite import suites
 
 MODELS = 'reference = "ebm"\n[models.ebm]\n'
 SHELF = (
@@ -13,7 +13,7 @@ SHELF = (
 
 @pytest.fixture
 def suite(written):
-    return lambda text: load_suite(written("mine.toml", text))
+    return lambda text: suites.load_suite(written("mine.toml", text))
 
 
 def test_scenes_by_name_by_table_and_by_file_and_models_by_labels_of_their_own(suite, written):

@@ -7,20 +7,20 @@ from types import SimpleNamespace
 
 import pytest
 
-from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.suite import results, suites, tolerances
 from rockcheck.validation.suite.acceptance import accept
-from rockcheck.validation.suite.results import Cell, Run
-from rockcheck.validation.suite.suites import load_suite, named_suites
-from rockcheck.validation.suite.tolerances import MEASURES, Tolerance, judge, parse_tolerances
 
-LINE = Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
+LINE = tolerances.Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 
 
 def check(value, line=LINE, measure="theta_rms", note="", **more):
-    figure = Figure(
+    figure = figures.Figure(
         measure=measure, label=measure, unit="alpha", value=value, against="r", note=note
     )
-    return judge(figure, line, kind="numerical", measure=MEASURES[measure], **more)
+    return tolerances.judge(
+        figure, line, kind="numerical", measure=tolerances.MEASURES[measure], **more
+    )
 
 
 @pytest.mark.parametrize(
@@ -61,7 +61,7 @@ def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails_and_says_why(one, 
     ],
 )
 def test_faults_in_a_file_are_named(fault_of, text, fault):
-    assert fault in str(fault_of(parse_tolerances, tomllib.loads(text), [("a", "b")]))
+    assert fault in str(fault_of(tolerances.parse_tolerances, tomllib.loads(text), [("a", "b")]))
 
 
 FILE = (
@@ -78,13 +78,13 @@ def accepted(written):
 
     def accept_of(text, *checks, reason=None):
         path = written("mine.tolerances.toml", text)
-        run = Run(
+        run = results.Run(
             suite="mine",
             created="",
             reference="r",
             models=("r", "m"),
             scenes={"s": {}},
-            cells=(Cell(scene="s", model="m", status="done", checks=checks),),
+            cells=(results.Cell(scene="s", model="m", status="done", checks=checks),),
         )
         part = SimpleNamespace(
             path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
@@ -98,7 +98,7 @@ def line_of(expected, limit, drift, why="a test"):
     return {"expected": expected, "limit": limit, "drift": drift, "why": why}
 
 
-FAR = Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
+FAR = tolerances.Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
 
 
 @pytest.mark.parametrize(
@@ -167,13 +167,13 @@ def test_accept_leaves_what_passes_and_refuses_what_it_may_not_write(
 )
 def test_a_new_line_holds_what_it_was_made_from(accepted, measure, value):
     _, _, text = accepted("", check(value, None, measure))
-    (line,) = parse_tolerances(tomllib.loads(text)).values()
+    (line,) = tolerances.parse_tolerances(tomllib.loads(text)).values()
     assert check(value, line, measure).verdict == "pass"
 
 
-@pytest.mark.parametrize("name", named_suites())
+@pytest.mark.parametrize("name", suites.named_suites())
 def test_a_shipped_suite_loads_and_its_tolerances_are_whole_and_have_cells(name):
-    suite = load_suite(name)
+    suite = suites.load_suite(name)
     assert {((of or scene).name, variant.label) for scene, variant, of in suite.cells()} >= {
         (place.scene, place.model) for place in suite.tolerances
     }
@@ -184,7 +184,7 @@ def test_a_shipped_suite_loads_and_its_tolerances_are_whole_and_have_cells(name)
     ] == []
 
 
-ALIKE = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same")
+ALIKE = tolerances.Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same")
 EVERYWHERE = """
 ["*".m.r]
 outcome_agrees = { expected = 1.0, limit = 0.0, drift = 0.0, why = "the same" }
@@ -198,7 +198,7 @@ outcome_agrees = { expected = 0.0, limit = 1.0, drift = 0.0, why = "one falls" }
 
 
 def test_a_line_for_every_scene():
-    lines = parse_tolerances(
+    lines = tolerances.parse_tolerances(
         tomllib.loads(EVERYWHERE), [("a", "m"), ("b", "m"), ("c", "m"), ("a", "r")]
     )
     assert {
@@ -210,7 +210,7 @@ def test_a_line_for_every_scene():
         ("b", "outcome_agrees"): (1.0, "one falls"),
         ("c", "outcome_agrees"): (0.0, "the same"),
     }
-    assert {place.scene for place in parse_tolerances(tomllib.loads(EVERYWHERE))} == {
+    assert {place.scene for place in tolerances.parse_tolerances(tomllib.loads(EVERYWHERE))} == {
         "*",
         "a",
         "b",

@@ -10,10 +10,8 @@ from xml.etree import ElementTree
 import pytest
 
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store
-from rockcheck.validation.suite.results import Cell, Run
+from rockcheck.validation.suite import results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.suite.suites import load_suite
-from rockcheck.validation.suite.tables import junit, markdown
 
 SUITE = """
 reference = "still"
@@ -45,7 +43,7 @@ ks_distance = { expected = 1.0, limit = 1.0, drift = 0.0, why = "a test" }
 def run(tmp_path, written, faulty):
     path = written("mine.toml", SUITE)
     return lambda: run_suite(
-        load_suite(path, allow_code=["faulty:Still"]), tmp_path / "out", jobs=0
+        suites.load_suite(path, allow_code=["faulty:Still"]), tmp_path / "out", jobs=0
     )
 
 
@@ -142,20 +140,20 @@ EVIL = (
 
 
 def test_names_in_the_summary_and_in_junit_are_text():
-    made = Run(
+    made = results.Run(
         suite=EVIL,
         created="2026",
         reference="x",
         scenes={},
         faults=(EVIL,),
         models=(EVIL,),
-        cells=(Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL),),
+        cells=(results.Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL),),
     )
-    text = markdown(made)
+    text = tables.markdown(made)
     assert text.replace("\n", "").isprintable()
     assert len([line for line in text.splitlines() if line.startswith("#")]) == 1
     bare = re.sub(r"\\[\[\]`!]", "", text)
     assert [mark for mark in ("<", "://", "](", "![", "`") if mark in bare] == []
     rows = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("|")]
     assert [row.count("|") for row in rows] == [3] * 3
-    assert ElementTree.fromstring(junit(made)).get("errors") == "1"
+    assert ElementTree.fromstring(tables.junit(made)).get("errors") == "1"

@@ -5,41 +5,33 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.discrepancy.impact_laws import LawFollowed
-from rockcheck.validation.discrepancy.measures import DIFFERENCES
-from rockcheck.validation.suite.results import Cell, Check, CostRecord, EnsembleRecord, Run
-from rockcheck.validation.suite.tables import (
-    MOST_SHOWN,
-    junit,
-    markdown,
-    shown,
-    summary,
-    verdict_table,
-)
-from rockcheck.validation.suite.tolerances import Tolerance, judge
+from rockcheck.validation.discrepancy import figures, impact_laws, measures
+from rockcheck.validation.suite import results, tables, tolerances
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
-EXACT = Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
-LINE = Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
+EXACT = tolerances.Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
+LINE = tolerances.Tolerance(expected=0.25, limit=0.5, drift=0.125, why="a test")
 
 
 def check(
     value: float | None,
     measure: str = "theta_rms",
-    line: Tolerance = LINE,
+    line: tolerances.Tolerance = LINE,
     *,
     kind: str = "numerical",
     **more: str,
-) -> Check:
+) -> results.Check:
     about = {"label": measure, "unit": "alpha", "against": "r", **more}
-    return judge(
-        Figure(measure=measure, value=value, **about), line, kind=kind, measure=DIFFERENCES[measure]
+    return tolerances.judge(
+        figures.Figure(measure=measure, value=value, **about),
+        line,
+        kind=kind,
+        measure=measures.DIFFERENCES[measure],
     )
 
 
-def run_of(*cells: Cell, **more: object) -> Run:
-    return Run(
+def run_of(*cells: results.Cell, **more: object) -> results.Run:
+    return results.Run(
         suite="mine",
         created="",
         reference="r",
@@ -50,9 +42,13 @@ def run_of(*cells: Cell, **more: object) -> Run:
     )
 
 
-def cell(scene: str, model: str, *checks: Check, reason: str = "", **more: object) -> Cell:
+def cell(
+    scene: str, model: str, *checks: results.Check, reason: str = "", **more: object
+) -> results.Cell:
     status = "failed" if reason else "done"
-    return Cell(scene=scene, model=model, status=status, reason=reason, checks=checks, **more)
+    return results.Cell(
+        scene=scene, model=model, status=status, reason=reason, checks=checks, **more
+    )
 
 
 BROKEN = cell("a", "n", reason="more than 10 events")
@@ -72,7 +68,7 @@ def totals(element: ET.Element) -> dict[str, int]:
 @pytest.mark.parametrize(("strict", "failures"), [(False, [1, 1, 1]), (True, [2, 2, 1])])
 def test_totals_and_failures_of_the_junit_file(strict, failures):
     root = ET.fromstring(
-        junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
+        tables.junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
     )
     suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
     assert {name: totals(suite) for name, suite in suites.items()} == {
@@ -97,8 +93,8 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
 
 @pytest.mark.parametrize(("read_back", "seconds"), [(False, 7.5), (True, 0.0)])
 def test_a_cell_that_was_read_back_took_no_time(read_back, seconds):
-    ran = cell("a", "m", cost=CostRecord(worker_seconds=7.5), read_back=read_back)
-    assert float(ET.fromstring(junit(run_of(ran))).find("testsuite").get("time")) == seconds
+    ran = cell("a", "m", cost=results.CostRecord(worker_seconds=7.5), read_back=read_back)
+    assert float(ET.fromstring(tables.junit(run_of(ran))).find("testsuite").get("time")) == seconds
 
 
 SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
@@ -117,7 +113,7 @@ SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
 )
 def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, marks):
     numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
-    root = ET.fromstring(junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
+    root = ET.fromstring(tables.junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
     cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
     assert ([[(one.tag, one.get("message")) for one in case] for case in cases], totals(root)) == (
         marks,
@@ -127,9 +123,12 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, ma
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
     laws = {"am": "closed", "an": "", "ao": "", "bn": "open", "bm": "", "cm": ""}
-    met = {law: LawFollowed(t=1.25, law=law, errors={}, spread=0.1) for law in ("closed", "open")}
+    met = {
+        law: impact_laws.LawFollowed(t=1.25, law=law, errors={}, spread=0.1)
+        for law in ("closed", "open")
+    }
     cells = (cell(*names, impact_law=met.get(law)) for names, law in laws.items())
-    table = markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
+    table = tables.markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
     rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
     assert [rows[0], *rows[2:]] == [
         ["scene", "landing", "m", "n"],
@@ -139,7 +138,7 @@ def test_the_table_of_laws_has_the_models_that_met_a_landing():
 
 
 def test_the_summary_names_what_is_not_a_pass():
-    text = markdown(run_of(*MIXED))
+    text = tables.markdown(run_of(*MIXED))
     said = (
         "## 💥 rockcheck mine: error",
         "3 simulations, 0 up to date, 5 checks",
@@ -151,23 +150,25 @@ def test_the_summary_names_what_is_not_a_pass():
 def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     """The one that is out of tolerance, the nearest to their limits, and all ensembles; JUnit has
     every scene."""
-    near = [cell(f"near {n}", "m", check(0.4)) for n in range(MOST_SHOWN - 1)]
+    near = [cell(f"near {n}", "m", check(0.4)) for n in range(tables.MOST_SHOWN - 1)]
     far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
-    drawn = EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
+    drawn = results.EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
     worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", check(0.75)))
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
-    assert shown(run) == tuple(one.scene for one in worst)
-    assert shown(run_of(*near)) == tuple(one.scene for one in near)
-    assert len(verdict_table(run).rows) == MOST_SHOWN + 1
-    text = markdown(run)
+    assert tables.shown(run) == tuple(one.scene for one in worst)
+    assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
+    assert len(tables.verdict_table(run).rows) == tables.MOST_SHOWN + 1
+    text = tables.markdown(run)
     assert ("| out |" in text, "| far 3 |" in text) == (True, False)
     assert "|\n\nand 30 more scenes" in text  # not a row of the table
-    assert len(ET.fromstring(junit(run)).findall("testsuite")) == len(run.cells)
+    assert len(ET.fromstring(tables.junit(run)).findall("testsuite")) == len(run.cells)
 
 
 def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
-    text = markdown(run_of(*(cell(f"s{n}", "m", check(0.75)) for n in range(MOST_SHOWN + 7))))
-    assert text.count("is more than 0.5") == MOST_SHOWN
+    text = tables.markdown(
+        run_of(*(cell(f"s{n}", "m", check(0.75)) for n in range(tables.MOST_SHOWN + 7)))
+    )
+    assert text.count("is more than 0.5") == tables.MOST_SHOWN
     assert "- and 7 more, in junit.xml" in text
 
 
@@ -191,7 +192,7 @@ def test_what_waits_for_its_tolerance_has_not_failed_unless_something_else_has(o
     assert one.words == words
 
 
-ABSENT = Cell(scene="a", model="n", status="absent", reason="needs it")
+ABSENT = results.Cell(scene="a", model="n", status="absent", reason="needs it")
 PASSES, CHANGES, FAILS = (cell("a", "m", check(value)) for value in (0.25, 0.4, 0.75))
 
 
@@ -215,7 +216,7 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
     runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
     assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
     assert (runs[0].words == "not judged") == (not more.get("judged", True))
-    assert [one.get("verdict") for one in summary(runs[0])["cells"]] == [
+    assert [one.get("verdict") for one in tables.summary(runs[0])["cells"]] == [
         None if "judged" in more or not (one.checks or one.reason) else one.verdict for one in cells
     ]
 
@@ -256,7 +257,7 @@ ALONE = check(0.9, "x_rms", against="")
     ],
 )
 def test_the_row_of_a_scene(cells, judged, row):
-    lines = markdown(run_of(*cells, judged=judged)).splitlines()
+    lines = tables.markdown(run_of(*cells, judged=judged)).splitlines()
     assert [line for line in lines if line.startswith("| a |")] == [row]
 
 
@@ -266,6 +267,6 @@ def test_the_row_of_a_scene(cells, judged, row):
 )
 def test_the_reason_gives_the_remark_where_the_figure_itself_is_asked_for(limit, reason):
     """Which outcomes they were; of a figure with a limit the distance says enough."""
-    line = Tolerance(expected=1.0, limit=limit, drift=0.0, why="the same outcome")
+    line = tolerances.Tolerance(expected=1.0, limit=limit, drift=0.0, why="the same outcome")
     more = {"unit": "1", "note": "at rest, not overturned left"}
     assert check(0.0, "outcome_agrees", line, **more).reason == reason

@@ -11,11 +11,20 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.scenes import Block, Floor, History, InputError, Record, Scene, Sine, Wall
+from rockcheck.scenes import (
+    PAPER_BLOCK as SLENDER,
+    Block,
+    Floats,
+    Floor,
+    History,
+    InputError,
+    Record,
+    Scene,
+    Sine,
+    Wall,
+)
 from rockcheck.scenes.kinematics import energy
-from rockcheck.scenes.scene import PAPER_BLOCK as SLENDER
 from rockcheck.validation.criteria import (
     newmark_slip,
     overturning_velocity,
@@ -24,7 +33,6 @@ from rockcheck.validation.criteria import (
     rectangular_pulse_ratio,
 )
 
-FloatArray = NDArray[np.float64]
 G = 9.81
 #: Wider than tall: it slides, drops and bounces without tipping.
 SQUAT = Block(half_width=1.0, half_height=0.5)
@@ -38,7 +46,7 @@ class Motion:
 
     history: History
 
-    def __getattr__(self, name: str) -> FloatArray:
+    def __getattr__(self, name: str) -> Floats:
         if name not in self.history.channels:
             raise InputError(f"the history of {self.history.name} has no column {name}")
         return np.asarray(self.history.channels[name], dtype=float)
@@ -79,7 +87,7 @@ class Phenomenon:
         )
 
 
-def _when(t: FloatArray, values: FloatArray, level: float) -> float:
+def _when(t: Floats, values: Floats, level: float) -> float:
     """When `values` first pass `level` upward, linear between rows; NaN if never."""
     above = np.flatnonzero(values >= level)
     if not above.size:
@@ -94,7 +102,7 @@ def _between(m: Motion, name: str, start: float, end: float) -> float:
     return float(np.interp(end, m.t, channel) - np.interp(start, m.t, channel))
 
 
-def _apart(one: FloatArray, other: FloatArray) -> float:
+def _apart(one: Floats, other: Floats) -> float:
     rows = min(len(one), len(other))
     return float(np.max(np.abs(one[:rows] - other[:rows])))
 

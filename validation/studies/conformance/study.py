@@ -16,17 +16,20 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.engines.base_motion import velocity_at, velocity_of
-from rockcheck.engines.steps import march_fixed
-from rockcheck.scenes import Floor, History, InputError, ModelFailure, Scene
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.files import read_toml
-from rockcheck.scenes.observation import scene_notes
-from rockcheck.scenes.reading import read_json
-from rockcheck.scenes.writing import Case, junit_text, table_text, write_whole
-from rockcheck.validation.execute.models import build, build_own, family, home, is_own
-from rockcheck.validation.execute.pool import Failure
-from rockcheck.validation.execute.provenance import cell_key, code_digest, version_of
+from rockcheck.engines import base_motion, steps
+from rockcheck.scenes import (
+    Floats,
+    Floor,
+    History,
+    Scene,
+    errors,
+    files,
+    observation,
+    printable,
+    reading,
+    writing,
+)
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import (
     Block,
     Column,
@@ -42,7 +45,6 @@ from rockcheck.validation.studies.conformance.phenomena import (
     PHENOMENA,
     SCENES,
     SQUAT,
-    FloatArray,
     G,
     Motion,
 )
@@ -96,14 +98,14 @@ class Player:
 
 def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
     """An engine, with rockcheck's best settings unless others are named, or a "module:Class"."""
-    own = is_own(name)
+    own = models.is_own(name)
     built_by = {
         "time_step": STEP,
         **({"settings": settings or "best"} if settings or not own else {}),
         **given,
     }
     if not own:
-        build(name, built_by)  # an unusable player is refused before anything runs
+        models.build(name, built_by)  # an unusable player is refused before anything runs
     more = (
         f"{key}={value}" for key, value in given.items() if key not in ("settings", "time_step")
     )
@@ -114,7 +116,7 @@ def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
         step,
         name,
         built_by,
-        "" if own else version_of(family(name).libraries[0]),
+        "" if own else provenance.version_of(models.family(name).libraries[0]),
         search=(str(Path.cwd()),) if own else (),
         cost=A_STEP / (step if isinstance(step, float) and step > 0.0 else STEP),
     )
@@ -123,10 +125,10 @@ def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
 def written(folder: Path) -> Player:
     """A folder with a CSV for each scene, and an `engine.toml` that says whose they are."""
     allowed = {"engine": str, "version": str, "settings": str, "step": float, "lacks": list}
-    about = {"engine": ""} | read_toml(folder / ABOUT)
+    about = {"engine": ""} | files.read_toml(folder / ABOUT)
     for key, value in about.items():
         if not isinstance(value, allowed.get(key, ())) or (key == "engine" and not value):
-            raise InputError(
+            raise errors.InputError(
                 f"{printable(repr(value))} is not allowed; allowed: {', '.join(allowed)}",
                 f"{printable(folder / ABOUT)}: {printable(key)}",
             )
@@ -169,14 +171,16 @@ class Trial(Task):
         who, scenes = self.player, PHENOMENA[self.id].scenes
         return {
             **super().depends(),
-            "cells": [cell_key(scene, who.model, who.given, who.search) for scene in scenes],
+            "cells": [
+                provenance.cell_key(scene, who.model, who.given, who.search) for scene in scenes
+            ],
         }
 
     def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
         who, what = self.player, PHENOMENA[self.id]
         sys.path.extend(path for path in who.search if path not in sys.path)
-        model: Any = build_own(who.model, who.given)
+        model: Any = models.build_own(who.model, who.given)
         version = who.version or str(getattr(model, "version", ""))
         if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
             return Seen(
@@ -189,8 +193,10 @@ class Trial(Task):
         try:
             value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # the motion lacks the wanted event
-            raise ModelFailure(printable(error, 200)) from None
-        told = set(chain.from_iterable(map(scene_notes, what.scenes)))  # of our own scenes
+            raise errors.ModelFailure(printable(error, 200)) from None
+        told = set(
+            chain.from_iterable(map(observation.scene_notes, what.scenes))
+        )  # of our own scenes
         return Seen(
             value if math.isfinite(value) else None,
             *what.judge(value),
@@ -235,11 +241,11 @@ class Conformance(Study):
             {"cards": cards},
             "fail" if failing else "pass",
             int(failing > 0),
-            files={"junit.xml": junit_text("rockcheck conformance", map(_cases, cards))},
+            files={"junit.xml": writing.junit_text("rockcheck conformance", map(_cases, cards))},
         )
 
 
-def _cases(card: Card) -> tuple[str, Iterator[Case]]:
+def _cases(card: Card) -> tuple[str, Iterator[writing.Case]]:
     """A suite of JUnit: a case a phenomenon."""
     title = card["title"]
     return title, (
@@ -257,26 +263,28 @@ def _in_units(scene: Scene, history: History) -> None:
     for name, value in zip(("x", "y", "theta"), scene.initial_state, strict=False):
         first = float(history.channels.get(name, [value])[0])
         if not abs(first - value) <= 0.02 * (1.0 if name == "theta" else size):
-            raise ModelFailure(
+            raise errors.ModelFailure(
                 f"unit? {name} begins at {first:.4g}, and the scene at {value:.4g}: columns are in"
                 " SI units unless their names say otherwise, such as x_mm, theta_deg"
             )
     turned = float(np.max(np.abs(history.channels["theta"])))
     if turned > math.pi:
-        raise ModelFailure(f"unit? theta reaches {turned:.4g} rad: degrees are called theta_deg")
+        raise errors.ModelFailure(
+            f"unit? theta reaches {turned:.4g} rad: degrees are called theta_deg"
+        )
     if turned < 1.0 and t[-1] < 0.9 * scene.duration - scene.output_step:
-        raise ModelFailure(
+        raise errors.ModelFailure(
             f"unit? t ends at {t[-1]:.4g} s, and the scene at {scene.duration:g} s: milliseconds"
             " are called t_ms"
         )
 
 
-def _card(player: Player, found: Mapping[str, Seen | Failure]) -> Card:
-    faults = {one.reason for one in found.values() if isinstance(one, Failure) and one.refused}
+def _card(player: Player, found: Mapping[str, Seen | pool.Failure]) -> Card:
+    faults = {one.reason for one in found.values() if isinstance(one, pool.Failure) and one.refused}
     if len(faults) == 1 and all(one.reason in faults for one in found.values()):
-        raise InputError(*faults)
+        raise errors.InputError(*faults)
     seen = {
-        id: Seen(None, "error", one.reason, "") if isinstance(one, Failure) else one
+        id: Seen(None, "error", one.reason, "") if isinstance(one, pool.Failure) else one
         for id, one in found.items()
     }
     rows = [
@@ -381,8 +389,8 @@ def _blocks(cards: Sequence[Card]) -> Iterator[Block]:
 def wrote(path: Path) -> bool:
     """Whether the path is a finished study: a folder or its `run.json`."""
     try:
-        data = read_json(path / "run.json" if path.is_dir() else path)
-    except InputError:
+        data = reading.read_json(path / "run.json" if path.is_dir() else path)
+    except errors.InputError:
         return False
     return isinstance(data, dict) and "cards" in data
 
@@ -450,10 +458,12 @@ def _read(path: Path) -> dict[tuple[str, str, str], dict[str, Any]]:
             (row["engine"], row["settings"], row["id"]): row
             | {name: row[name] and float(row[name]) for name in ("value", "limit")}
             | {name: str(row[name]) for name in ("name", "version", "verdict")}
-            for row in read_json(path)["tables"]["rows"]
+            for row in reading.read_json(path)["tables"]["rows"]
         }
     except (ValueError, KeyError, TypeError):
-        raise InputError(f"{printable(path)}: not what `rockcheck conformance` wrote") from None
+        raise errors.InputError(
+            f"{printable(path)}: not what `rockcheck conformance` wrote"
+        ) from None
 
 
 TEXTS = Path(__file__).parents[2] / "data" / "export"
@@ -470,10 +480,13 @@ def export(folder: Path) -> list[str]:
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
-            base = velocity_of(scene.excitation), velocity_of(scene.vertical)
-            write_whole(
+            base = (
+                base_motion.velocity_of(scene.excitation),
+                base_motion.velocity_of(scene.vertical),
+            )
+            writing.write_whole(
                 folder / f"{name}-base.csv",
-                table_text(
+                writing.table_text(
                     (
                         "t_s",
                         "x_velocity_m_s",
@@ -484,7 +497,10 @@ def export(folder: Path) -> list[str]:
                     np.column_stack(
                         [
                             t,
-                            *([velocity_at(at, *one) for at in t.tolist()] for one in base),
+                            *(
+                                [base_motion.velocity_at(at, *one) for at in t.tolist()]
+                                for one in base
+                            ),
                             *(one.acceleration(t) for one in (scene.excitation, scene.vertical)),
                         ]
                     ).tolist(),
@@ -509,10 +525,11 @@ def export(folder: Path) -> list[str]:
         }
         for scene in SCENES.values()
     ]
-    write_whole(
-        folder / "scenes.csv", table_text(tuple(scenes[0]), [tuple(row.values()) for row in scenes])
+    writing.write_whole(
+        folder / "scenes.csv",
+        writing.table_text(tuple(scenes[0]), [tuple(row.values()) for row in scenes]),
     )
-    write_whole(
+    writing.write_whole(
         folder / "README.md",
         "\n".join(
             [
@@ -526,7 +543,7 @@ def export(folder: Path) -> list[str]:
         ),
     )
     if not (folder / ABOUT).exists():
-        write_whole(folder / ABOUT, (TEXTS / ABOUT).read_text(encoding="utf-8"))
+        writing.write_whole(folder / ABOUT, (TEXTS / ABOUT).read_text(encoding="utf-8"))
     return list(SCENES)
 
 
@@ -642,13 +659,13 @@ class Calibration:
     reached: bool
 
 
-def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> FloatArray:
-    times: FloatArray = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
+def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: float) -> Floats:
+    times: Floats = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
     world = model.tuned_world(scene, parameters, step)
     try:
-        return march_fixed(world, scene, times, np.tile([0.0, -G], (len(times) - 1, 1)))[1]
-    except ModelFailure as error:
-        raise InputError(
+        return steps.march_fixed(world, scene, times, np.tile([0.0, -G], (len(times) - 1, 1)))[1]
+    except errors.ModelFailure as error:
+        raise errors.InputError(
             f"{model.name} cannot play a drop with these parameters: {error}", "--set time_step"
         ) from None
     finally:
@@ -669,14 +686,14 @@ class Tune(Task):
         for name, (least, most) in WANTED.items():
             value = getattr(self, name)
             if not isinstance(value, int | float) or not least <= value <= most:
-                raise InputError(
+                raise errors.InputError(
                     f"{printable(value)} is not allowed: give {least:g} to {most:g}",
                     "--tune" if name == "restitution" else f"--set {name}",
                 )
 
     def depends(self) -> Any:
         """Also the engine's code."""
-        return {**super().depends(), "home": code_digest(home(self.engine))}
+        return {**super().depends(), "home": provenance.code_digest(models.home(self.engine))}
 
     def play(self) -> Calibration:
         """Parameters in the engine's own words, and the contact reached with them.
@@ -688,7 +705,7 @@ class Tune(Task):
         from scipy.optimize import brentq
 
         (bounds, words), step, friction = KNOBS[self.engine], self.time_step, self.friction
-        model: Any = build(self.engine, {"time_step": step, "settings": "default"})
+        model: Any = models.build(self.engine, {"time_step": step, "settings": "default"})
         drop = Scene(
             name="drop",
             block=SQUAT,
@@ -715,7 +732,7 @@ class Tune(Task):
 
         restitution, ends = self.restitution, [dropped(end)[0] for end in bounds]
         if not min(ends) - NEAR <= restitution <= max(ends) + NEAR:
-            raise InputError(
+            raise errors.InputError(
                 f"{restitution:g} cannot be reached by {self.engine} at a step of {step:g} s:"
                 f" {min(ends):.3g} to {max(ends):.3g} can",
                 "--tune",
@@ -769,9 +786,9 @@ class Tuning(Study):
         """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
         ended = list(map(done.get, self.wanted))
         found = [one for one in ended if isinstance(one, Calibration)]
-        refused = [one for one in ended if isinstance(one, Failure) and one.refused]
+        refused = [one for one in ended if isinstance(one, pool.Failure) and one.refused]
         if refused and not found:
-            raise InputError(refused[0].reason)
+            raise errors.InputError(refused[0].reason)
         reached = sum(one.reached for one in found)
         return Finding(
             self.name,

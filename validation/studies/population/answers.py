@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes.experience import WIDTH, outside, trust_of
-from rockcheck.scenes.writing import finite
+from rockcheck.scenes import experience, writing
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.compare import QUANTITIES, spread
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -38,8 +37,8 @@ from rockcheck.validation.studies.population.runs import (
     Ran,
     Sure,
 )
+from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Numerical
-from rockcheck.validation.uncertainty.population import share_of
 
 #: Name of the error of a step or tolerance, among the sources of uncertainty.
 STEPS = "numerical error"
@@ -236,10 +235,12 @@ def _falls(found: Found) -> Answer:
     some = [each for each in found.runs.values() if each]
     hits = np.array([[sum(run.fell for run in each)] for each in some]).reshape(-1, 1)
     decided = np.array([[len(each)] for each in some]).reshape(-1, 1)
-    ends = np.clip(np.ravel(share_of(hits, decided) if some else [math.nan] * 3), 0.0, 1.0)
+    ends = np.clip(
+        np.ravel(population.share_of(hits, decided) if some else [math.nan] * 3), 0.0, 1.0
+    )
     overturning: dict[str, Any] = {
         "count": int(hits.sum()),
-        **dict(zip(INTERVAL, finite(ends.tolist()), strict=True)),
+        **dict(zip(INTERVAL, writing.finite(ends.tolist()), strict=True)),
     }
     outcomes = {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES}
     if count == 0:
@@ -460,7 +461,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
         "inputs": [
             *(float(np.var(some)) for some in peaks if found.drawn),
             *(
-                ((peak.high - peak.low) / (2.0 * WIDTH)) ** 2
+                ((peak.high - peak.low) / (2.0 * experience.WIDTH)) ** 2
                 for peak in (inputs.figures[:1] if inputs else ())
             ),
         ],
@@ -518,7 +519,7 @@ def _by_steps(found: Found) -> list[float]:
         0.0 if case in fallen and numerical.converged else numerical.u_num("peak_rotation")
         for case, numerical in found.judged.items()
     ]
-    return [(error / WIDTH) ** 2 for error in errors if error is not None]
+    return [(error / experience.WIDTH) ** 2 for error in errors if error is not None]
 
 
 def _leading(found: Found) -> str:
@@ -658,8 +659,10 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
             "simulated": sum(far > least for *_, far in runs),
             "agrees": sum(says == (far > least) for says, _, far in runs),
             # the lower medians; None where they are infinite
-            "estimate": finite(median_low(estimate for estimate, _ in pairs)) if pairs else None,
-            "motion": finite(median_low(far for _, far in pairs)) if pairs else None,
+            "estimate": writing.finite(median_low(estimate for estimate, _ in pairs))
+            if pairs
+            else None,
+            "motion": writing.finite(median_low(far for _, far in pairs)) if pairs else None,
             "unit": unit,
             "unsafe": sum(far > estimate * (1.0 + MOVED) + MOVED for estimate, far in pairs)
             if pairs
@@ -713,7 +716,7 @@ def _models(found: Found) -> Iterator[Block]:
     """How far the other models are from the first, and what the suites know of them."""
     rows = []
     for model, apart in found.apart.items():
-        trust = trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
+        trust = experience.trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
         rows.append(
             [
                 "floor-first law of impacts" if model == LAW else model,
@@ -777,7 +780,7 @@ def _histories(found: Found) -> list[Block]:
                         Series(
                             case, times.tolist(), line, style="thin" if len(rows) > 1 else "smooth"
                         )
-                        for case, line in zip(rows, finite(lines.tolist()), strict=True)
+                        for case, line in zip(rows, writing.finite(lines.tolist()), strict=True)
                     ],
                 )
             ],
@@ -819,7 +822,7 @@ def _runs(found: Found) -> Iterator[Block]:
     )
     beyond: dict[str, list[str]] = {}
     for case, one in study.cases.items():
-        for line in outside(one.scene):
+        for line in experience.outside(one.scene):
             beyond.setdefault(line, []).append(case)
     without = ", ".join(case for case in study.cases if drawn and case not in drawn)
 
@@ -850,7 +853,7 @@ class Assessment(Asked):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The answers to the engineer's questions."""
-        ended = {task: one for task, one in done.items() if not isinstance(one, Failure)}
+        ended = {task: one for task, one in done.items() if not isinstance(one, pool.Failure)}
         # by part and case, the record of the first of its tasks
         first = {
             part: {

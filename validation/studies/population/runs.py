@@ -10,14 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall
-from rockcheck.scenes.files import UncertainScene, with_numbers
-from rockcheck.scenes.writing import columns_text
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, Wall, files, writing
 from rockcheck.validation.criteria import CRITERIA, base_of
+from rockcheck.validation.discrepancy import figures, impact_laws
 from rockcheck.validation.discrepancy.compare import Motion, largest_reach, largest_slip, motion_of
-from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.discrepancy.impact_laws import parting_landing
-from rockcheck.validation.execute.models import build, family
+from rockcheck.validation.execute import models
 from rockcheck.validation.studies.population.study import (
     A_RUN,
     SOON,
@@ -27,8 +24,8 @@ from rockcheck.validation.studies.population.study import (
     effort,
 )
 from rockcheck.validation.study import Study, Task
+from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
-from rockcheck.validation.uncertainty.population import Inputs, Runs, propagate
 
 Side = Literal["left", "right"]
 Numbers = tuple[tuple[str, float], ...]
@@ -41,7 +38,7 @@ _SEED = 1
 LAW, OTHER_LAW = "impact law", {"impacts": "floor-first"}
 
 
-class Ran(Stored):
+class Ran(figures.Stored):
     """One run: its motion, or the reason why it has none.
 
     How far the block slid and how far it reached to the left and to the right are in m, also of a
@@ -71,7 +68,7 @@ class Ran(Stored):
         return math.inf if self.fell else self.peak
 
 
-class Played(Stored):
+class Played(figures.Stored):
     """The runs of a task, in the order of its variants.
 
     Of the first variant, where they were asked for: `history` as CSV, and `said`, by hand method
@@ -83,7 +80,7 @@ class Played(Stored):
     said: tuple[tuple[bool, float | None], ...] = ()
 
 
-class Sure(Stored):
+class Sure(figures.Stored):
     """How sure a run is: its numerical uncertainty, its law of impacts, its inputs.
 
     `depends_on_law_from_s` is the time (s) from which the run depends on the law of impacts;
@@ -92,7 +89,7 @@ class Sure(Stored):
 
     numerical: Numerical | None = None
     depends_on_law_from_s: float | None = None
-    inputs: Inputs | None = None
+    inputs: population.Inputs | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ class Run(OneScene):
 
     def play(self) -> Played:
         """All variants, one after the other."""
-        model = build(self.model, dict(self.settings))
+        model = models.build(self.model, dict(self.settings))
         ran = [_ran(changed(self.scene, numbers), model) for numbers in self.variants]
         runs, history = tuple(one for one, _ in ran), ran[0][1]
         if not self.shown:
@@ -116,7 +113,7 @@ class Run(OneScene):
         if history is not None:
             every = -(-len(history.channels["t"]) // MOST_ROWS)
             columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
-            rows = columns_text(columns)
+            rows = writing.columns_text(columns)
         return Played(
             runs=runs,
             history=rows,
@@ -127,7 +124,7 @@ class Run(OneScene):
 def changed(scene: Scene, numbers: Numbers) -> Scene:
     """The scene with these numbers; a wall whose gap is infinite is taken away."""
     gone = [place.split(".")[1] for place, value in numbers if value == np.inf]
-    scene = with_numbers(scene, {place: v for place, v in numbers if v != np.inf})
+    scene = files.with_numbers(scene, {place: v for place, v in numbers if v != np.inf})
     return scene.replace(walls=[w for w in scene.walls if w.side not in gone]) if gone else scene
 
 
@@ -149,7 +146,7 @@ class Certainty(OneScene):
     """How sure a run is; with `samples` draws of the uncertain numbers of `given`, if any."""
 
     samples: int = 0
-    given: UncertainScene | None = field(default=None, repr=False, compare=False)
+    given: files.UncertainScene | None = field(default=None, repr=False, compare=False)
 
     def depends(self) -> Any:
         """Also what is not known of the scene, where it is drawn."""
@@ -163,11 +160,15 @@ class Certainty(OneScene):
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
-        landing = parting_landing(self.scene)
+        landing = impact_laws.parting_landing(self.scene)
         return Sure(
-            numerical=numerical_uncertainty(build(self.model, dict(self.settings)), self.scene),
+            numerical=numerical_uncertainty(
+                models.build(self.model, dict(self.settings)), self.scene
+            ),
             depends_on_law_from_s=None if landing is None else landing.t,
-            inputs=propagate(self.given, samples=self.samples).inputs if self.given else None,
+            inputs=population.propagate(self.given, samples=self.samples).inputs
+            if self.given
+            else None,
         )
 
 
@@ -182,8 +183,8 @@ class Asked(Study):
     `levels` is the population over intensities.
     """
 
-    own: UncertainScene
-    cases: Mapping[str, UncertainScene]
+    own: files.UncertainScene
+    cases: Mapping[str, files.UncertainScene]
     models: Sequence[str] = (SWIFT,)
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     gaps: Sequence[float] = ()
@@ -192,7 +193,7 @@ class Asked(Study):
     recorded: bool = False
     levels: Population | None = None
     left_out: Sequence[str] = ()
-    record = Runs | Played | Sure
+    record = population.Runs | Played | Sure
     name = "assess"
 
     @property
@@ -203,7 +204,7 @@ class Asked(Study):
     @property
     def swift(self) -> str:
         """The event-based model that plays draws and gaps."""
-        return self.model if isinstance(build(self.model, {}), EventBasedModel) else SWIFT
+        return self.model if isinstance(models.build(self.model, {}), EventBasedModel) else SWIFT
 
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
@@ -256,7 +257,7 @@ class Asked(Study):
         runs = len(self.cases) * (6 + len(self.draws)) * (1 + len(self.gaps))
         return (
             "here"
-            if all(family(model).compiled for model in self.models) and runs * A_RUN < SOON
+            if all(models.family(model).compiled for model in self.models) and runs * A_RUN < SOON
             else "worker"
         )
 

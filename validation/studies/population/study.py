@@ -13,12 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import InputError, Record, Scene
-from rockcheck.scenes.errors import unknown_name
-from rockcheck.scenes.excitations import Excitation
+from rockcheck.scenes import Excitation, InputError, Record, Scene, errors
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build, compiles, family
+from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -31,7 +28,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.study import Task
-from rockcheck.validation.uncertainty.population import Curve, Floats, Runs, curve_of, play
+from rockcheck.validation.uncertainty import population
 
 Motions = Sequence[tuple[str, Recording]]
 #: The event-based model that plays populations, draws and gaps.
@@ -79,8 +76,8 @@ class OneScene(Task):
 def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
     """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
     return {
-        "expected": runs * (A_RUN if family(model).compiled else A_SLOW_RUN),
-        "compiles": compiles(model, settings),
+        "expected": runs * (A_RUN if models.family(model).compiled else A_SLOW_RUN),
+        "compiles": models.compiles(model, settings),
     }
 
 
@@ -94,11 +91,11 @@ class Batch(OneScene):
     factors: tuple[float, ...] = field(default=(), repr=False)
     both: bool = False
 
-    def play(self) -> Runs:
+    def play(self) -> population.Runs:
         """The runs."""
-        player: Any = build(self.model, dict(self.settings))
+        player: Any = models.build(self.model, dict(self.settings))
         across, upward = self.scene.excitation, self.scene.vertical
-        return play(
+        return population.play(
             [
                 self.scene.replace(
                     excitation=across.scaled(factor),
@@ -122,7 +119,7 @@ class Population:
 
     cases: Mapping[str, Scene]
     motions: Sequence[tuple[str, Any, float]]
-    levels: Floats
+    levels: population.Floats
     across: Column
     limits: Mapping[str, float]
     settings: Mapping[str, Any]
@@ -133,7 +130,7 @@ class Population:
     @cached_property
     def batches(self) -> list[Batch]:
         """One a case and motion. Raises `InputError` where the model cannot play a scene."""
-        player: Any = build(SWIFT, self.settings)
+        player: Any = models.build(SWIFT, self.settings)
         for scene in self.cases.values():
             player.check(scene)
         how = effort(SWIFT, self.settings, 2 * len(self.levels))
@@ -155,7 +152,7 @@ class Population:
 
     def gather(self, done: Mapping[Any, Any]) -> tuple[str, list[Block]]:
         """The answer, and the blocks: a curve a case and event; the lines of all motions."""
-        played = [batch for batch in self.batches if isinstance(done.get(batch), Runs)]
+        played = [batch for batch in self.batches if isinstance(done.get(batch), population.Runs)]
         peaks = {
             case: np.array([done[one].peaks for one in played if one.of[0] == case]).reshape(
                 -1, 2, len(self.levels)
@@ -163,7 +160,7 @@ class Population:
             for case in dict.fromkeys(batch.of[0] for batch in played)
         }
         curves = [
-            curve_of(case + event, some > limit, np.isnan(some), self.levels, DRAWS)
+            population.curve_of(case + event, some > limit, np.isnan(some), self.levels, DRAWS)
             for case, some in peaks.items()
             for event, limit in self.limits.items()
         ]
@@ -187,7 +184,7 @@ class Population:
 
 
 def blocks_of(
-    curves: Sequence[Curve], across: Column, other: dict[str, Any] | None = None
+    curves: Sequence[population.Curve], across: Column, other: dict[str, Any] | None = None
 ) -> list[Block]:
     """The curves, drawn and as tables, over the intensity `across`.
 
@@ -253,7 +250,9 @@ def blocks_of(
     ]
 
 
-def lines_of(motions: Sequence[str], peaks: Floats, levels: Floats, across: Column) -> list[Block]:
+def lines_of(
+    motions: Sequence[str], peaks: population.Floats, levels: population.Floats, across: Column
+) -> list[Block]:
     """Peaks (motion, direction, intensity) as a line a motion and direction, and their quantiles.
 
     A quantile is the smallest peak that the share of the motions does not exceed. A line ends where
@@ -343,16 +342,22 @@ def measure_of(word: str) -> Measure:
     """The measure of that name, or of "sa:0.5": spectral acceleration at a period, s."""
     found = re.fullmatch(r"sa:(\d*\.?\d+)", word)
     if found and (at := float(found[1])) >= 1e-3:
-        return f"Sa({at:g} s), 5 %", "g", lambda r, scene: intensity.spectral_acceleration(r, at)
+        return (
+            f"Sa({at:g} s), 5 %",
+            "g",
+            lambda r, scene: intensity.spectral_acceleration(r, at),
+        )
     if word not in MEASURES:
-        raise InputError(str(unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--levels")
+        raise InputError(
+            str(errors.unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--levels"
+        )
     return MEASURES[word]
 
 
 def ida(
     scene: Scene,
     motions: Motions,
-    levels: Floats,
+    levels: population.Floats,
     *,
     measure: str = "pga",
     capacities: Sequence[float] = CAPACITIES,
@@ -394,7 +399,9 @@ def ida(
     )
 
 
-def fragility(scene: Scene, levels: Floats, frequencies: tuple[float, float]) -> Population:
+def fragility(
+    scene: Scene, levels: population.Floats, frequencies: tuple[float, float]
+) -> Population:
     """The probability of overturning over the intensity, with the wall and without.
 
     The motions are pulses of the scene's kind at `PULSES` frequencies, over p, between the two of

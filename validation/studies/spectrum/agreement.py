@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.engines.engine import Engine
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build, not_installed
+from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
 from rockcheck.validation.paper import Panel
 from rockcheck.validation.studies.spectrum.tiles import SETTLE, Book, Request, letters_of
@@ -66,7 +65,7 @@ def plays(request: Request, panel: Panel) -> bool:
 
     An engine without restitution does not play walls or a floor that bounce.
     """
-    model = build(request.model, request.settings)
+    model = models.build(request.model, request.settings)
     lacks = model.lacks() if isinstance(model, Engine) else ()
     return "restitution" not in lacks or not any(
         [panel.scene.floor.restitution, *(wall.restitution for wall in panel.scene.walls)]
@@ -89,7 +88,7 @@ def agree(
     others = [
         replace(request, model=model, settings={})
         for model in CANDIDATES
-        if not not_installed(model)
+        if not models.not_installed(model)
     ]
     requests = {one.model: one for one in (request, *others)}
     shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]

@@ -12,12 +12,8 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse
-from rockcheck.scenes import Ricker, Scene, Sine
-from rockcheck.scenes.reading import read_json
-from rockcheck.scenes.writing import table_text
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.scenes import Ricker, Scene, Sine, reading, writing
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
 from rockcheck.validation.paper import (
     GAPS,
@@ -75,7 +71,7 @@ class Spectra(Study):
     record = tiles.Played
 
     def __post_init__(self) -> None:
-        check = getattr(build(self.request.model, self.request.settings), "check", None)
+        check = getattr(models.build(self.request.model, self.request.settings), "check", None)
         for panel in self.panels if check else ():
             check(panel.scene)  # type: ignore[misc]
 
@@ -111,7 +107,7 @@ class Spectra(Study):
             )
             blocks += measures.blocks(paper, claims)
         if self._papers and not self.compared:
-            compared, panels = read_json(KEPT / "agreement.json"), [*paper_panels()]
+            compared, panels = reading.read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
             blocks += agreement.blocks(compared, agreement.mapped(panels), came=not self.compared)
         return Finding(
@@ -129,7 +125,7 @@ class Spectra(Study):
                 for panel, one in by_panel.items()
                 for kind, write in (("csv", _csv), ("npz", _npz))
             },
-            exit_code=3 if any(isinstance(one, Failure) for one in done.values()) else 0,
+            exit_code=3 if any(isinstance(one, pool.Failure) for one in done.values()) else 0,
         )
 
     @property
@@ -147,7 +143,7 @@ class Spectra(Study):
         """All that follows from the nodes played; the book lists those still to be played."""
         spectra: dict[Panel, Spectrum] = {}
         motions: dict[Panel, tiles.Played] = {}
-        fast = tiles.compiled(build(self.request.model, self.request.settings))
+        fast = tiles.compiled(models.build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         for panel in self.panels:
             one = self._spectrum(book, panel)
@@ -372,7 +368,7 @@ def _csv(spectrum: Spectrum, about: str) -> bytes:
     -1 overturned left, 0 safe, 1 overturned right.
     """
     rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
-    table = table_text(
+    table = writing.table_text(
         ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())],
         ([amplitude, *row] for amplitude, row in rows),
     )

@@ -16,17 +16,14 @@ from rockcheck.ebm.spectrum import (
     RIGHT,
     SAFE,
     TOLERANCE,
-    Floats,
     Motion,
     Nodes as Outcomes,
     node_scene,
     play_motions,
     play_nodes,
 )
-from rockcheck.scenes import InputError, ModelFailure, Scene, kinematics
-from rockcheck.validation.execute import provenance
-from rockcheck.validation.execute.models import build
-from rockcheck.validation.execute.pool import Failure, cores
+from rockcheck.scenes import Floats, InputError, ModelFailure, Scene, kinematics
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
 from rockcheck.validation.study import Task
 
@@ -92,10 +89,10 @@ class Nodes(Task):
 
     def play(self) -> Played:
         """Outcomes or motions of the nodes, or whether they overturn after one impact."""
-        player: Any = build(self.model, self.settings)
+        player: Any = models.build(self.model, self.settings)
         where = self.scene, self.amplitudes, self.frequencies
         if self.what == "motions":
-            return _motions(play_motions(*where, model=player, parts=PARTS, jobs=cores()))
+            return _motions(play_motions(*where, model=player, parts=PARTS, jobs=pool.cores()))
         if self.what == "one impact":
             kinds = [
                 [event.kind for event in player.simulate(one).event_list]
@@ -104,7 +101,7 @@ class Nodes(Task):
             return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
         if not compiled(player):
             return Played("".join(_letter(one, player) for one in self.scenes()))
-        sides, failed = play_nodes(*where, model=player, jobs=cores())
+        sides, failed = play_nodes(*where, model=player, jobs=pool.cores())
         return Played("".join(letters_of(sides, np.argwhere(failed))))
 
 
@@ -147,7 +144,7 @@ def nodes_of(
     what: What = "outcomes",
 ) -> list[Nodes]:
     """The tasks that play nodes (1-D arrays of one length) of a spectrum, in order."""
-    fast = compiled(build(model, settings))
+    fast = compiled(models.build(model, settings))
     neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
     how = provenance.code_digest(__name__) if fast else f"{SETTLE} {ENOUGH}"
     base = provenance.cell_key(neutral, model, settings) + what + how
@@ -267,7 +264,7 @@ class Request:
             raise InputError(said, "--size")
         settings = {**SETTINGS.get(self.model, {}), **self.settings}
         object.__setattr__(self, "settings", settings)
-        build(self.model, settings)
+        models.build(self.model, settings)
         for name, (low, high) in (
             ("frequencies", self.frequency_range),
             ("amplitudes", self.amplitude_range),
@@ -281,7 +278,7 @@ class Request:
 
     def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
         """The settings with each other law of impacts on which outcomes may depend."""
-        player = build(self.model, self.settings)
+        player = models.build(self.model, self.settings)
         if not isinstance(player, EventBasedModel):
             return []
         return [
@@ -315,7 +312,7 @@ class Book:
         if missing:
             return None
         return [
-            Played(UNDECIDED * len(task.amplitudes)) if isinstance(one, Failure) else one
+            Played(UNDECIDED * len(task.amplitudes)) if isinstance(one, pool.Failure) else one
             for task, one in ((task, self.done[task]) for task in tasks)
         ]
 

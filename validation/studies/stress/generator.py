@@ -8,9 +8,19 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rockcheck.scenes import Block, Floor, InputError, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.scenes import (
+    Block,
+    Floats,
+    Floor,
+    InputError,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+)
 
 #: Kinds of scenes by what models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen
 #: friction has one coefficient, and a pivot that never slips does not start with slip.
@@ -222,7 +232,7 @@ def _excitation(r: np.random.Generator, uplift: float, own_period: float) -> Exc
     )
 
 
-def _samples(r: np.random.Generator, amplitude: float) -> NDArray[np.float64]:
+def _samples(r: np.random.Generator, amplitude: float) -> Floats:
     """A single sample, noise, levels with steps, or spikes in silence."""
     count = max(1, round(_log(r, 2.0, MOST_SAMPLES)))
     return _one_of(

@@ -18,6 +18,8 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
+    Excitation,
+    Floats,
     History,
     InputError,
     ModelFailure,
@@ -28,12 +30,10 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
-from rockcheck.scenes.excitations import Excitation
 from rockcheck.validation.studies.stress.mechanics import (
     BOOLE,
     GROUP,
     SLIPS,
-    Floats,
     Mask,
     Motion,
     integrals,

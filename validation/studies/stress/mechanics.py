@@ -20,9 +20,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Block, History, Scene, kinematics
+from rockcheck.scenes import Block, Floats, History, Scene, kinematics
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: A contact is closed, R, and a pivot slips, sqrt(g R), beyond these.
 CLOSED, SLIPS = 1e-8, 1e-9

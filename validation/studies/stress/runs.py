@@ -18,10 +18,8 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
-from rockcheck.scenes import InputError, ModelFailure, Scene
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.files import scene_text, tables_of
-from rockcheck.validation.execute.models import build, compiles
+from rockcheck.scenes import InputError, ModelFailure, Scene, files, printable
+from rockcheck.validation.execute import models
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -154,7 +152,7 @@ class Approximate(Player):
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
         try:
-            history = build(self.label, self.settings(scene, number)).simulate(scene)
+            history = models.build(self.label, self.settings(scene, number)).simulate(scene)
         except (ModelFailure, InputError) as error:
             return CheckedRun(figures={"ends": 1.0}, failure=str(error))
         figures = {"ends": 0.0, "finite": not_finite(history)}
@@ -283,7 +281,7 @@ def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
     A part is left out, a run or list is shorter, the scale is another; at last one number is zero
     or has fewer digits.
     """
-    tables = tables_of(scene)
+    tables = files.tables_of(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
     yield from (_with(tables, path) for path, _ in places)
     unit = math.sqrt(scene.block.radius / scene.gravity)
@@ -374,9 +372,9 @@ class Broken:
             remark,
             " ".join([f"rockcheck simulate {self.name} --model {model}", *options]),
         )
-        tables = tables_of(scene)
+        tables = files.tables_of(scene)
         tables.pop("name", None)  # it is the file's own
-        return scene_text(tables, "\n".join(filter(None, words)))
+        return files.scene_text(tables, "\n".join(filter(None, words)))
 
 
 @dataclass(kw_only=True)
@@ -532,7 +530,7 @@ def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
         count,
         seconds=PATIENCE + count * a_run,
         expected=count * a_run / AMPLE,
-        compiles=compiles(model.split()[0]),
+        compiles=models.compiles(model.split()[0]),
     )
 
 

@@ -15,22 +15,21 @@ from typing import Any, Literal
 import numpy as np
 
 from rockcheck.scenes import (
+    PAPER_BLOCK,
     Block,
     Floor,
-    InputError,
-    ModelFailure,
     Record,
     Rest,
     Ricker,
     Scene,
     Sine,
     Wall,
+    errors,
     kinematics,
+    printable,
 )
-from rockcheck.scenes.errors import printable
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.validation.execute import pool
 from rockcheck.validation.execute.models import build, not_installed
-from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, text
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -162,9 +161,9 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
         history = build(
             line.family, dict(line.settings) | {line.knob: step * unit} | stiff
         ).simulate(scene)
-    except ModelFailure as error:
+    except errors.ModelFailure as error:
         return "sinks" if "through the floor" in str(error) else "blows up"
-    except InputError as error:
+    except errors.InputError as error:
         return printable(error, 60)
     if not_finite(history):
         return "blows up"
@@ -205,7 +204,7 @@ def stand_still(label: str, case: str, duration: float) -> Found:
     steps = {} if line.family == "cm" else {line.knob: step}
     try:
         history = build(line.family, dict(line.settings) | steps).simulate(scene)
-    except (ModelFailure, InputError) as error:
+    except (errors.ModelFailure, errors.InputError) as error:
         return Found(label, case, duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius
     late = channels["t"] > 0.5 * channels["t"][-1]
@@ -315,7 +314,7 @@ class Stress(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """Chunks and places; smaller tasks for those that are lost; then failures are shrunk."""
-        lost = [task for task, one in done.items() if isinstance(one, Failure)]
+        lost = [task for task, one in done.items() if isinstance(one, pool.Failure)]
         work: list[Task] = [
             *self._chunks(),
             *(places(self.quick, self.models) if self.what != "runs" else ()),

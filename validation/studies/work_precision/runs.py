@@ -17,14 +17,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.horizon import predictability_horizon
+from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.spectrum import node_pulse
-from rockcheck.scenes import Floor, History, Rest, Ricker, Scene, Wall, load_scene
-from rockcheck.scenes.scene import PAPER_BLOCK
+from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
+from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.discrepancy.figures import IMPACTS
-from rockcheck.validation.execute.models import build
+from rockcheck.validation.execute import models
 from rockcheck.validation.study import Task
 
 MEMBERS = 10
@@ -369,7 +367,7 @@ class Play(Task):
     def play(self) -> list[BenchmarkRun]:
         """Plays the member with the setting; short runs several times, for the median time."""
         line, ready = LINES[self.line], prepared(self.family, self.member)
-        model = build(line.model, {line.knob: self.value, **line.fixed})
+        model = models.build(line.model, {line.knob: self.value, **line.fixed})
         history = model.simulate(ready.scene)
         costs = [history.cost]
         while len(costs) < self.repeats and costs[0].wall_seconds < LONG_ENOUGH:
@@ -377,7 +375,10 @@ class Play(Task):
         reference = ready.references[line.reference]
         errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
         first = [
-            min((event.t for event in h.event_list if event.kind in IMPACTS), default=math.nan)
+            min(
+                (event.t for event in h.event_list if event.kind in figures.IMPACTS),
+                default=math.nan,
+            )
             for h in (reference, history)
         ]
         return [

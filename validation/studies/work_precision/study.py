@@ -11,8 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pandas as pd
 
-from rockcheck.validation.execute.models import not_installed
-from rockcheck.validation.execute.pool import Failure
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -138,7 +137,7 @@ class WorkPrecision(Study):
         lines = [
             (line, value)
             for line in LINES.values()
-            if not not_installed(line.model)
+            if not models.not_installed(line.model)
             for value in (line.quick if self.quick else line.values)
         ]
         for member, family, (line, value) in itertools.product(
@@ -158,7 +157,11 @@ class WorkPrecision(Study):
                 )
 
     def _convergence(self) -> Iterator[Task]:
-        lines = [line for line in LINES.values() if line.converge and not not_installed(line.model)]
+        lines = [
+            line
+            for line in LINES.values()
+            if line.converge and not models.not_installed(line.model)
+        ]
         for place, line, name in itertools.product(
             (1, 0) if self.quick else (2, 1, 0), lines, QUICK_WALLS if self.quick else WALLS
         ):
@@ -171,12 +174,12 @@ class WorkPrecision(Study):
         """The tables and diagrams of what was measured."""
         rows = [
             *itertools.chain.from_iterable(
-                one for one in done.values() if not isinstance(one, Failure)
+                one for one in done.values() if not isinstance(one, pool.Failure)
             ),
             *(
                 task.record(failure=one.reason)
                 for task, one in done.items()
-                if isinstance(task, Play) and isinstance(one, Failure)
+                if isinstance(task, Play) and isinstance(one, pool.Failure)
             ),
         ]
         samples, times, sizes, starts, saved = (

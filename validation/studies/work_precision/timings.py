@@ -26,11 +26,19 @@ from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
 from rockcheck.ebm.core.state import Rows
-from rockcheck.ebm.spectrum import Floats, node_pulse
-from rockcheck.scenes import Floor, ModelFailure, Record, Scene, Wall, load_scene
+from rockcheck.ebm.spectrum import node_pulse
+from rockcheck.scenes import (
+    PAPER_BLOCK,
+    Floats,
+    Floor,
+    ModelFailure,
+    Record,
+    Scene,
+    Wall,
+    load_scene,
+)
 from rockcheck.scenes.compiled import kernel
-from rockcheck.scenes.scene import PAPER_BLOCK
-from rockcheck.validation.execute.models import Model, build, not_installed
+from rockcheck.validation.execute import models
 from rockcheck.validation.studies.work_precision.runs import pulse
 
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
@@ -396,9 +404,9 @@ def _histories() -> Iterator[Pair]:
         ("pybullet", slow),
         ("pybullet", {"time_step": "adaptive"}),
     ):
-        if not_installed(name):
+        if models.not_installed(name):
             continue
-        model = build(name, settings)
+        model = models.build(name, settings)
         label = f"{name} adaptive" if "adaptive" in settings.values() else name
         remark = "a wall out of reach against none" + (
             ", and with it another share of penetration removed" if label == "pybullet" else ""
@@ -417,7 +425,8 @@ def _histories() -> Iterator[Pair]:
     for step in (1e-3, "adaptive"):
         label = "mujoco adaptive" if step == "adaptive" else "mujoco"
         mended, plain = (
-            build("mujoco", {"time_step": step, "cone_correction": on}) for on in (True, False)
+            models.build("mujoco", {"time_step": step, "cone_correction": on})
+            for on in (True, False)
         )
         yield _of_histories(
             label,
@@ -437,9 +446,13 @@ def _histories() -> Iterator[Pair]:
 
 
 def _of_histories(
-    label: str, thing: str, dear: tuple[Model, Scene], cheap: tuple[Model, Scene], remark: str
+    label: str,
+    thing: str,
+    dear: tuple[models.Model, Scene],
+    cheap: tuple[models.Model, Scene],
+    remark: str,
 ) -> Pair:
-    def cost(model: Model, scene: Scene) -> Play:
+    def cost(model: models.Model, scene: Scene) -> Play:
         return lambda: 1e3 * model.simulate(scene).cost.cpu_seconds / scene.duration
 
     # theta by time, to the nanosecond
@@ -482,8 +495,8 @@ def _mujoco_steps() -> list[Pair]:
         path = Path(folder) / "world.xml"
         mujoco.mj_saveLastXML(str(path), world.model)
         text = path.read_text(encoding="utf-8")
-    models = {thing: _loaded(text, thing) for thing in ("", *CHANGES)}
-    bare = models["contact pairs"]
+    loaded = {thing: _loaded(text, thing) for thing in ("", *CHANGES)}
+    bare = loaded["contact pairs"]
 
     def steps(model: Any, data: Any) -> None:
         for _ in range(_STEPS):
@@ -496,7 +509,7 @@ def _mujoco_steps() -> list[Pair]:
 
     played = {
         thing: _timed(partial(steps, model), _STEPS, partial(_started, model))
-        for thing, model in models.items()
+        for thing, model in loaded.items()
     }
     whole, lean = played[""], played["contact pairs"]
     return [
@@ -585,7 +598,7 @@ def _started(model: Any) -> Any:
 
 
 def _pybullet_steps() -> list[Pair]:
-    if not_installed("pybullet"):
+    if models.not_installed("pybullet"):
         return []
     from rockcheck.engines import PyBullet
 
