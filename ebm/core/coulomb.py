@@ -20,11 +20,9 @@ then `EventBasedModel` (`friction`, `name`, `check`, `decides`), a family in
 stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's integration.
 """
 
-import numpy as np
-
 from rockcheck.ebm.core import contacts, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Shape
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Shape
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rests, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -92,31 +90,39 @@ def after_event(block, base, run):
 @inner_kernel
 def follow(block, base, run):
     """Selects the mode that follows, and names the event: UNTOLD where the mode goes on."""
-    state, ended = run.state, code_of(run.state.mode)
+    state, mode = run.state, run.state.mode
+    ended, family, pivot = code_of(mode), mode.family, mode.pivot
     if state.guard > Guard.FAR_GAP:
         state.event = _release(block, state)
-    event = state.event
-    # Events that are changes of mode and nothing else.
-    changes = event == Event.UPLIFT or event == Event.SLIPS or event == Event.LIFT_OFF
     if not modes.select(block, base, run):
         state.ending, state.event = Ending.NOT_FINITE, Event.UNTOLD
-    elif (changes or event == Event.RELEASE) and code_of(state.mode) == ended:
-        state.event = Event.UNTOLD
+    elif state.event == Event.RELEASE:
+        goes_on = code_of(mode) == ended
+        state.event = Event.UNTOLD if goes_on else _change(mode, family, pivot)
+
+
+@inner_kernel
+def _change(mode, family, pivot):
+    """The event of a change of mode without impact, by `family` and `pivot` of the mode before."""
+    if pivot != Pivot.OFF:
+        if mode.pivot == Pivot.OFF:
+            return Event.LIFT_OFF
+        if family == Family.FLAT and mode.family == Family.TILT:
+            return Event.UPLIFT
+        if pivot == Pivot.STICK and mode.pivot == Pivot.SLIPPING:
+            return Event.SLIPS
+    return Event.RELEASE
 
 
 @inner_kernel
 def tell(run, event):
-    """Notes an event, and one more where an impact ends in rest.
-
-    The end of rest is named by the mode that follows.
-    """
+    """Notes an event, and one more where an impact ends in rest."""
     state, mode = run.state, run.state.mode
     rest = mode_code(state) == 0
     if event == Event.UNTOLD or (event == Event.LEAVES_REST and rest):
         return
     if event == Event.LEAVES_REST:
-        state.t_rest = np.nan
-        event = Event.SLIPS if mode.family == Family.FLAT else Event.UPLIFT
+        event = _change(mode, Family.FLAT, Pivot.STICK)
     note(run, event, state.before)
     impact = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
     if impact and rest and run.records.log.shape[0] > state.events:
@@ -125,19 +131,13 @@ def tell(run, event):
 
 @inner_kernel
 def _release(block, state):
-    """Prepares the motion for a change of mode without impact, and names it."""
-    mode, which = state.mode, state.guard
-    if which == Guard.SLIP:
+    """Prepares the motion for a change of mode without impact: STICKS, or a kind of change."""
+    mode = state.mode
+    if state.guard == Guard.SLIP:
         if on_wall(mode):
             contacts.stop(state.motion)
         contacts.stand(block, state.motion)
         return Event.STICKS
-    if not block.unilateral and rests(mode) and not on_wall(mode):
-        # Or hangs on, or lands again: the next mode says which.
-        return Event.LEAVES_REST
-    if which == Guard.CONE_PLUS or which == Guard.CONE_MINUS:
-        return Event.SLIPS
-    if which == Guard.UPLIFT_PLUS or which == Guard.UPLIFT_MINUS:
-        return Event.UPLIFT
-    lifts = which == Guard.FLOOR_PUSH and block.unilateral
-    return Event.LIFT_OFF if lifts else Event.RELEASE
+    # A pulled block that leaves rest may hang on, or land again: the next mode says which.
+    leaves = not block.unilateral and rests(mode) and not on_wall(mode)
+    return Event.LEAVES_REST if leaves else Event.RELEASE

@@ -80,7 +80,7 @@ def begin(block, base, run):
     """Prepares the first mode at t = 0."""
     state, motion, control = run.state, run.state.motion, run.state.control
     state.ending, state.t = Ending.GOING, 0.0
-    state.t_rest = state.zeta = state.swing_energy = state.swing_place = np.nan
+    state.zeta = state.swing_energy = state.swing_place = np.nan
     state.peak, state.stride, state.swing, state.repeats = abs(motion.theta), np.inf, 0.0, False
     # All that a block does before it topples happens within alpha. Terms fall like the powers of a
     # ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what
@@ -89,7 +89,7 @@ def begin(block, base, run):
     state.tolerance_rad = control.tolerance * min(block.left.alpha, block.right.alpha)
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
     state.quiet_from = quiet_from(base, state.tolerance_rad)
-    state.steps = state.events = state.wall_impacts = state.rows = state.gains = 0
+    state.steps = state.events = state.rows = state.gains = 0
     state.largest_gain = state.impulse = 0.0
     state.rules[:] = 0
     state.winds = state.known = False
@@ -140,7 +140,6 @@ def resolve(block, base, run):
             modes.forget(state)  # a new motion: all modes may be tried again
         elif block.unilateral:
             state.event = Event.UNTOLD  # a block in flight passes theta = 0
-        state.wall_impacts += state.event == Event.WALL_IMPACT
 
 
 @inner_kernel

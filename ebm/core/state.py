@@ -56,11 +56,9 @@ STATE = record(
     mode=MODE,
     # Why the run has ended, an Ending.
     ending="i8",
-    # Clock: now, and when the run ends; since when the block rests; from when the base is quiet;
-    # how long the last steps were.
+    # Clock: now, and when the run ends; from when the base is quiet; how long the last steps were.
     t="f8",
     t_end="f8",
-    t_rest="f8",
     quiet_from="f8",
     stride="f8",
     # What the series are asked for, in rad: the tolerance, and how large the last term may be so
@@ -112,11 +110,10 @@ STATE = record(
     # Bouc-Wen friction: its variable z, and whether that winds, the pivot not having yielded.
     zeta="f8",
     winds="?",
-    # Counts: steps, events, wall impacts, rows written; impacts that added energy, and the largest
+    # Counts: steps, events, rows written; impacts that added energy, and the largest
     # gain; the modelling choices, a Rule each.
     steps="i8",
     events="i8",
-    wall_impacts="i8",
     rows="i8",
     gains="i8",
     largest_gain="f8",

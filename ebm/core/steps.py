@@ -169,8 +169,6 @@ def rest(block, base, run):
     to_left, to_right = block.left.arm / block.height, block.right.arm / block.height
     if not block.no_slip:
         to_left, to_right = min(to_left, block.mu_s), min(to_right, block.mu_s)
-    if math.isnan(state.t_rest):
-        state.t_rest = state.t
     # Of an acceleration, for all guards of rest to see it.
     noise = 2.0 * state.slack * NOISE[Kind.FORCE] / block.height
     low, high = -np.inf if mode.far != 0 else -to_right, np.inf if mode.tip != 0 else to_left

@@ -44,7 +44,6 @@ def run_to_end(scene: Scene, **settings: object) -> SimpleNamespace:
         t=found.t * natural.time_unit(scene),
         x=found.motion.x * scene.block.radius,
         peak=found.peak / scene.block.alpha,
-        wall_impacts=int(found.wall_impacts),
     )
 
 
@@ -82,7 +81,8 @@ def test_bilateral_row(line, row):
         )
     rattles = row["e_w"] == "1" and int(row["n_wall"]) > 20
     if line == GRAZING_ROW:
-        assert (run.wall_impacts, row["n_wall"]) == (5, "4")
+        events = EventBasedModel(tolerance=1e-12).simulate(scene).event_list
+        assert (sum(one.kind == "wall impact" for one in events), row["n_wall"]) == (5, "4")
         assert run.peak == pytest.approx(float(row["peak_theta_over_alpha"]), abs=6e-3)
         assert run.x == pytest.approx(float(row["x_final"]), abs=3e-3)
         return

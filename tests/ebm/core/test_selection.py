@@ -5,23 +5,18 @@ import math
 
 import numpy as np
 import pytest
-from situations import (
-    PIVOTS,
-    Core,
-    candidates,
-    margin,
-    random_tilt,
-    shentons,
-    upright,
-)
+from situations import PIVOTS, Core, candidates, margin, random_tilt, shentons, upright
 from stepping import TILTED, run_at
 
-from rockcheck.ebm.core import (
-    modes,
-)
+from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm.core import modes
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Rule
 from rockcheck.ebm.core.state import code_of
 from rockcheck.scenes import Wall
+from rockcheck.validation.studies.stress.generator import exact_scene, random_scene
+
+#: Modes of an upright block, of a pivot that stands, and of one that slips.
+FLAT, STANDS, SLIPS = {"rest", "slide"}, {"rest", "rock", "lean"}, {"slide", "slide-rock", "ladder"}
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
@@ -163,3 +158,31 @@ def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
         assert modes.select(core.setting, core.base, run)
         assert (mode.family, mode.pivot, state.slack) == (Family.FLAT, Pivot.STICK, slack)
         assert (state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (count, count)
+
+
+def name_of(before: str, after: str) -> str:
+    """The name of a change of mode of a block on the floor, without impact."""
+    if after == "flight":
+        return "lift-off"
+    if before in FLAT and after not in FLAT:
+        return "uplift"
+    return "slip" if before in STANDS and after in SLIPS else "release"
+
+
+@pytest.mark.parametrize("pivot", PIVOTS)
+def test_an_event_is_named_by_the_modes_before_and_after_it(pivot):
+    model, seen = EventBasedModel(pivot=pivot), set()
+    for number in range(400):
+        scene = (exact_scene, random_scene)[number % 2](11, number, pivot)
+        for one in model.simulate(scene).event_list:
+            if one.kind == "stick":
+                assert one.mode_before in SLIPS, (number, one)
+            elif (
+                one.kind in ("uplift", "slip", "lift-off", "release")
+                and one.mode_before != "flight"
+            ):
+                assert one.kind == name_of(one.mode_before, one.mode_after), (number, one)
+                seen.add(one.kind)
+    assert seen == {"uplift", "slip", "release"} | (
+        {"lift-off"} if pivot == "unilateral" else set()
+    )

@@ -179,3 +179,31 @@ def test_nothing_rebounds_between_two_walls(gap, leans):
     assert not strike._wall_impact(b, state, False, 1e-9)
     assert (state.rules[Rule.WEDGED], state.rules.sum(), state.impulse) == (1, 1, 0.3)
     assert six(state.motion)[3:].tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("tilt", [9e-11, -9e-11])
+def test_a_tilt_of_rounding_is_set_upright_about_its_pivot(tilt):
+    """The lower corner keeps its height, and its slip if that is more than rounding."""
+    block = setting_of(PAPER_BLOCK)
+    motion = run_at((0.0, 0.9, tilt, 0.01, 0.0, 9e-10)).state.motion
+    height, slip = contacts.floor_gap(block, motion), contacts.slip_velocity(block, motion)
+    contacts.upright(block, motion)
+    assert (motion.theta, motion.w, motion.vx) == (0.0, 0.0, slip)
+    assert contacts.floor_gap(block, motion) == pytest.approx(height, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("gap", "rate", "seen"),
+    [
+        (9e-11, -9e-10, (0.0, 0.0)),
+        (-9e-11, -9e-10, (0.0, 0.0)),
+        (9e-11, -2e-9, (9e-11, -2e-9)),
+        (-9e-11, -2e-9, (0.0, -2e-9)),
+        (9e-11, 0.0, (9e-11, 0.0)),
+        (-9e-11, 1.0, (0.0, 1.0)),
+        (2e-10, -9e-10, (2e-10, -9e-10)),
+    ],
+)
+def test_a_gap_that_is_closed_to_rounding(gap, rate, seen):
+    """It rests where it closes slowly, and has no depth where it is let go."""
+    assert contacts.closed_gap(gap, rate) == seen
