@@ -12,7 +12,7 @@ from stepping import assert_contacts_hold
 from rockcheck.ebm import EventBasedModel, packed
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.ebm.core import names
-from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead
+from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead, weightless_at
 from rockcheck.ebm.core.lanes import LANES
 from rockcheck.scenes import (
     PAPER_BLOCK,
@@ -266,6 +266,13 @@ def test_impulse_ahead_is_the_integral(symmetric, share):
     )
     assert impulse_ahead(ground, t) == pytest.approx(there, rel=1e-9)
     assert impulse_ahead(ground, ground.form.centre) == math.inf
+
+
+@pytest.mark.parametrize(("early", "found"), [(5e-7, 0.0), (3e-6, 3e-6), (-1e-7, -1e-7)])
+def test_a_base_that_soon_falls_faster_than_g_leaves_a_block_weightless(early, found):
+    ground = ground_of(Sine(amplitude=-1.5 * 9.81, period=2.0), 9.81, 0.4)
+    passes = math.asin(1.0 / 1.5) / ground.form.rate
+    assert weightless_at(ground, passes - early) == pytest.approx(passes - found, abs=1e-12)
 
 
 def test_inner_kernels_return_no_arrays(monkeypatch):

@@ -12,7 +12,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import modes
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Rule
 from rockcheck.ebm.core.state import code_of
-from rockcheck.scenes import Wall
+from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Scene, Wall
 from rockcheck.validation.studies.stress.generator import exact_scene, random_scene
 
 #: Modes of an upright block, of a pivot that stands, and of one that slips.
@@ -186,3 +186,22 @@ def test_an_event_is_named_by_the_modes_before_and_after_it(pivot):
     assert seen == {"uplift", "slip", "release"} | (
         {"lift-off"} if pivot == "unilateral" else set()
     )
+
+
+@pytest.mark.parametrize(("more", "lands"), [(1e-5, ["floor impact"]), (-1e-5, [])])
+def test_a_pulled_block_lands_with_the_energy_that_takes_it_upright(more, lands):
+    """A floor that falls faster than g pulls the pivot of the paper's model: at g/5 more a tilt
+    of alpha/20 takes w^2 = 3/2 g/5R (cos(19/20 alpha) - cos(alpha))."""
+    alpha, falls = PAPER_BLOCK.alpha, Record.from_samples([-1.2 * 9.81] * 200, 0.01)
+    spin = math.sqrt(0.3 * 9.81 / PAPER_BLOCK.radius * (math.cos(0.95 * alpha) - math.cos(alpha)))
+    scene = Scene(
+        name="pulled",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.8),
+        vertical=falls,
+        initial_rotation=0.05 * alpha,
+        initial_angular_velocity=-spin * (1.0 + more),
+        duration=1.0,
+    )
+    events = EventBasedModel().simulate(scene).event_list
+    assert [one.kind for one in events if one.kind == "floor impact"] == lands
