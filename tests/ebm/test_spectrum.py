@@ -184,6 +184,16 @@ def test_what_is_decided_early_of_loaded_blocks():
     assert {-1, 0, 1} == set(decided_early(scenes, 1e-11, rtol=0.0, atol=1e-11).side.tolist())
 
 
+def test_a_block_past_its_balance_is_not_taken_for_fallen_while_it_may_turn_back():
+    """By its own spin, or thrown back by a wall in its way."""
+    steep = scene(excitation=Rest()).replace(
+        floor=Floor(friction=0.05), initial_rotation=1.05 * PAPER_BLOCK.alpha, duration=20.0
+    )
+    back = steep.replace(initial_angular_velocity=-0.4)
+    wall = steep.replace(walls=(Wall(side="left", gap=1.0, restitution=1.0),))
+    assert decided_early([back, wall, steep], 1e-9, rtol=1e-6).side.tolist() == [0, 0, -1]
+
+
 def test_a_record_is_scaled_and_the_block_resized():
     start = scene(excitation=RECORD)
     node = node_scene(start, 2.0, 0.5)
