@@ -27,9 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rockcheck.scenes import progress
 
     code = run(arguments, began=BEGAN)
-    if (
-        code == progress.INTERRUPTED
-    ):  # compiled code may still run in threads, which Python would wait for
+    # Compiled code may still run in threads, which Python would wait for.
+    if code == progress.INTERRUPTED:
         os._exit(code)
     return code
 

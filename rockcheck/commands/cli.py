@@ -271,9 +271,8 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
                 f" {where or f'this: {error}'}",
                 results.FAULT,
             )
-        if (
-            code == progress.INTERRUPTED
-        ):  # a study has gathered what there is, or Typer has caught it
+        # A study has gathered what there is, or Typer has caught it.
+        if code == progress.INTERRUPTED:
             return _told("interrupted; what was finished is kept", progress.INTERRUPTED)
         return code if isinstance(code, int) else 0
 

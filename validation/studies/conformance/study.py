@@ -194,9 +194,8 @@ class Trial(Task):
             value = float(what.value(*map(Motion, histories)))
         except (ValueError, IndexError) as error:  # the motion lacks the wanted event
             raise errors.ModelFailure(printable(error, 200)) from None
-        told = set(
-            chain.from_iterable(map(observation.scene_notes, what.scenes))
-        )  # of our own scenes
+        # Notes of our own scenes.
+        told = set(chain.from_iterable(map(observation.scene_notes, what.scenes)))
         return Seen(
             value if math.isfinite(value) else None,
             *what.judge(value),
