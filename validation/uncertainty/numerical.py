@@ -251,11 +251,6 @@ class Explanation(Stored):
     verdict: str
     reason: str = ""
 
-    @property
-    def u_val(self) -> float | None:
-        """The uncertainty of the comparison; None where the run is not converged."""
-        return None if self.u_num is None else math.hypot(self.u_num, self.u_input, self.u_data)
-
 
 def explain(
     quantity: str,

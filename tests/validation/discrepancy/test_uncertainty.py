@@ -161,24 +161,24 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
 
 
 @pytest.mark.parametrize(
-    ("error", "u_num", "known", "u_val", "said"),
+    ("error", "u_num", "known", "said"),
     [
-        (0.01, 0.02, (0.0, 0.0), 0.02, numerical.NUMERICAL),
-        (0.03, 0.02, (0.04, 0.0), 0.0447213595, numerical.INPUTS),
-        (0.03, 0.02, (0.01, 0.04), 0.0458257569, numerical.DATA),
-        (0.10, 0.03, (0.04, 0.0), 0.05, "not explained: model form or set-up, at least 0.05 alpha"),
+        (0.01, 0.02, (0.0, 0.0), numerical.NUMERICAL),
+        (0.03, 0.02, (0.04, 0.0), numerical.INPUTS),
+        (0.03, 0.02, (0.01, 0.04), numerical.DATA),
+        (0.10, 0.03, (0.04, 0.0), "not explained: model form or set-up, at least 0.05 alpha"),
+        (0.10, 0.03, (0.04, 0.06), "not explained: model form or set-up, at least 0.022 alpha"),
         # Nothing is known of inputs and tests.
-        (0.10, 0.04, (), 0.04, "not explained: model form or set-up, at least 0.06 alpha"),
-        (0.10, None, (0.04, 0.0), None, numerical.NOT_CONVERGED),
-        (None, 0.02, (0.04, 0.0), 0.0447213595, numerical.NOT_CONVERGED),
-        (0.02, 0.02, (0.0, 0.0), 0.02, numerical.NUMERICAL),  # at the limit it is within it
-        (0.04, 0.0, (0.04, 0.0), 0.04, numerical.INPUTS),
-        (0.03, 0.02, (0.03, 0.03), 0.0469041576, numerical.INPUTS),
+        (0.10, 0.04, (), "not explained: model form or set-up, at least 0.06 alpha"),
+        (0.10, None, (0.04, 0.0), numerical.NOT_CONVERGED),
+        (None, 0.02, (0.04, 0.0), numerical.NOT_CONVERGED),
+        (0.02, 0.02, (0.0, 0.0), numerical.NUMERICAL),  # at the limit it is within it
+        (0.04, 0.0, (0.04, 0.0), numerical.INPUTS),
+        (0.03, 0.02, (0.03, 0.03), numerical.INPUTS),
     ],
 )
-def test_what_a_difference_says(error, u_num, known, u_val, said):
-    found = numerical.explain("theta_rms", "alpha", error, u_num, *known)
-    assert (found.verdict, found.u_val) == (said, pytest.approx(u_val))
+def test_what_a_difference_says(error, u_num, known, said):
+    assert numerical.explain("theta_rms", "alpha", error, u_num, *known).verdict == said
 
 
 def test_bias_and_scatter_are_recovered_and_cover():
@@ -283,7 +283,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, verdict):
         for ends in ("at rest", "overturned left")
     )
     (found,) = comparing.explanations(BOOKCASE, own, [other], {}, inputs)
-    assert (found.verdict.startswith(verdict), found.u_val) == (True, 0.0)
+    assert found.verdict.startswith(verdict)
 
 
 def test_a_motion_that_depends_on_the_law_of_impacts_is_not_sure(tmp_path, told):
