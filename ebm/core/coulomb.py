@@ -22,8 +22,8 @@ stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's
 
 from rockcheck.ebm.core import contacts, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Shape
-from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rests, rocks
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Shape, Shown
+from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Largest ratio of successive steps; where a block rattles, short steps need few terms.
@@ -89,55 +89,50 @@ def after_event(block, base, run):
 
 @inner_kernel
 def follow(block, base, run):
-    """Selects the mode that follows, and names the event: UNTOLD where the mode goes on."""
-    state, mode = run.state, run.state.mode
-    ended, family, pivot = code_of(mode), mode.family, mode.pivot
+    """Selects the mode that follows; the event is UNTOLD where the mode goes on."""
+    state, ended = run.state, code_of(run.state.mode)
     if state.guard > Guard.FAR_GAP:
         state.event = _release(block, state)
     if not modes.select(block, base, run):
         state.ending, state.event = Ending.NOT_FINITE, Event.UNTOLD
-    elif state.event == Event.RELEASE:
-        goes_on = code_of(mode) == ended
-        state.event = Event.UNTOLD if goes_on else _change(mode, family, pivot)
-
-
-@inner_kernel
-def _change(mode, family, pivot):
-    """The event of a change of mode without impact, by `family` and `pivot` of the mode before."""
-    if pivot != Pivot.OFF:
-        if mode.pivot == Pivot.OFF:
-            return Event.LIFT_OFF
-        if family == Family.FLAT and mode.family == Family.TILT:
-            return Event.UPLIFT
-        if pivot == Pivot.STICK and mode.pivot == Pivot.SLIPPING:
-            return Event.SLIPS
-    return Event.RELEASE
+    elif state.event == Event.RELEASE and code_of(state.mode) == ended:
+        state.event = Event.UNTOLD
 
 
 @inner_kernel
 def tell(run, event):
     """Notes an event, and one more where an impact ends in rest."""
-    state, mode = run.state, run.state.mode
-    rest = mode_code(state) == 0
-    if event == Event.UNTOLD or (event == Event.LEAVES_REST and rest):
+    state, now = run.state, mode_code(run.state)
+    if event == Event.RELEASE:
+        event = _change(state.before, now)
+    if event == Event.UNTOLD:
         return
-    if event == Event.LEAVES_REST:
-        event = _change(mode, Family.FLAT, Pivot.STICK)
     note(run, event, state.before)
     impact = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
-    if impact and rest and run.records.log.shape[0] > state.events:
+    if impact and now == Shown.REST and run.records.log.shape[0] > state.events:
         note(run, Event.SETTLED, state.before)
 
 
 @inner_kernel
+def _change(before, now):
+    """The event of a change without impact, by the modes before and after it, as they are shown."""
+    if before == Shown.REST and now == Shown.REST:
+        return Event.UNTOLD
+    if before == Shown.FLIGHT:
+        return Event.RELEASE
+    if now == Shown.FLIGHT:
+        return Event.LIFT_OFF
+    if before <= Shown.SLIDE and now > Shown.SLIDE:
+        return Event.UPLIFT
+    return Event.SLIPS if before % 2 == 0 and now % 2 == 1 else Event.RELEASE
+
+
+@inner_kernel
 def _release(block, state):
-    """Prepares the motion for a change of mode without impact: STICKS, or a kind of change."""
-    mode = state.mode
-    if state.guard == Guard.SLIP:
-        if on_wall(mode):
-            contacts.stop(state.motion)
-        contacts.stand(block, state.motion)
-        return Event.STICKS
-    # A pulled block that leaves rest may hang on, or land again: the next mode says which.
-    leaves = not block.unilateral and rests(mode) and not on_wall(mode)
-    return Event.LEAVES_REST if leaves else Event.RELEASE
+    """Prepares the motion for a change of mode without impact: STICKS, else RELEASE."""
+    if state.guard != Guard.SLIP:
+        return Event.RELEASE
+    if on_wall(state.mode):
+        contacts.stop(state.motion)
+    contacts.stand(block, state.motion)
+    return Event.STICKS

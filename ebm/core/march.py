@@ -101,7 +101,7 @@ def begin(block, base, run):
     stands = motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     state.guard, state.before, state.changing = Guard.NONE, 0, True
     leaves = stands and closed_floor(block, motion)
-    state.event = Event.LEAVES_REST if leaves else Event.UNTOLD
+    state.event = Event.RELEASE if leaves else Event.UNTOLD
     mode = state.mode
     mode.family = mode.sense = mode.pivot = mode.slip = mode.pull = mode.tip = mode.far = 0
 

@@ -77,12 +77,12 @@ Row = _rows(
 
 ROWS = int(Row.END)
 
-#: Events of the log; not in it: none, and the end of rest, whose event depends on the next mode.
+#: Events of the log; not in it: none.
 Event = IntEnum(
     "Event",
-    "LEAVES_REST UNTOLD UPLIFT SLIPS STICKS FLOOR_IMPACT WALL_IMPACT LIFT_OFF LANDS RELEASE SETTLED"
+    "UNTOLD UPLIFT SLIPS STICKS FLOOR_IMPACT WALL_IMPACT LIFT_OFF LANDS RELEASE SETTLED"
     " FELL_LEFT FELL_RIGHT",
-    start=-2,
+    start=-1,
 )
 
 #: Names of the events.
@@ -99,8 +99,11 @@ EVENT_NAMES: dict[int, str] = {
     Event.FELL_LEFT: "overturned left",
     Event.FELL_RIGHT: "overturned right",
 }
-#: Names of the modes' codes (see `ebm.core.state.mode_code`).
-MODE_NAMES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight")
+#: The modes of a history (see `ebm.core.state.mode_code`): in odd ones the pivot slips.
+Shown = IntEnum("Shown", "REST SLIDE ROCK SLIDE_ROCK LEAN LADDER FLIGHT", start=0)
+
+#: Names of these modes.
+MODE_NAMES = tuple(one.name.lower().replace("_", "-") for one in Shown)
 
 #: How a run ended.
 Ending = IntEnum(

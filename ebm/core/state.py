@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import record
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, Pivot, Row
+from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, Pivot, Row, Shown
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -220,14 +220,14 @@ def code_of(mode):
 
 @inner_kernel
 def mode_code(state):
-    """The mode's index in MODE_NAMES."""
+    """The mode as a history shows it, a Shown."""
     mode = state.mode
     if mode.pivot == Pivot.OFF:
-        return 6
+        return Shown.FLIGHT
     if mode.family == Family.FLAT:
-        return 0 if mode.pivot == Pivot.STICK else 1
-    wall = 2 if on_wall(mode) else 0
-    return wall + (2 if mode.pivot == Pivot.STICK or state.winds else 3)
+        return Shown.REST if mode.pivot == Pivot.STICK else Shown.SLIDE
+    first = Shown.LEAN if on_wall(mode) else Shown.ROCK
+    return first + (mode.pivot != Pivot.STICK and not state.winds)
 
 
 @inner_kernel

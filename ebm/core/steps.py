@@ -180,7 +180,7 @@ def rest(block, base, run):
         return
     state.t, state.stride = until, np.inf
     leave(state, Kind.FORCE)
-    state.guard, state.event = Guard.NONE, Event.LEAVES_REST
+    state.guard, state.event = Guard.NONE, Event.RELEASE
     state.before, state.changing = 0, True
 
 
