@@ -175,6 +175,7 @@ def test_an_event_is_named_by_the_modes_before_and_after_it(pivot):
     for number in range(400):
         scene = (exact_scene, random_scene)[number % 2](11, number, pivot)
         for one in model.simulate(scene).event_list:
+            seen.add(one.kind)
             if one.kind == "stick":
                 assert one.mode_before in SLIPS, (number, one)
             elif (
@@ -182,10 +183,8 @@ def test_an_event_is_named_by_the_modes_before_and_after_it(pivot):
                 and one.mode_before != "flight"
             ):
                 assert one.kind == name_of(one.mode_before, one.mode_after), (number, one)
-                seen.add(one.kind)
-    assert seen == {"uplift", "slip", "release"} | (
-        {"lift-off"} if pivot == "unilateral" else set()
-    )
+    assert seen >= {"uplift", "slip", "release", "settled"}
+    assert ("lift-off" in seen) == (pivot == "unilateral")
 
 
 @pytest.mark.parametrize(("more", "lands"), [(1e-5, ["floor impact"]), (-1e-5, [])])
