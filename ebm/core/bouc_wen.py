@@ -101,7 +101,7 @@ def after_event(block, base, run):
     if begins and mode.family == Family.TILT and not modes.select(block, base, run):
         state.ending = Ending.NOT_FINITE
     state.winds = mode.pivot != Pivot.SLIPPING or mode.sense * mode.slip * state.zeta != 1.0
-    coulomb.tell(run, state.event)
+    coulomb.tell(run)
 
 
 @inner_kernel

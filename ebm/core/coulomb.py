@@ -22,7 +22,7 @@ stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's
 
 from rockcheck.ebm.core import contacts, guards, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Row, Shape, Shown
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Kind, Row, Shape
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -84,7 +84,7 @@ def after_event(block, base, run):
     if not state.known:
         follow(block, base, run)
     state.known = False
-    tell(run, state.event)
+    tell(run)
 
 
 @inner_kernel
@@ -100,29 +100,29 @@ def follow(block, base, run):
 
 
 @inner_kernel
-def tell(run, event):
-    """Notes an event, and one more where an impact ends in rest."""
-    state, now = run.state, mode_code(run.state)
+def tell(run):
+    """Notes the state's event, and one more where an impact ends in rest."""
+    state, event, now = run.state, run.state.event, mode_code(run.state)
     if event == Event.RELEASE:
         event = _change(state.before, now)
     if event == Event.UNTOLD:
         return
     note(run, event, state.before)
     impact = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
-    if impact and now == Shown.REST and run.records.log.shape[0] > state.events:
+    if impact and now == HistoryMode.REST and run.records.log.shape[0] > state.events:
         note(run, Event.SETTLED, state.before)
 
 
 @inner_kernel
 def _change(before, now):
     """The event of a change without impact, by the modes before and after it, as they are shown."""
-    if before == Shown.REST and now == Shown.REST:
+    if before == HistoryMode.REST and now == HistoryMode.REST:
         return Event.UNTOLD
-    if before == Shown.FLIGHT:
+    if before == HistoryMode.FLIGHT:
         return Event.RELEASE
-    if now == Shown.FLIGHT:
+    if now == HistoryMode.FLIGHT:
         return Event.LIFT_OFF
-    if before <= Shown.SLIDE and now > Shown.SLIDE:
+    if before <= HistoryMode.SLIDE and now > HistoryMode.SLIDE:
         return Event.UPLIFT
     return Event.SLIPS if before % 2 == 0 and now % 2 == 1 else Event.RELEASE
 

@@ -100,10 +100,10 @@ EVENT_NAMES: dict[int, str] = {
     Event.FELL_RIGHT: "overturned right",
 }
 #: The modes of a history (see `ebm.core.state.mode_code`): in odd ones the pivot slips.
-Shown = IntEnum("Shown", "REST SLIDE ROCK SLIDE_ROCK LEAN LADDER FLIGHT", start=0)
+HistoryMode = IntEnum("HistoryMode", "REST SLIDE ROCK SLIDE_ROCK LEAN LADDER FLIGHT", start=0)
 
 #: Names of these modes.
-MODE_NAMES = tuple(one.name.lower().replace("_", "-") for one in Shown)
+MODE_NAMES = tuple(one.name.lower().replace("_", "-") for one in HistoryMode)
 
 #: How a run ended.
 Ending = IntEnum(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import record
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, Pivot, Row, Shown
+from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, HistoryMode, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -220,13 +220,13 @@ def code_of(mode):
 
 @inner_kernel
 def mode_code(state):
-    """The mode as a history shows it, a Shown."""
+    """The mode as a history shows it, a HistoryMode."""
     mode = state.mode
     if mode.pivot == Pivot.OFF:
-        return Shown.FLIGHT
+        return HistoryMode.FLIGHT
     if mode.family == Family.FLAT:
-        return Shown.REST if mode.pivot == Pivot.STICK else Shown.SLIDE
-    first = Shown.LEAN if on_wall(mode) else Shown.ROCK
+        return HistoryMode.REST if mode.pivot == Pivot.STICK else HistoryMode.SLIDE
+    first = HistoryMode.LEAN if on_wall(mode) else HistoryMode.ROCK
     return first + (mode.pivot != Pivot.STICK and not state.winds)
 
 
