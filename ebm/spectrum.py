@@ -109,7 +109,12 @@ def overturning_spectrum(
             "frequency_ratios",
         )
     errors.check_kind(scene, Scene, "load_scene", "scene")
-    check_excitation(scene)
+    if scene.excitation.kind not in ("ricker", "sine", "record"):
+        raise InputError(
+            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse,"
+            " or a record",
+            "excitation.kind",
+        )
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
         model.check(scene)
@@ -223,9 +228,10 @@ def play_motions(
     made = cache(partial(node_scene, scene))
     played = [made(a if changing else 1.0, f) for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
-    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)._replace(durations=lengths)
+    packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
+    packed = packed._replace(durations=lengths, output_steps=lengths / parts)
     found = batch.run_batch(
-        packed, model, until_decided=False, parts=parts, strict=False, jobs=jobs
+        packed, model, until_decided=False, rows=parts + 1, strict=False, jobs=jobs
     )
     motions: list[Motion | None] = []
     for one, failed, side, at_rest, states, written in zip(
@@ -271,16 +277,6 @@ def node_pulse(scene: Scene, amplitude_ratio: Any, frequency_ratio: Any) -> tupl
     """
     amplitude = amplitude_ratio * scene.gravity * scene.block.slope
     return amplitude, 2.0 * math.pi / (frequency_ratio * scene.frequency_parameter)
-
-
-def check_excitation(scene: Scene) -> None:
-    """Raises `InputError` where the scene's excitation has no size that a spectrum could vary."""
-    if scene.excitation.kind not in ("ricker", "sine", "record"):
-        raise InputError(
-            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse,"
-            " or a record",
-            "excitation.kind",
-        )
 
 
 def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]) -> None:

@@ -6,8 +6,6 @@ position, one of velocity.
 
 import math
 
-import numpy as np
-
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
@@ -157,13 +155,3 @@ def land_upright(block, motion, sign, on_floor):
         motion.x = -block.gap_left
     elif right < CLOSED and right < left:
         motion.x = block.gap_right
-
-
-@inner_kernel
-def between_walls(block, motion):
-    """Whether the block touches both walls at once."""
-    return (
-        block.gap_left < np.inf
-        and block.gap_right < np.inf
-        and wall_gap(block, motion, 1) + wall_gap(block, motion, -1) < CLOSED
-    )

@@ -13,8 +13,8 @@ How to add a guard:
 2. A line in `GUARDS`, and in `fill_guards` its weights, positive as long as the mode may last.
 3. `rock_guards_hold`: ROCK takes a short cut past the table, so that a guard of ROCK is bounded
    there, too.
-4. `ebm.core.coulomb._release` and `ebm.core.bouc_wen._follow` say which event its end is. A new one
-   is a member of `Event` with a line in `EVENT_NAMES`, and stands in the glossary.
+4. `ebm.core.coulomb._change` names the event by the modes before and after it. A new one is a
+   member of `Event` with a line in `EVENT_NAMES`, and stands in the glossary.
 
 A guard ends its mode, and takes part in the choice of the next one (`ebm.core.modes.wrong_by`): it
 is not negative in a mode that may begin. What only tells, as the passing of an angle, is no guard:
@@ -363,12 +363,6 @@ def _past_a_touch(which, degree, times, noise, a):
 
 
 @inner_kernel
-def _latest(tau, which, other):
-    """The time before which a root of another guard takes the place of this one's at tau."""
-    return tau - series.INSTANT if 0 <= which <= Guard.FAR_GAP < other else tau
-
-
-@inner_kernel
 def first_event(run):
     """The first time within the step at which a guard ends the mode, and which guard.
 
@@ -388,7 +382,8 @@ def first_event(run):
         if math.isnan(root):
             tau, which = root, k
             break
-        if root == series.NO_ROOT or root >= _latest(tau, which, k):
+        gap = 0 <= which <= Guard.FAR_GAP < k
+        if root == series.NO_ROOT or root >= (tau - series.INSTANT if gap else tau):
             continue
         past = _past_a_touch(k, degree, (root, h), noise, a)
         if past < tau:

@@ -59,9 +59,7 @@ def loop_with(friction: ModuleType) -> object:
     @inner_kernel
     def play_row(rows, i, state, work, records, found):
         """Plays row i in the state, and notes what is kept of it."""
-        begin, motion = rows.starts[i], state.motion
-        motion.x, motion.y, motion.theta = begin.x, begin.y, begin.theta
-        motion.vx, motion.vy, motion.w = begin.vx, begin.vy, begin.w
+        state.motion = rows.starts[i]
         state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
         sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
         base = Base(
@@ -155,9 +153,7 @@ def end(run):
 @inner_kernel
 def keep(state, found):
     """Writes what is kept of a run."""
-    motion, last = state.motion, found.motion
-    last.x, last.y, last.theta = motion.x, motion.y, motion.theta
-    last.vx, last.vy, last.w = motion.vx, motion.vy, motion.w
+    found.motion = state.motion
     found.t, found.peak, found.ending = state.t, state.peak, state.ending
     found.steps, found.rows, found.at_rest = state.steps, state.rows, rests(state.mode)
 

@@ -34,7 +34,7 @@ def _candidates() -> np.ndarray:
     More contacts come first, sticking before slipping, a pushing floor before a pulling one.
     Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or
     left, 2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses
-    are relative to that of `tips_first`.
+    are relative to the side that is `favoured`, left where none is.
     """
     stands = [
         (Family.FLAT, 1, Pivot.STICK, 0, pull, walls, 0)
@@ -152,11 +152,15 @@ def _guard_wrong_by(state, which, order, ahead, a, measured):
         return 0.0
     if not measured:
         return np.inf
-    return series.contradiction(a, Row.GUARD, degree, noise, ahead) / noise if sign < 0 else 1.0
+    slack = 1.0
+    while sign < 0:
+        slack *= 4.0
+        sign = series.leading(a, Row.GUARD, degree, slack * noise, ahead)
+    return slack
 
 
 @inner_kernel
-def _favoured(block, base, state):
+def favoured(block, base, state):
     """The side to which a flat block at rest would rather tip: +1 left, -1 right, 0 neither.
 
     It is 0 where the scene is its own mirror image. Both sides fit only by rounding, or where the
@@ -177,15 +181,6 @@ def _favoured(block, base, state):
     if toward == 0.0:
         toward = block.right.arm - block.left.arm
     return 0 if toward == 0.0 else (1 if toward > 0.0 else -1)
-
-
-@inner_kernel
-def tips_first(block, base, state):
-    """The side to which a flat block is first tried to tip, +1 left or -1 right.
-
-    It is the sense in which all of the block is calculated.
-    """
-    return 1 if _favoured(block, base, state) >= 0 else -1
 
 
 @inner_kernel
@@ -327,12 +322,12 @@ def _touching(block, base, state):
         first = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
         near = touched_walls(block, motion, first, False)
         return _Touching(first, first, floor, v, 0, near, 0, near)
-    favoured = _favoured(block, base, state)
-    first = 1 if favoured >= 0 else -1
+    side = favoured(block, base, state)
+    first = 1 if side >= 0 else -1
     walls = touched_walls(block, motion, 1, True)
     near = touched_walls(block, motion, first, False)
     away = touched_walls(block, motion, -first, False)
-    return _Touching(favoured, first, floor, v, walls, near, away, _FLAT_TRIES)
+    return _Touching(side, first, floor, v, walls, near, away, _FLAT_TRIES)
 
 
 @called_kernel

@@ -541,9 +541,15 @@ def flat_series(block, base, run, order):
 
 
 @inner_kernel
-def _tilt_at(block, state, a, tau, motion):
-    """Writes the motion of a tilted block, on the contacts to rounding."""
+def motion_at(block, state, a, tau, motion):
+    """Writes the motion at tau after the start of the series into `motion`.
+
+    That of a tilted block is on its contacts to rounding.
+    """
     mode, order, pivot = state.mode, state.order, state.place
+    if mode.family == Family.FLAT:
+        _flat_at(block, state, a, tau, motion)
+        return
     sign = float(mode.sense)
     phi = value(a, Row.PHI, order, tau)
     w = value(a, Row.OMEGA, order - 1, tau)
@@ -591,12 +597,3 @@ def _flat_at(block, state, a, tau, motion):
         motion.y = block.height
         motion.vy = 0.0
     motion.theta = motion.w = 0.0
-
-
-@inner_kernel
-def motion_at(block, state, a, tau, motion):
-    """Writes the motion at tau after the start of the series into `motion`."""
-    if state.mode.family == Family.FLAT:
-        _flat_at(block, state, a, tau, motion)
-    else:
-        _tilt_at(block, state, a, tau, motion)

@@ -196,14 +196,6 @@ def leads_up(begin, rate, half_bend, floor, ahead):
 
 
 @inner_kernel
-def contradiction(a, row, n, floor, ahead):
-    """The least noise, a multiple of `floor`, for which c would not leave tau = 0 downward."""
-    while leading(a, row, n, floor, ahead) < 0:
-        floor *= 4.0
-    return floor
-
-
-@inner_kernel
 def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 

@@ -153,7 +153,8 @@ def _wall_impact(block, state, tip, resting):
     """
     mode, motion = state.mode, state.motion
     # Wedged: between both walls at once nothing rebounds.
-    if contacts.between_walls(block, motion) or on_wall(mode):
+    gaps = contacts.wall_gap(block, motion, 1) + contacts.wall_gap(block, motion, -1)
+    if gaps < contacts.CLOSED or on_wall(mode):
         state.rules[Rule.WEDGED] += 1
         state.impulse = abs(motion.vx)
         contacts.stop(motion)
@@ -187,7 +188,10 @@ def _corner_impact(block, state, sw, e, resting):
     corner = impacts.Corner(1.0, sw, s, c, sw * cp, side.share, block.spin)
     branch, w2, xdot2, n, p, v2 = impacts.wall_impact(block, corner, e, w1, xdot1)
     state.impulse = abs(p) + n
-    count_gain(before, xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / block.spin, state)
+    after = xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / block.spin
+    if after > before * (1.0 + 10.0 * ROUNDING):
+        state.gains += 1
+        state.largest_gain = max(state.largest_gain, after / before - 1.0)
     C = corner.C
     stays = e == 0.0 and branch != impacts.Branch.B_STICK and branch != impacts.Branch.E_SLIP
     stays = stays or sw * (xdot2 - C * w2) < resting
@@ -206,19 +210,14 @@ def _corner_impact(block, state, sw, e, resting):
     return False
 
 
-@inner_kernel
-def count_gain(before, after, state):
-    """Counts an impact that added energy, and keeps the largest relative gain."""
-    if after > before * (1.0 + 10.0 * ROUNDING):
-        state.gains += 1
-        state.largest_gain = max(state.largest_gain, after / before - 1.0)
-
-
 @called_kernel
 def _strike_all(block, base, run, resting):
     """Unilateral pivot: resolves all contacts touched at this instant."""
     state, mode, motion, work = run.state, run.state.mode, run.state.motion, run.stack
-    sense = modes.tips_first(block, base, state) if mode.family == Family.FLAT else mode.sense
+    sense = mode.sense
+    if mode.family == Family.FLAT:
+        # The sense in which a selection calculates, too.
+        sense = 1 if modes.favoured(block, base, state) >= 0 else -1
     sign = float(sense)
     phi = abs(motion.theta)
     flat = motion.theta == 0.0

@@ -21,7 +21,7 @@ from rockcheck import (
     Wall,
 )
 from rockcheck.ebm import natural
-from rockcheck.ebm.batch import play_ensemble
+from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.ebm.core import march, series
 from rockcheck.ebm.core.state import workspace
 
@@ -150,41 +150,41 @@ ENSEMBLE = [
 ]
 
 
+def batch(scenes, model=UNILATERAL, **given):
+    return run_batch(pack(scenes, model), model, until_decided=False, **given)
+
+
 def test_as_one_at_a_time():
-    found = play_ensemble(ENSEMBLE, UNILATERAL, rows=1000, jobs=3)
+    found = batch(ENSEMBLE, rows=201, columns=2, jobs=3)
     assert {-1, 0, 1} >= set(found.side.tolist()) > {0}
     for i, scene in enumerate(ENSEMBLE):
         history = UNILATERAL.simulate(scene)
         theta = history.channels["theta"]
-        assert np.array_equal(found.t[: len(theta)], history.channels["t"])
-        assert np.array_equal(found.theta[i, : len(theta)], theta)
+        assert np.array_equal(found.motion[i, : found.written[i]], theta)
         fallen = {-1: "overturned left", 1: "overturned right"}.get(int(found.side[i]))
         assert fallen == (history.outcome if "overturned" in history.outcome else None)
         if fallen:
-            assert np.all(found.theta[i, len(theta) :] == -0.5 * math.pi * found.side[i])
+            assert found.end["theta"][i] == -0.5 * math.pi * found.side[i]
             assert found.peak[i] == pytest.approx(0.5 * math.pi)
         else:
             assert found.peak[i] >= np.max(np.abs(theta)) > found.peak[i] - 1e-3
-            assert found.last_slip[i] == pytest.approx(history.channels["slip"][-1], abs=1e-12)
+            assert found.end["theta"][i] == pytest.approx(theta[-1], abs=1e-12)
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 def test_threads_change_nothing(jobs):
-    once, again = (
-        play_ensemble(ENSEMBLE, UNILATERAL, rows=50),
-        play_ensemble(ENSEMBLE * 5, UNILATERAL, rows=50, jobs=jobs),
-    )
-    for name, times in (("theta", (5, 1)), ("peak", 5)):
+    once, again = batch(ENSEMBLE, rows=50), batch(ENSEMBLE * 20, rows=50, jobs=jobs)
+    for name, times in (("motion", (20, 1, 1)), ("peak", 20)):
         assert np.array_equal(np.tile(getattr(once, name), times), getattr(again, name))
 
 
 @pytest.mark.parametrize(
     ("settings", "error", "said"),
     [
-        ({"most_steps": 3}, ModelFailure, "scene 0 of the ensemble: the cap on steps was reached"),
+        ({"most_steps": 3}, ModelFailure, "run 0 of the batch: the cap on steps was reached"),
         ({"friction": "bouc-wen"}, InputError, "Coulomb"),
     ],
 )
 def test_what_fails_is_told(settings, error, said):
     with pytest.raises(error, match=said):
-        play_ensemble(ENSEMBLE, EventBasedModel(**settings))
+        batch(ENSEMBLE, EventBasedModel(**settings))

@@ -159,7 +159,7 @@ def inputs_of(store: Store, given: files.UncertainScene) -> population.Inputs:
         "inputs",
         "validation.uncertainty.population",
         population.Inputs,
-        lambda: population.propagate(given).inputs,
+        lambda: population.propagate(given),
         spreads={name: spread.model_dump() for name, spread in given.spreads.items()},
         correlation=given.correlation.tolist(),
     )

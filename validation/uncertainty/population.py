@@ -9,17 +9,20 @@ number matters most.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import Floats, InputError, Scene, files
+from rockcheck.scenes import Floats, InputError, Scene, files, kinematics
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.figures import Stored
+
+if TYPE_CHECKING:
+    from rockcheck.ebm.batch import Outcomes
 
 #: Median and dispersion where no lognormal curve fits.
 NO_FIT = math.nan, math.nan
@@ -106,7 +109,7 @@ def curve_of(
         for rows in sets
     ]
     known = [one for one in medians if not math.isnan(one)]
-    low, high = _ends(known) if known and len(known) >= 0.9 * draws else NO_FIT
+    low, high = _ends(known).tolist() if known and len(known) >= 0.9 * draws else NO_FIT
     return Curve(label, len(hit), int(failed.sum()), median, dispersion, low, high, points)
 
 
@@ -163,10 +166,8 @@ def fit_lognormal(
 
 #: Default number of draws; Sobol's sequence is balanced for powers of two.
 SAMPLES = 1024
-#: Rows of a band's history at the most: a picture has no more columns.
+#: Times at which draws are compared, at the most.
 MOST_ROWS = 2000
-#: Shares of the draws between which the bands lie.
-BANDS = (0.025, 0.16, 0.5, 0.84, 0.975)
 _SEED = 1
 
 
@@ -222,23 +223,6 @@ class Inputs(Stored):
         )
 
 
-@dataclass(frozen=True)
-class Propagated:
-    """Draws of a scene, played.
-
-    `bands` on theta (alpha) have a row for each quantile of `BANDS` and a column for each of the
-    times `t` (s). `values` are the numbers of each draw, `peaks` its peak rotation (alpha, at most
-    1), `fallen` whether it overturned.
-    """
-
-    inputs: Inputs
-    t: Floats
-    bands: Floats
-    values: Floats
-    peaks: Floats
-    fallen: NDArray[np.bool_]
-
-
 def propagate(
     given: files.UncertainScene,
     *,
@@ -246,7 +230,7 @@ def propagate(
     samples: int = SAMPLES,
     seed: int = _SEED,
     indices: bool = True,
-) -> Propagated:
+) -> Inputs:
     """Play draws of an uncertain scene with an event-based model (default: the unilateral one).
 
     `samples` is rounded up to a power of two. Deterministic in `seed`. Raises `InputError` where
@@ -254,7 +238,7 @@ def propagate(
     """
     from scipy.stats import binomtest, qmc
 
-    from rockcheck.ebm.batch import play_ensemble
+    from rockcheck.ebm import natural
 
     if not given.spreads:
         raise InputError(
@@ -265,48 +249,60 @@ def propagate(
     values = given.values(
         qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count)
     )
-    played = play_ensemble([given.at(row) for row in values], model, rows=MOST_ROWS)
-    own = play_ensemble([given.scene], model)
-    peaks, fallen = np.minimum(played.peak / played.alpha, 1.0), played.side != 0
-    bands = np.quantile(played.theta / given.scene.block.alpha, BANDS, axis=0)
+    step = max(given.scene.output_step, given.scene.duration / MOST_ROWS)
+    given = replace(given, scene=given.scene.replace(output_step=step))
+    # The scene itself, and its draws.
+    scenes = [given.scene, *map(given.at, values)]
+    found, peaks = _played(scenes, model, rows=len(given.scene.output_times))
+    ended = np.arange(found.motion.shape[1]) >= found.written[:, None]
+    theta = np.where(ended, found.end["theta"][:, None], found.motion)[1:]
+    low, high = _ends(theta / given.scene.block.alpha)
+    slips = np.empty(len(scenes))
+    for n, (scene, end) in enumerate(zip(scenes, found.end.tolist(), strict=True)):
+        ((x, _, tilt, *_),) = natural.to_si(scene, np.array([end]))
+        slips[n] = kinematics.slip(scene.block, x, tilt)
+    stands, fallen = found.side == 0, found.side[1:] != 0
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(
         measures.CONFIDENCE, method="wilson"
     )
-    return Propagated(
-        Inputs(
-            samples=count,
-            model=model.name,
-            names=given.names,
-            figures=(
-                _interval("peak_rotation", "alpha", np.minimum(own.peak / own.alpha, 1.0), peaks),
-                *(
-                    [_interval("last_slip", "m", own.last_slip, played.last_slip[~fallen])]
-                    if np.any(~fallen) and not own.side[0]
-                    else ()
-                ),
+    return Inputs(
+        samples=count,
+        model=model.name,
+        names=given.names,
+        figures=(
+            _interval("peak_rotation", "alpha", peaks),
+            *(
+                [_interval("last_slip", "m", slips[stands])]
+                if stands[0] and not fallen.all()
+                else ()
             ),
-            overturns=Interval(
-                name="overturns",
-                unit="1",
-                value=float(np.mean(fallen)),
-                low=share.low,
-                high=share.high,
-            ),
-            sensitivities=sensitivities(given, model, seed=seed)
-            if indices and given.independent
-            else (),
-            theta_band=float(np.sqrt(np.mean((0.5 * (bands[-1] - bands[0])) ** 2))),
-            note=""
-            if given.independent
-            else "inputs are correlated: Sobol indices, which are for independent ones, are left"
-            " out",
         ),
-        played.t,
-        bands,
-        values,
-        peaks,
-        fallen,
+        overturns=Interval(
+            name="overturns",
+            unit="1",
+            value=float(np.mean(fallen)),
+            low=share.low,
+            high=share.high,
+        ),
+        sensitivities=sensitivities(given, model, seed=seed)
+        if indices and given.independent
+        else (),
+        theta_band=float(np.sqrt(np.mean((0.5 * (high - low)) ** 2))),
+        note=""
+        if given.independent
+        else "inputs are correlated: Sobol indices, which are for independent ones, are left out",
     )
+
+
+def _played(
+    scenes: Sequence[Scene], model: EventBasedModel, rows: int = 0
+) -> "tuple[Outcomes, Floats]":
+    """What a model makes of scenes, with rows of theta; and their peaks, in alpha, at most 1."""
+    from rockcheck.ebm.batch import pack, run_batch
+
+    found = run_batch(pack(scenes, model), model, until_decided=False, rows=rows, columns=2)
+    alphas = np.array([scene.block.alpha for scene in scenes])
+    return found, np.minimum(found.peak / alphas, 1.0)
 
 
 def sensitivities(
@@ -323,13 +319,9 @@ def sensitivities(
     """
     from scipy.stats import sobol_indices
 
-    from rockcheck.ebm.batch import pack, run_batch
-
     def peak_and_fall(points: Floats) -> Floats:
-        scenes = [given.at(row) for row in points.T]
-        found = run_batch(pack(scenes, model), model, until_decided=False)
-        alphas = np.array([scene.block.alpha for scene in scenes])
-        return np.array([np.minimum(found.peak / alphas, 1.0), found.side != 0], dtype=float)
+        found, peaks = _played([given.at(row) for row in points.T], model)
+        return np.array([peaks, found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
     chance = np.random.default_rng(seed)
@@ -346,13 +338,13 @@ def sensitivities(
     )
 
 
-def _ends(values: Floats | list[float]) -> tuple[float, float]:
-    low, high = np.quantile(
-        values, (0.5 - 0.5 * measures.CONFIDENCE, 0.5 + 0.5 * measures.CONFIDENCE)
-    )
-    return float(low), float(high)
+def _ends(values: Floats | list[float]) -> Floats:
+    """The ends of the interval of `CONFIDENCE` of values, which may be rows."""
+    half = 0.5 * measures.CONFIDENCE
+    return np.quantile(values, (0.5 - half, 0.5 + half), axis=0)
 
 
-def _interval(name: str, unit: str, own: Floats, draws: Floats) -> Interval:
-    low, high = _ends(draws)
-    return Interval(name=name, unit=unit, value=float(own[0]), low=low, high=high)
+def _interval(name: str, unit: str, values: Floats) -> Interval:
+    """The scene's own value, the first one, with the interval of its draws'."""
+    low, high = _ends(values[1:]).tolist()
+    return Interval(name=name, unit=unit, value=float(values[0]), low=low, high=high)

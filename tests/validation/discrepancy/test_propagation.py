@@ -1,9 +1,6 @@
 """What a spread of the inputs makes of the figures, on a scene with a closed form: the peak of free
 rocking is its first tilt."""
 
-import math
-
-import numpy as np
 import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
@@ -37,8 +34,7 @@ def span(one):
 
 
 def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
-    found = population.propagate(tilted(0.5), indices=False)
-    inputs = found.inputs
+    inputs = population.propagate(tilted(0.5), indices=False)
     peak = pytest.approx((0.5, 0.5 - 0.05 * NORMAL, 0.5 + 0.05 * NORMAL), abs=2e-3)
     assert [(one.name, one.unit, span(one)) for one in inputs.figures] == [
         ("peak_rotation", "alpha", peak),
@@ -51,16 +47,25 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
         "ebm-unilateral",
         (),
     )
-    assert not found.fallen.any()
     wilson = NORMAL**2 / (population.SAMPLES + NORMAL**2)
     assert span(inputs.overturns) == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
-    # At the start the bands are the quantiles of a normal number.
-    assert found.bands[:, 0] == pytest.approx(
-        [0.5 + 0.05 * z for z in (-NORMAL, -0.994458, 0.0, 0.994458, NORMAL)], abs=2e-3
+    # Just after the start the rotations are still spread as the first ones.
+    early = population.propagate(tilted(0.5, duration=0.02), indices=False)
+    assert early.u_input("theta_rms") == pytest.approx(0.05 * NORMAL, abs=1e-3)
+
+
+def test_the_slip_of_a_block_that_slides_to_a_stop_is_spread_as_its_friction():
+    sliding = Scene(
+        name="sliding",
+        block=Block(half_width=1.0, half_height=0.2),
+        floor=Floor(friction=0.3),
+        duration=1.0,
+        initial_velocity=1.0,
     )
-    assert inputs.u_input("theta_rms") == pytest.approx(
-        math.sqrt(np.mean((0.5 * (found.bands[4] - found.bands[0])) ** 2))
-    )
+    given = files.uncertain_scene(sliding, {"floor.friction": files.Spread(low=0.2, high=0.4)}, {})
+    found = population.propagate(given, indices=False).figures[1]
+    stops = [1.0 / (2.0 * friction * sliding.gravity) for friction in (0.3, 0.395, 0.205)]
+    assert (found.name, span(found)) == ("last_slip", pytest.approx(stops, rel=1e-3))
 
 
 @pytest.mark.parametrize("value", [0.5, 0.7])
@@ -75,13 +80,13 @@ def test_a_figure_lies_within_its_farther_end(value):
     ("asked", "drawn"), [(33, 64), (2, 2), (population.SAMPLES, population.SAMPLES)]
 )
 def test_draws_of_sobol_are_balanced(asked, drawn):
-    assert population.propagate(tilted(0.5), samples=asked, indices=False).inputs.samples == drawn
+    assert population.propagate(tilted(0.5), samples=asked, indices=False).samples == drawn
 
 
 def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
     found = population.propagate(
         tilted(1.0, duration=6.0), model=EventBasedModel(tolerance=1e-8), indices=False
-    ).inputs
+    )
     assert span(found.overturns) == (
         pytest.approx(0.5, abs=0.01),
         pytest.approx(0.5 - NORMAL / 2 / 32, abs=0.012),
@@ -98,12 +103,12 @@ def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
 @pytest.mark.parametrize(("tilt", "all_fall"), [(1.05, False), (1.3, True)])
 def test_where_the_scenes_own_block_falls_nothing_is_said_of_a_slip(tilt, all_fall):
     drawn = population.propagate(tilted(tilt, duration=3.0), samples=64, indices=False)
-    names = [one.name for one in drawn.inputs.figures]
-    assert (drawn.fallen.all(), names) == (all_fall, ["peak_rotation"])
+    names = [one.name for one in drawn.figures]
+    assert (drawn.overturns.value == 1.0, names) == (all_fall, ["peak_rotation"])
 
 
 def test_what_the_peak_does_not_depend_on_has_no_index():
-    found = population.propagate(tilted(0.5), samples=64).inputs
+    found = population.propagate(tilted(0.5), samples=64)
     assert found.note == ""
     assert {one.name: (one.first, one.total) for one in found.sensitivities} == {
         "initial_rotation": pytest.approx((1.0, 1.0), abs=0.05),
@@ -121,7 +126,5 @@ def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
 
 
 def test_correlated_inputs_have_no_indices_and_a_note_says_so():
-    found = population.propagate(
-        tilted(0.5, {"initial_rotation, floor.friction": 0.5}), samples=64
-    ).inputs
+    found = population.propagate(tilted(0.5, {"initial_rotation, floor.friction": 0.5}), samples=64)
     assert (found.sensitivities, "correlated" in found.note) == ((), True)

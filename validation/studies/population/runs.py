@@ -166,9 +166,7 @@ class Certainty(OneScene):
                 models.build(self.model, dict(self.settings)), self.scene
             ),
             depends_on_law_from_s=None if landing is None else landing.t,
-            inputs=population.propagate(self.given, samples=self.samples).inputs
-            if self.given
-            else None,
+            inputs=population.propagate(self.given, samples=self.samples) if self.given else None,
         )
 
 
