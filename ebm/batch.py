@@ -10,24 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.names import FAILURES, Ending
-from rockcheck.ebm.core.state import FOUND, Records, Rows
+from rockcheck.ebm.core.state import FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import pack, pack_pulses, play, sides_of, state_for
+from rockcheck.ebm.packed import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
 
 __all__ = ["Outcomes", "pack", "pack_pulses", "run_batch", "run_decided"]
 #: Runs of a batch that a thread takes at once.
 _CHUNK = 256
-#: The fields of a FOUND, by their names in `Outcomes`.
-_KEPT = {
-    "peak": "peak",
-    "t_end": "t",
-    "series": "steps",
-    "ending": "ending",
-    "at_rest": "at_rest",
-    "end": "motion",
-    "written": "rows",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,28 +25,28 @@ class Outcomes:
     """What a batch found, one value a run.
 
     `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta|
-    in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t_end`
-    the time in sqrt(R/g) at which the run was decided; `series` the number of Taylor expansions.
+    in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t` the
+    time in sqrt(R/g) at which the run was decided, and `motion`, a MOTION, where it then was;
+    `steps` the number of Taylor expansions.
     """
 
     side: NDArray[np.int8]
+    motion: NDArray[np.void]
+    t: Floats
     peak: Floats
-    t_end: Floats
-    series: NDArray[np.int64]
     #: How each run ended, a key of `ebm.core.names.FAILURES` where it failed; and whether it then
     #: was at rest.
     ending: NDArray[np.int64]
+    steps: NDArray[np.int64]
     at_rest: NDArray[np.bool_]
-    #: Where each run ended, a MOTION; and, as asked for, `columns` (x, y, theta and their rates) of
-    #: its `written` rows.
-    end: NDArray[np.void]
-    motion: Floats
-    written: NDArray[np.int64]
+    #: As asked for, columns (x, y, theta and their rates) of its first `rows` output rows.
+    rows: NDArray[np.int64]
+    out: Floats
 
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Which runs reached a cap or had no consistent motion."""
-        return (self.ending != Ending.DONE) & (self.ending != Ending.OVERTURNED)
+        return ~np.isin(self.ending, (Ending.DONE, Ending.OVERTURNED))
 
 
 def run_batch(
@@ -75,9 +65,11 @@ def run_batch(
     The durations of the runs then do not count. Else `columns` of the motion may be kept, up to
     `rows` times a run, its output step apart. `jobs` threads (default: all cores). `on_progress`
     gets the number of runs done. Where a run reaches a cap or has no consistent motion:
-    `ModelFailure` if `strict`, else only its `ending` says so.
+    `ModelFailure` if `strict`, else only its `ending` says so. Raises `InputError` where the
+    model's runs do not know when they are decided.
     """
-    refuse_undecided(model)
+    if not model.decides:
+        raise InputError("a batch has Coulomb's friction or none", "friction")
     count = len(packed.durations)
     found = np.empty(count, FOUND)
     if until_decided:
@@ -87,20 +79,22 @@ def run_batch(
         some = found[first : first + _CHUNK]
         size = len(some)
         out, modes = np.zeros((size, rows, 6)), np.zeros((size, rows), dtype=np.int8)
-        state = state_for(model, min(model.most_steps, 2_000_000), until_decided)
+        states = state_for(model, min(model.most_steps, 2_000_000), until_decided)
         records = Records(out, modes, np.empty((size, 0, 5)))
-        play(model, packed.part(slice(first, first + size)), state, records, some)
-        return out[:, :, columns]
+        given = packed.part(slice(first, first + size)), states, workspace(), records, some
+        loop_of(model, *given)(*given)
+        return out[:, :, columns].copy()
 
-    motion = []
+    kept = [np.empty((0, rows, 6))[:, :, columns]]
     with progress.threads(jobs) as pool:
-        for kept in pool.map(chunk, range(0, count, _CHUNK)):
-            motion.append(kept)
-            on_progress(min(_CHUNK * len(motion), count), count)
+        for n, out in enumerate(pool.map(chunk, range(0, count, _CHUNK)), 1):
+            kept.append(out)
+            on_progress(min(_CHUNK * n, count), count)
+    overturned = found["ending"] == Ending.OVERTURNED
     outcomes = Outcomes(
-        side=sides_of(found),
-        motion=np.concatenate(motion),
-        **{name: found[field].copy() for name, field in _KEPT.items()},
+        side=np.where(overturned, -np.sign(found["motion"]["theta"]), 0.0).astype(np.int8),
+        out=np.concatenate(kept),
+        **{name: found[name].copy() for name in FOUND.names or ()},
     )
     if strict and outcomes.failed.any():
         first = int(np.argmax(outcomes.failed))
@@ -123,9 +117,3 @@ def run_decided(
         for mine, better in zip(vars(found).values(), vars(finer).values(), strict=True):
             mine[again] = better
     return found
-
-
-def refuse_undecided(model: EventBasedModel) -> None:
-    """Raises `InputError` where the model's runs do not know when they are decided."""
-    if not model.decides:
-        raise InputError("a batch has Coulomb's friction or none", "friction")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm import natural
 from rockcheck.ebm.core import block, march, names
 from rockcheck.ebm.core.ground import FORM
-from rockcheck.ebm.core.state import MOTION, STATE, Records, Rows, workspace
+from rockcheck.ebm.core.state import MOTION, STATE, Rows
 from rockcheck.scenes import Floats, Scene, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
@@ -82,20 +82,6 @@ def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArr
     states = np.zeros(1, STATE)
     states["control"] = model.tolerance, most_steps, model.most_events, until_decided, 0.0
     return states
-
-
-def play(
-    model: Any, rows: Rows, states: NDArray[np.void], records: Records, found: NDArray[np.void]
-) -> None:
-    """Plays runs with the model's friction, one after the other in `states`."""
-    given = rows, states, workspace(), records, found
-    loop_of(model, *given)(*given)
-
-
-def sides_of(found: NDArray[np.void]) -> NDArray[np.int8]:
-    """The side to which each run overturned, -1 left or +1 right, 0 if it did not."""
-    overturned = found["ending"] == names.Ending.OVERTURNED
-    return np.where(overturned, -np.sign(found["motion"]["theta"]), 0.0).astype(np.int8)
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:

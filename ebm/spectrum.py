@@ -235,7 +235,7 @@ def play_motions(
     )
     motions: list[Motion | None] = []
     for one, failed, side, at_rest, states, written in zip(
-        played, found.failed, found.side, found.at_rest, found.motion, found.written, strict=True
+        played, found.failed, found.side, found.at_rest, found.out, found.rows, strict=True
     ):
         x, y, theta = natural.to_si(one, states[: max(int(written), 1)])[:, :3].T
         t = one.duration / parts * np.arange(len(theta))

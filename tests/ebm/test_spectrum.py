@@ -132,8 +132,8 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     early = batch.run_batch(batch.pack(nodes, model), model)
     fine = EventBasedModel(tolerance=1e-13)
     whole = batch.run_batch(batch.pack(nodes, fine), fine, until_decided=False)
-    assert early.series.max() < 500 < whole.series.min()
-    assert (whole.t_end / early.t_end).min() > 20.0
+    assert early.steps.max() < 500 < whole.steps.min()
+    assert (whole.t / early.t).min() > 20.0
     np.testing.assert_allclose(
         early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9
     )  # errors before the wall grow
@@ -153,7 +153,7 @@ def decided_early(scenes, tolerance, **near):
     )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(early.peak, whole.peak, **near)
-    assert np.sum(early.series) < np.sum(whole.series)
+    assert np.sum(early.steps) < np.sum(whole.steps)
     return early
 
 
@@ -175,7 +175,7 @@ def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     early = decided_early(nodes, 1e-9, rtol=1e-6)
     quiet = np.array([quiet_from(natural.base_of(node), 1e-9) for node in nodes])
     safe = (early.side == 0) & (early.peak > 0.0)
-    assert np.count_nonzero(early.t_end[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
+    assert np.count_nonzero(early.t[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
 
 
 def test_what_is_decided_early_of_loaded_blocks():

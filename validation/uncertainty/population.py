@@ -254,11 +254,11 @@ def propagate(
     # The scene itself, and its draws.
     scenes = [given.scene, *map(given.at, values)]
     found, peaks = _played(scenes, model, rows=len(given.scene.output_times))
-    ended = np.arange(found.motion.shape[1]) >= found.written[:, None]
-    theta = np.where(ended, found.end["theta"][:, None], found.motion)[1:]
+    ended = np.arange(found.out.shape[1]) >= found.rows[:, None]
+    theta = np.where(ended, found.motion["theta"][:, None], found.out)[1:]
     low, high = _ends(theta / given.scene.block.alpha)
     slips = np.empty(len(scenes))
-    for n, (scene, end) in enumerate(zip(scenes, found.end.tolist(), strict=True)):
+    for n, (scene, end) in enumerate(zip(scenes, found.motion.tolist(), strict=True)):
         ((x, _, tilt, *_),) = natural.to_si(scene, np.array([end]))
         slips[n] = kinematics.slip(scene.block, x, tilt)
     stands, fallen = found.side == 0, found.side[1:] != 0
