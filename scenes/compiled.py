@@ -106,11 +106,6 @@ class _Compiling(Listener):
 register("numba:compile", _Compiling())
 
 
-def _package(function: Callable[..., Any]) -> Path:
-    """Folder of the function's package: of rockcheck.ebm for rockcheck.ebm.core.march."""
-    return Path(function.__code__.co_filename).parents[max(function.__module__.count(".") - 2, 0)]
-
-
 @cache
 def _cache_folder(package: Path) -> Path | None:
     """The private folder for a package's compiled code, or None if there can be none.
@@ -275,11 +270,8 @@ class _Cache(FunctionCache):
             super().save_overload(sig, data)
 
     def _path(self, key: object) -> Path:
-        about = (numba.__version__, sys.version, key)
-        return (
-            self.folder
-            / f"{self.name[-100:]}-{hashlib.sha256(repr(about).encode()).hexdigest()[:32]}.nbc"
-        )
+        about = hashlib.sha256(repr((numba.__version__, sys.version, key)).encode())
+        return self.folder / f"{self.name[-100:]}-{about.hexdigest()[:32]}.nbc"
 
     def load(self, key: object) -> Any:
         """The data that `save` wrote; None if there are none, or if they are damaged."""
@@ -292,10 +284,6 @@ class _Cache(FunctionCache):
                 return pickle.loads(content[32:])
         self._drop(path)
         return None
-
-    def holds(self, signature: Any, codegen: Any) -> bool:
-        """Whether there is a file for a signature, whole or not."""
-        return self._path(self._index_key(signature, codegen)).exists()
 
     def save(self, key: object, data: object) -> None:
         """Write numba's data of a compiled function, whole or not at all."""
@@ -328,7 +316,9 @@ def kernel(function: Callable[..., Any]) -> Any:
     compiled = numba.njit(
         nogil=True, error_model="numpy", _nrt=True, no_cfunc_wrapper=True, pipeline_class=_Compiler
     )(function)
-    folder = _cache_folder(_package(function))
+    # Folders from the source up to its package: up to rockcheck.ebm from rockcheck.ebm.core.march.
+    above = max(function.__module__.count(".") - 2, 0)
+    folder = _cache_folder(Path(function.__code__.co_filename).parents[above])
     if folder is not None:
         compiled._cache = _Cache(function, folder)
     return compiled
@@ -342,20 +332,17 @@ def for_types_of(compiled: Any, *args: Any) -> Callable[..., Any]:
     """
     if config.DISABLE_JIT:
         return cast(Callable[..., Any], compiled)
-    return cast(
-        Callable[..., Any],
-        compiled.compile(tuple(compiled.typeof_pyval(argument) for argument in args)),
-    )
+    return cast(Callable[..., Any], compiled.compile(tuple(map(compiled.typeof_pyval, args))))
 
 
 def is_ready(compiled: Any, *args: Any) -> bool:
     """Whether a kernel runs at once for the types of these arguments: nothing is to be compiled."""
     if config.DISABLE_JIT:
         return True
-    signature = tuple(compiled.typeof_pyval(argument) for argument in args)
+    signature = tuple(map(compiled.typeof_pyval, args))
     cache, codegen = compiled._cache, compiled.targetctx.codegen()
-    return signature in compiled.overloads or (
-        isinstance(cache, _Cache) and cache.holds(signature, codegen)
+    return signature in compiled.overloads or (  # or has a file, whole or not
+        isinstance(cache, _Cache) and cache._path(cache._index_key(signature, codegen)).exists()
     )
 
 

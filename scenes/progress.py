@@ -40,9 +40,9 @@ def unheard(done: float, total: float, what: str = "") -> None:
 _listener: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
 
 
-def tell(done: float, total: float, what: str = "") -> None:
+def tell(done: float, total: float) -> None:
     """Pass the progress on to the listener of this thread, if there is one."""
-    _listener.get()(done, total, what)
+    _listener.get()(done, total)
 
 
 @contextmanager
@@ -98,27 +98,21 @@ def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
 ONE_RUN: ContextVar[bool] = ContextVar("one_run", default=False)
 
 
-class _Runner:
-    """A thread that runs the main thread's kernels, one after another."""
-
-    def __init__(self) -> None:
-        self.process = os.getpid()
-        #: The function to call and the future of its result; None ends the thread.
-        self.calls: SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = SimpleQueue()
-        threading.Thread(target=self._serve, daemon=True).start()
-
-    def _serve(self) -> None:
-        while (work := self.calls.get()) is not None:
-            call, ended = work
-            try:
-                ended.set_result(call())
-            except BaseException as error:
-                ended.set_exception(error)
-            del work, call, ended  # and the arrays that the call holds
+#: The function to call and the future of its result; None ends the thread.
+Calls = SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None]
+#: The process and the calls of the thread that waits for them, if there is one.
+_RUNNERS: list[tuple[int, Calls]] = []
 
 
-#: The thread that waits for calls, if there is one.
-_RUNNERS: list[_Runner] = []
+def _serve(calls: Calls) -> None:
+    """Run the main thread's kernels, one after another."""
+    while (work := calls.get()) is not None:
+        call, ended = work
+        try:
+            ended.set_result(call())
+        except BaseException as error:
+            ended.set_exception(error)
+        del work, call, ended  # and the arrays that the call holds
 
 
 def interruptible(call: Callable[[], Result]) -> Result:
@@ -131,18 +125,19 @@ def interruptible(call: Callable[[], Result]) -> Result:
     """
     if threading.current_thread() is not threading.main_thread():
         return call()
-    runner = _RUNNERS.pop() if _RUNNERS else None
-    if runner is None or runner.process != os.getpid():
-        runner = _Runner()
+    process, calls = _RUNNERS.pop() if _RUNNERS else (0, Calls())
+    if process != os.getpid():
+        process, calls = os.getpid(), Calls()
+        threading.Thread(target=_serve, args=[calls], daemon=True).start()
     ended: Future[Result] = Future()
     try:
-        runner.calls.put((call, ended))
+        calls.put((call, ended))
         while not ended.done():
             wait((ended,), timeout=1.0)  # Windows interrupts no wait without a timeout
     except BaseException:
-        runner.calls.put(None)
+        calls.put(None)
         raise
-    _RUNNERS.append(runner)
+    _RUNNERS.append((process, calls))
     return ended.result()
 
 

@@ -86,9 +86,9 @@ def head_of(path: Path, most: int) -> str:
         return ""
 
 
-def read_json(path: Path, most: int = MOST_BYTES) -> Any:
+def read_json(path: Path) -> Any:
     """The value of a JSON file, its texts `inert`. Raises `InputError` where it is no such file."""
-    text = read_text(path, most)
+    text = read_text(path)
     try:
         value = json.loads(text)
         return value if text.isascii() and "\\" not in text else _inert(value)

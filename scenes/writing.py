@@ -111,14 +111,9 @@ def _naming(path: Path) -> Iterator[None]:
 _FORMULA = re.compile(r"[=@＝＠](?!\Z)|[-+－＋](?!(?:inf|nan|\d*+\.?+\d*+(?:[eE][-+]?\d++)?)\Z)")
 
 
-def table_text(
-    columns: Sequence[str], rows: Iterable[Sequence[object]], *, digits: int | None = None
-) -> str:
-    """A table as CSV; floats with all digits, or with `digits` significant ones.
-
-    None and NaN are empty cells.
-    """
-    return _csv(columns, ([_cell(value, digits) for value in row] for row in rows))
+def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table as CSV, floats with all their digits; None and NaN are empty cells."""
+    return _csv(columns, (map(_cell, row) for row in rows))
 
 
 def columns_text(columns: Mapping[str, Sequence[object]]) -> str:
@@ -150,12 +145,10 @@ def _text(text: str) -> str:
     return f"'{text}" if _FORMULA.match(text) else text
 
 
-def _cell(value: object, digits: int | None = None) -> object:
+def _cell(value: object) -> object:
     if isinstance(value, str):
         return _text(value)
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return ""
-    return f"{value:.{digits}g}" if digits is not None and isinstance(value, float) else value
+    return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
 
 
 def markdown_table(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

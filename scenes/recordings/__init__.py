@@ -64,7 +64,15 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     """
     asked = reading or Reading()
     lines = read_text(path, latin=True).split("\n")
-    read = _reader_of(path, lines)
+    head = [line[:200] for line in lines[:_LOOKED_AT]]
+    by_content: dict[Reader, bool] = {
+        read_knet: head[0].startswith("Origin Time"),
+        read_esm: any(line.startswith("SAMPLING_INTERVAL_S:") for line in head),
+        read_volume: any(map(is_volume, head)),
+        read_at2: any(AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]),
+    }
+    fits = next((reader for reader, fit in by_content.items() if fit), read_table)
+    read = _BY_NAME.get(path.suffix.lower(), fits)
     for name in ("column", "header_lines", "decimal") if read in _WITH_HEADER else ():
         if getattr(asked, name) is not None:
             raise fault(
@@ -90,18 +98,6 @@ def read_record(path: Path, reading: Reading | None = None) -> Recording:
             path, f"{len(found)} components, {_listed(found)}; give one: {option('component', 1)}"
         )
     return found[0]
-
-
-def _reader_of(path: Path, lines: list[str]) -> Reader:
-    head = [line[:200] for line in lines[:_LOOKED_AT]]
-    found: dict[Reader, bool] = {
-        read_knet: head[0].startswith("Origin Time"),
-        read_esm: any(line.startswith("SAMPLING_INTERVAL_S:") for line in head),
-        read_volume: any(map(is_volume, head)),
-        read_at2: any(AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]),
-    }
-    fits = next((reader for reader, fit in found.items() if fit), read_table)
-    return _BY_NAME.get(path.suffix.lower(), fits)
 
 
 def _listed(found: list[Recording]) -> str:

@@ -89,25 +89,17 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     values = numbers(path, enumerate(lines[header:], header + 1), count)
     if len(values) != count:
         raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header)
+    fields = lines[1].split(",")  # event, date, station and component, or another form
+    name = fields[-1].strip()[:10]
     return [
         Recording(
             samples=np.array(values) * UNITS[unit],
             time_step=step,
             unit=unit,
             form="PEER AT2",
-            component=_at2_component(lines),
+            component=name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else "",
         )
     ]
-
-
-def _at2_component(lines: list[str]) -> str:
-    """Component, from the end of the second line; "" if that line has another form.
-
-    The line holds event, date, station and component.
-    """
-    fields = lines[1].split(",")
-    name = fields[-1].strip()[:10]
-    return name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
 
 
 def read_esm(path: Path, lines: list[str], reading: Reading) -> list[Recording]:

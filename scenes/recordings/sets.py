@@ -44,10 +44,14 @@ def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, b
         if not path.is_dir() and (path.exists() or not any(sign in path.name for sign in "*?[")):
             found[path] = True
             continue
-        inside = _files(path.iterdir() if path.is_dir() else path.parent.glob(path.name))
+        listed, none = (
+            (path.iterdir(), "a folder without files")
+            if path.is_dir()
+            else (path.parent.glob(path.name), "no such files")
+        )
+        inside = sorted(one for one in listed if one.is_file() and not one.name.startswith("."))
         if not inside:
-            what = "a folder without files" if path.is_dir() else "no such files"
-            raise InputError(f"{printable(path)}: {what}")
+            raise InputError(f"{printable(path)}: {none}")
         found = dict.fromkeys(inside, False) | found
     return found
 
@@ -58,10 +62,6 @@ def record_path(name: str, folder: Path) -> Path:
     return (
         shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
     )
-
-
-def _files(paths: Iterable[Path]) -> list[Path]:
-    return sorted(path for path in paths if path.is_file() and not path.name.startswith("."))
 
 
 def motions_of(
