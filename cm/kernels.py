@@ -242,17 +242,6 @@ def effective_mass(
 
 
 @kernel
-def shared_mass(own: float, other: float, coupling: float, ratio: float) -> float:
-    """Share of the block's mass that a corner brings to a frictionless impact of two corners.
-
-    The other corner arrives `ratio` times as fast. A unit impulse at a corner changes its own
-    velocity by `own` (by `other` at that one) and the other corner's by `coupling`. Negative where
-    the other corner's impact throws this one off.
-    """
-    return (other - coupling * ratio) / (own * other - coupling * coupling)
-
-
-@kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
     """Linear interpolation in `samples`, `rate` a second from t = 0; zero after the last."""
     place = t * rate
@@ -348,7 +337,11 @@ def closes(
         spring = 1.0
         ratio = other.rate / comes.rate
         both = other.rate < 0.1 * comes.rate and other.gap < -other.rate * contact_time
-        mass = shared_mass(comes.mobility, other.mobility, coupling, ratio)
+        # Its share of the block's mass in a frictionless impact of both, of which the other comes
+        # `ratio` times as fast. Negative where the other's impact throws this one off.
+        mass = (other.mobility - coupling * ratio) / (
+            comes.mobility * other.mobility - coupling * coupling
+        )
         if both and (left != right if surface == FLOOR else bottom != top) and mass > 0.0:
             spring = 2.0 * mass
         elif both:

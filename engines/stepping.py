@@ -91,14 +91,14 @@ class March(NamedTuple):
     asked: Floats
 
 
-def course_of(scene: Scene, longest: float, short: float) -> Course:
-    """Steps of at most `longest` s, and near events `short` times the usual."""
+def begun(scene: Scene, longest: float, short: float) -> tuple[Course, March]:
+    """A run at its start: steps of at most `longest` s, and near events `short` times the usual."""
     base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
     moment = short / scene.frequency_parameter
     across, up = (
         (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in base
     )
-    return Course(
+    course = Course(
         corners=np.array(
             [(*one.corner, *one.normal, one.distance) for one in contacts.contacts_of(scene)]
         ),
@@ -115,14 +115,10 @@ def course_of(scene: Scene, longest: float, short: float) -> Course:
         long_approach=LONG_APPROACH * moment,
         resting=RESTING * longest * scene.gravity,
     )
-
-
-def begun(scene: Scene, contacts: int) -> March:
-    """A run at its start."""
     state = np.zeros(CARRY_Y + 1)
-    closed, before = np.zeros((2, contacts), dtype=bool)
     state[:6] = kinematics.of_mass(scene.block, scene.initial_state)
-    return March(state, closed, before, np.zeros(IMPACT + 1))
+    closed, before = np.zeros((2, len(course.corners)), dtype=bool)
+    return course, March(state, closed, before, np.zeros(IMPACT + 1))
 
 
 _velocity_at, _rate_of = inner_kernel(base_motion.velocity_at), inner_kernel(contacts.rate_of)

@@ -181,9 +181,8 @@ def adaptive_march(
     from rockcheck.engines import stepping
     from rockcheck.scenes.compiled import for_types_of
 
-    course = stepping.course_of(scene, longest, short)
+    course, run = stepping.begun(scene, longest, short)
     most_steps = 100_000 + 20 * int(course.end / longest)
-    run = stepping.begun(scene, len(course.corners))
     first = np.empty((_ROOM, stepping.COLUMNS))
     first[0, :7] = 0.0, *run.state[:6]
     step = for_types_of(stepping.step, run, course, (0.0, 0.0, 0.0), first[0])

@@ -103,6 +103,10 @@ def _values(path: Path, record: recordings.Recording) -> dict[str, Any]:
 def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> None:
     from rockcheck.reports.document import show
 
+    # The largest acceleration in each part of the motion, as bars.
+    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
+    peaks = np.array([np.max(part) for part in parts])
+    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
     rows = [
         ("format", f"{value['format']}, unit {value['unit']}"),
         (
@@ -113,20 +117,12 @@ def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> No
         ("PGV", f"{value['pgv_m_s']:.4g} m/s"),
         ("Arias", f"{value['arias_m_s']:.4g} m/s"),
         ("Sa(T), 5 %", ", ".join(f"{at} s: {sa:.3g} g" for at, sa in value["sa_g"].items())),
-        ("|a|", _picture(record)),
+        ("|a|", "".join(_MARKS[level] for level in levels)),
         *(("note", printable(note, 200)) for note in record.notes),
     ]
     title = f"{path}, {record.component}" if record.component else str(path)
     table = Table("record", [text("record"), text("value", " ")], rows)
     show(Finding("record", title, "", [Text(title), table]), console())
-
-
-def _picture(record: recordings.Recording) -> str:
-    """The largest acceleration in each part of the motion, as bars."""
-    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
-    peaks = np.array([np.max(part) for part in parts])
-    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
-    return "".join(_MARKS[level] for level in levels)
 
 
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:
