@@ -96,9 +96,11 @@ class ContinuousModel(Frozen):
 
         The step goes with 1/sqrt(k/m).
         """
-        change: dict[str, float] = {"penetration": factor**2 * self.penetration}
-        if self.stiffness is not None:
-            change = {"stiffness": self.stiffness / factor**2}
+        change = (
+            {"penetration": factor**2 * self.penetration}
+            if self.stiffness is None
+            else {"stiffness": self.stiffness / factor**2}
+        )
         if self.time_step is not None:
             change["time_step"] = factor * self.time_step
         return self.model_copy(update=change)
@@ -185,19 +187,18 @@ class ContinuousModel(Frozen):
             happened.append(
                 Event(t=reached, kind="overturned left" if state[2] > 0.0 else "overturned right")
             )
-        settings = {
-            "penetration": scene.gravity / parameters.stiffness,
-            "stiffness": parameters.stiffness,
-            "time_step": dt,
-            "damping_rule": self.damping_rule,
-        }
         return observation.observe(
             scene,
             self.name,
             kinematics.of_box(scene.block, output[:row]),
             events=happened,
             cost=cost,
-            settings=settings,
+            settings={
+                "penetration": scene.gravity / parameters.stiffness,
+                "stiffness": parameters.stiffness,
+                "time_step": dt,
+                "damping_rule": self.damping_rule,
+            },
         )
 
     def _parameters(self, scene: Scene) -> kernels.Parameters:
@@ -210,8 +211,10 @@ class ContinuousModel(Frozen):
         ratio = calibrated if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
         walls = scene.wall("left"), scene.wall("right")
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
-        restitution = [wall.restitution if wall else 0.0 for wall in walls]
-        restitution.append(scene.floor.restitution)
+        restitution = (
+            *(wall.restitution if wall else 0.0 for wall in walls),
+            scene.floor.restitution,
+        )
         return kernels.Parameters(
             reach=(b + dx, b - dx, h + dz, h - dz),
             inverse_inertia=3.0 / (b * b + h * h)
@@ -222,7 +225,7 @@ class ContinuousModel(Frozen):
             friction_damping=FRICTION_DAMPING * math.sqrt(k),
             mu_s=scene.floor.mu_s,
             mu_k=scene.floor.friction,
-            restitution=tuple(restitution),
+            restitution=restitution,
             damping_ratio=tuple(ratio(one) for one in restitution),
             distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
             calibrated=self.damping_rule == "calibrated",

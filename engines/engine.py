@@ -135,8 +135,9 @@ class Engine(Frozen):
 
         For adaptive steps this includes those at the events.
         """
-        longer = {knob: factor * getattr(self, knob) for knob in self.steps.knobs}
-        return self.model_copy(update=longer)
+        return self.model_copy(
+            update={knob: factor * getattr(self, knob) for knob in self.steps.knobs}
+        )
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene with this engine's best settings.

@@ -209,8 +209,9 @@ class Block(Frozen):
     @property
     def per_unit_mass(self) -> Block:
         """The same block without its mass; the moment of inertia is per unit mass, m^2."""
-        inertia = self.moment_of_inertia and self.gyration_squared
-        return self.replace(mass=None, moment_of_inertia=inertia)
+        return self.replace(
+            mass=None, moment_of_inertia=self.moment_of_inertia and self.gyration_squared
+        )
 
     def mirrored(self) -> Block:
         """The same block with left and right exchanged."""

@@ -390,11 +390,17 @@ def inner_kernel(function: Callable[..., Any], *, forceinline: bool = True) -> A
     """
     if config.DISABLE_JIT:
         return function
-    # All options are named: numba would take the first caller's for the others.
-    options = {"nopython": True, "error_model": "numpy", "_nrt": False, "forceinline": forceinline}
     return _Inner(
         function,
-        targetoptions=options | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True},
+        # All options are named: numba would take the first caller's for the others.
+        targetoptions={
+            "nopython": True,
+            "error_model": "numpy",
+            "_nrt": False,
+            "forceinline": forceinline,
+            "no_cpython_wrapper": True,
+            "no_cfunc_wrapper": True,
+        },
         pipeline_class=_InnerCompiler,
     )
 

@@ -36,8 +36,13 @@ class Motion(Frozen):
         return self._times(("period", "time_step"), factor)
 
     def _times(self, names: tuple[str, ...], factor: float) -> Self:
-        own = [name for name in names if name in type(self).model_fields]
-        return self.model_copy(update={name: factor * getattr(self, name) for name in own})
+        return self.model_copy(
+            update={
+                name: factor * getattr(self, name)
+                for name in names
+                if name in type(self).model_fields
+            }
+        )
 
 
 class Rest(Motion):
@@ -218,8 +223,9 @@ def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}", "pga")
     if not largest > 0.0:
         raise InputError("the record does not move: no scale gives it a peak", "pga")
-    fields = {name: value for name, value in data.items() if name != "pga"}
-    return fields | {"scale": pga * GRAVITY_OF_RECORDS / largest}
+    return {name: value for name, value in data.items() if name != "pga"} | {
+        "scale": pga * GRAVITY_OF_RECORDS / largest
+    }
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

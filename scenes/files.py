@@ -78,8 +78,7 @@ def uncertain_scene_from(
 ) -> UncertainScene:
     """A scene with its uncertain numbers, from the tables of a scene file."""
     spreads: dict[str, Spread] = {}
-    tables = {key: value for key, value in data.items() if key != CORRELATION}
-    plain = _plain(tables, (), spreads)
+    plain = _plain({key: value for key, value in data.items() if key != CORRELATION}, (), spreads)
     scene = scene_from(plain, folder=folder, default_name=default_name)
     return uncertain_scene(scene, spreads, data.get(CORRELATION, {}))
 

@@ -124,9 +124,9 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
     for path, source in sources.items():
         up = upward[source] if source else []
         if len(up) != 1:
-            where = "in it or in a file of the set that is named alike"
             raise InputError(
-                f"{printable(path)}: {len(up)} vertical components {where}: give exactly one",
+                f"{printable(path)}: {len(up)} vertical components in it or in a file of the set"
+                " that is named alike: give exactly one",
                 "vertical",
             )
         found |= dict.fromkeys(horizontal[path], up[0])

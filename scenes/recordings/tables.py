@@ -239,7 +239,6 @@ def _chosen(cells: _Cells, column: int | str) -> int:
 
 
 def _unit_of(name: str) -> str:
-    """The unit that a column's name states; "" where it states none."""
     match = _BRACKETS.search(name)
     return NAMED.get(name) or (known_unit(match[1]) if match else "")
 
