@@ -18,16 +18,14 @@ def damping_ratio_of_paper(restitution: float) -> float:
 def restitution_of(damping_ratio: float) -> float:
     """Restitution of a clamped Kelvin-Voigt contact with damping ratio xi.
 
-    The contact ends where its force vanishes (Schwager & Poschel 2007): e = exp(-2 xi
-    arccos(xi)/sqrt(1
-    - xi^2)), with arccosh and xi^2 - 1 beyond 1.
+    The contact ends where its force vanishes (Schwager & Poschel 2007):
+    e = exp(-2 xi arccos(xi)/sqrt(1 - xi^2)), with arccosh and xi^2 - 1 beyond 1.
     """
     xi = damping_ratio
     if abs(xi - 1.0) < 1e-6:
         return math.exp(-2.0 * xi * (1.0 + (1.0 - xi) / 3.0))
-    if xi < 1.0:
-        return math.exp(-2.0 * xi * math.acos(xi) / math.sqrt(1.0 - xi * xi))
-    return math.exp(-2.0 * xi * math.acosh(xi) / math.sqrt(xi * xi - 1.0))
+    angle = math.acos(xi) if xi < 1.0 else math.acosh(xi)
+    return math.exp(-2.0 * xi * angle / math.sqrt(abs(1.0 - xi * xi)))
 
 
 def least_restitution(stiffness: float, frequency_parameter: float) -> float:
@@ -50,8 +48,5 @@ def damping_ratio(restitution: float, least: float) -> float:
     low, high = 0.0, 1.0 / math.sqrt(aim)
     while high - low > 1e-12 * high:
         middle = 0.5 * (low + high)
-        if restitution_of(middle) > aim:
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if restitution_of(middle) > aim else (low, middle)
     return 0.5 * (low + high)

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine
+from rockcheck.engines.engine import Engine, Worlds
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls
@@ -87,10 +87,13 @@ class _DartWorld(steps.World):
 
 
 class _RigidDartWorld(_DartWorld):
-    """A block that never sleeps, and whose penetration is corrected apart from its velocity."""
+    """A block that never sleeps, and whose penetration is corrected apart from its velocity.
 
-    def __init__(self, scene: Scene, scale: float, iterative: bool) -> None:
-        super().__init__(scene, scale)
+    In its units even slow contacts bounce.
+    """
+
+    def __init__(self, scene: Scene, iterative: bool = False) -> None:
+        super().__init__(scene, NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius))
         solver = self.world.getConstraintSolver()
         solver.setSplitImpulseEnabled(True)
         if iterative:
@@ -113,15 +116,11 @@ class Dart(Engine):
 
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
+    worlds: ClassVar[Worlds] = (_RigidDartWorld, _DartWorld)
 
     def rigid_world(self, scene: Scene) -> steps.World:
-        """The scene as DART holds it, in units in which even slow contacts bounce."""
-        scale = NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius)
-        return _RigidDartWorld(scene, scale, iterative=isinstance(self.steps, steps.AdaptiveStep))
-
-    def stock_world(self, scene: Scene) -> steps.World:
-        """The scene as DART holds it: a box among boxes."""
-        return _DartWorld(scene)
+        """The scene as DART holds it, with the solver that suits the steps."""
+        return _RigidDartWorld(scene, iterative=isinstance(self.steps, steps.AdaptiveStep))
 
     def notes(self, scene: Scene) -> list[str]:
         """Also that a flat landing may not stay flat on a floor that bounces."""

@@ -106,9 +106,11 @@ class Engine(Frozen):
     @property
     def steps(self) -> FixedStep | AdaptiveStep:
         """How its steps follow each other."""
-        if self.time_step == "adaptive":
-            return AdaptiveStep(self.largest_step, self.short_steps)
-        return FixedStep(self.time_step)
+        return (
+            AdaptiveStep(self.largest_step, self.short_steps)
+            if self.time_step == "adaptive"
+            else FixedStep(self.time_step)
+        )
 
     @classmethod
     def installed(cls) -> bool:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, StringConstraints, field_validator, model_validator
 
+from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block
 from rockcheck.scenes.errors import InputError
@@ -120,15 +121,13 @@ class Scene(Shown, Frozen):
                 f" {self.duration:g} s",
                 "output_step",
             )
-        x, half_width = self.initial_state[0], self.block.half_width
-        radius, tilt = self.block.half_diagonal, abs(self.initial_rotation)
+        x, _, tilt, *_ = self.initial_state
         for wall in self.walls:
-            to_the_left = x if wall.side == "left" else -x
-            reach = radius * math.sin(self.block.box_angle + tilt) - to_the_left
-            if reach > half_width + wall.gap + 1e-12 * radius:
+            clear = kinematics.clearance(self.block, wall.side, wall.gap, x, tilt)
+            if clear < -1e-12 * self.block.half_diagonal:
                 raise InputError(
-                    f"{self.initial_rotation:g} is not allowed: the block would start"
-                    f" {reach - half_width - wall.gap:.3g} m inside the {wall.side} wall",
+                    f"{tilt:g} is not allowed: the block would start {-clear:.3g} m inside the"
+                    f" {wall.side} wall",
                     "initial_rotation",
                 )
         return self

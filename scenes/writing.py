@@ -134,20 +134,16 @@ def _cells(values: Sequence[object]) -> Sequence[object]:
 def _csv(columns: Sequence[str], rows: Iterable[Iterable[object]]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(map(_text, columns))
+    writer.writerow(map(_cell, columns))
     writer.writerows(rows)
     return text.getvalue()
 
 
-def _text(text: str) -> str:
-    """Text as a cell that a spreadsheet shows: a formula has an apostrophe before it."""
-    text = inert(text)
-    return f"'{text}" if _FORMULA.match(text) else text
-
-
 def _cell(value: object) -> object:
+    """A cell that a spreadsheet shows as it is: a formula has an apostrophe before it."""
     if isinstance(value, str):
-        return _text(value)
+        text = inert(value)
+        return f"'{text}" if _FORMULA.match(text) else text
     return "" if value is None or (isinstance(value, float) and math.isnan(value)) else value
 
 
