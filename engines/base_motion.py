@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rockcheck.scenes import Floats, Record, Rest, Ricker, Scene, Sine
+from rockcheck.scenes import Record, Rest, Ricker, Scene, Sine
 
 SAMPLES_A_PERIOD = 1000  # of a pulse: a cubic spline through them is good to 1e-11 of its amplitude
 
@@ -51,16 +51,6 @@ def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:
         velocity += coefficient * power
         power *= since
     return velocity
-
-
-def felt_acceleration(scene: Scene, edges: Floats) -> Floats:
-    """Mean felt acceleration, -u and -(g + vg) in m/s^2, of each step; shape (steps, 2).
-
-    The steps lie between the times `edges`.
-    """
-    base = velocity_of(scene.excitation), velocity_of(scene.vertical)
-    gained = np.diff([[velocity_at(t, *one) for one in base] for t in edges.tolist()], axis=0)
-    return -gained / np.diff(edges)[:, None] - np.array([0.0, scene.gravity])
 
 
 def starts_of_motion(scene: Scene, *base: BaseVelocity) -> list[float]:

@@ -222,7 +222,10 @@ class FixedStep:
         count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
-        felt = base_motion.felt_acceleration(scene, times)
+        base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
+        speeds = [[base_motion.velocity_at(t, *one) for one in base] for t in times.tolist()]
+        # The mean of -u and of -(g + vg) over each step.
+        felt = -np.diff(speeds, axis=0) / np.diff(times)[:, None] - np.array([0.0, scene.gravity])
         return partial(march_fixed, world, scene, times, felt)
 
 

@@ -3,7 +3,7 @@
 One protocol of progress serves models, spectra, studies, suites and pages.
 
 Long work calls `on_progress(done, total, what)`. A model has no argument for it: it calls `tell`,
-which reaches the block that is `listening` in the same thread. Without one the call costs nothing.
+which reaches the `LISTENER` of the same thread. Without one the call costs nothing.
 
 Threads run kernels (`scenes.compiled`); Ctrl-C ends the wait for them at once. Needs no compiler.
 """
@@ -12,12 +12,11 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from contextvars import ContextVar
 from queue import SimpleQueue
 from typing import Any, Protocol, TypeVar
 
-Result = TypeVar("Result")
 Value = TypeVar("Value")
 #: Exit code of a run that Ctrl-C ended.
 INTERRUPTED = 130
@@ -37,12 +36,13 @@ def unheard(done: float, total: float, what: str = "") -> None:
     """An `OnProgress` that does nothing."""
 
 
-_listener: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
+#: What receives the progress that models `tell` in this thread.
+LISTENER: ContextVar[OnProgress] = ContextVar("listener", default=unheard)
 
 
 def tell(done: float, total: float) -> None:
     """Pass the progress on to the listener of this thread, if there is one."""
-    _listener.get()(done, total)
+    LISTENER.get()(done, total)
 
 
 @contextmanager
@@ -53,11 +53,6 @@ def within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
         yield
     finally:
         variable.reset(token)
-
-
-def listening(on_progress: OnProgress) -> AbstractContextManager[None]:
-    """Within this block `on_progress` receives what models `tell` in this thread."""
-    return within(_listener, on_progress)
 
 
 _announcer: Callable[[str], None] | None = None
@@ -115,7 +110,7 @@ def _serve(calls: Calls) -> None:
         del work, call, ended  # and the arrays that the call holds
 
 
-def interruptible(call: Callable[[], Result]) -> Result:
+def interruptible(call: Callable[[], Value]) -> Value:
     """The result of `call`, which runs a kernel. Ctrl-C ends the wait at once.
 
     Python handles a signal only between two of its own steps, and a kernel may run for minutes. So
@@ -129,7 +124,7 @@ def interruptible(call: Callable[[], Result]) -> Result:
     if process != os.getpid():
         process, calls = os.getpid(), Calls()
         threading.Thread(target=_serve, args=[calls], daemon=True).start()
-    ended: Future[Result] = Future()
+    ended: Future[Value] = Future()
     try:
         calls.put((call, ended))
         while not ended.done():

@@ -33,7 +33,7 @@ from rockcheck.commands import (
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history import check_format
-from rockcheck.scenes.progress import ONE_RUN, announcing, listening, within
+from rockcheck.scenes.progress import LISTENER, ONE_RUN, announcing, within
 from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
@@ -139,7 +139,7 @@ def run(
     title = f"{what.name}, {model}"
     with (
         playing(title, [(model, given)]) as on_progress,
-        listening(on_progress),
+        within(LISTENER, on_progress),
         within(ONE_RUN, True),
     ):
         history = simulate(what)

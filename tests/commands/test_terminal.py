@@ -186,7 +186,9 @@ def test_on_a_terminal_colour_progress_and_its_width(mine, columns):
 def test_models_tell_how_far_they_are(step):
     scene = load_scene("bookcase").replace(duration=4.0)
     heard: list[float] = []
-    with progress.listening(lambda done, total, what="": heard.append(done / total)):
+    with progress.within(
+        progress.LISTENER, lambda done, total, what="": heard.append(done / total)
+    ):
         MuJoCo(time_step=step).simulate(scene)
     assert heard == sorted(heard)
     assert 0.0 <= heard[0] <= heard[-1] < 1.0
