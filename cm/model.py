@@ -27,6 +27,7 @@ from rockcheck.scenes import (
     errors,
     kinematics,
     observation,
+    progress,
 )
 
 if TYPE_CHECKING:
@@ -125,7 +126,6 @@ class ContinuousModel(Frozen):
         errors.check_kind(scene, Scene, "load_scene", "scene")
         began = time.perf_counter()
         from rockcheck.cm import kernels
-        from rockcheck.scenes import progress
 
         times = scene.output_times
         parameters = self._parameters(scene)
@@ -205,10 +205,8 @@ class ContinuousModel(Frozen):
         from rockcheck.cm import kernels
 
         k = self.stiffness_in(scene)
-        calibrated = partial(
-            contact.damping_ratio, least=contact.least_restitution(k, scene.frequency_parameter)
-        )
-        ratio = calibrated if self.damping_rule == "calibrated" else contact.damping_ratio_of_paper
+        calibrated = self.damping_rule == "calibrated"
+        least = contact.least_restitution(k, scene.frequency_parameter)
         walls = scene.wall("left"), scene.wall("right")
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
         restitution = (
@@ -226,9 +224,14 @@ class ContinuousModel(Frozen):
             mu_s=scene.floor.mu_s,
             mu_k=scene.floor.friction,
             restitution=restitution,
-            damping_ratio=tuple(ratio(one) for one in restitution),
+            damping_ratio=tuple(
+                contact.damping_ratio(one, least)
+                if calibrated
+                else contact.damping_ratio_of_paper(one)
+                for one in restitution
+            ),
             distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
-            calibrated=self.damping_rule == "calibrated",
+            calibrated=calibrated,
             time_step=self.time_step_in(scene),
         )
 

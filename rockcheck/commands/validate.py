@@ -125,8 +125,9 @@ def run(
     asked = _scene if suites.is_scene(what) else _suite
     for option, given in (("--strict", strict), ("--history", history)):
         if given and asked is _scene:
-            said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
-            raise InputError(said, option)
+            raise InputError(
+                f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
+            )
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
     how: results.Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document, site
