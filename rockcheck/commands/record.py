@@ -63,7 +63,7 @@ def run(
     reading = recordings.Reading(**dict(setting_of(word, "--read") for word in read or ()))
     asked = sets.files_of(files)
     known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
-    found = [(path, one) for path, components in known.items() for one in components]
+    found = [(path, one) for path, components in known.items() for _, one in components]
     values = [_values(path, record) for path, record in found]
     for (path, record), value in zip(found, values, strict=True):
         _show(path, record, value)

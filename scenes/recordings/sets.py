@@ -69,8 +69,7 @@ def motions_of(
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The horizontal components of the files with their names, and the names left out.
 
-    Left out are vertical components, by name, and `Odd` files. A component's name is that of its
-    file, with its own name added where the file has several. A component or column that `reading`
+    Left out are vertical components, by name, and `Odd` files. A component or column that `reading`
     names is taken as horizontal. Raises as `read_components`, and where all components are
     vertical.
     """
@@ -80,8 +79,7 @@ def motions_of(
         raise faults[0]
     left_out: list[str] = []
     for path, components in read.items():
-        for one in components:
-            name = f"{path.name} {one.component}" if len(components) > 1 else path.name
+        for name, one in components:
             if reading.component is None and reading.column is None and is_vertical(path, one):
                 left_out.append(name)
             else:
@@ -93,20 +91,26 @@ def motions_of(
 
 def read_files(
     paths: Iterable[Path], reading: Reading
-) -> tuple[dict[Path, list[Recording]], list[InputError]]:
-    """The components of each file that can be read, and the faults of the others.
+) -> tuple[dict[Path, list[tuple[str, Recording]]], list[InputError]]:
+    """The components of each file that can be read, by name, and the faults of the others.
 
+    A component's name is that of its file, with its own name added where the file has several.
     Raises `InputError` for a file that was named itself.
     """
-    read: dict[Path, list[Recording]] = {}
+    read: dict[Path, list[tuple[str, Recording]]] = {}
     faults: list[InputError] = []
     for path in paths:
         try:
-            read[path] = read_components(path, reading)
+            found = read_components(path, reading)
         except InputError as error:
             if not isinstance(paths, Mapping) or paths[path]:
                 raise
             faults.append(error)
+        else:
+            several = len(found) > 1
+            read[path] = [
+                (f"{path.name} {one.component}" if several else path.name, one) for one in found
+            ]
     return read, faults
 
 
@@ -144,12 +148,12 @@ def _directions(
     """The names of the motions of each file that holds any; the vertical components of each."""
     read = read_files(paths, reading)[0]
     upward = {
-        path: [one for one in components if is_vertical(path, one)]
+        path: [one for _, one in components if is_vertical(path, one)]
         for path, components in read.items()
     }
     named = reading.component is not None or reading.column is not None
     horizontal = {
-        path: [name for name, _ in motions_of([path], reading)[0]]
+        path: [name for name, one in components if named or not is_vertical(path, one)]
         for path, components in read.items()
         if named or len(upward[path]) < len(components)
     }
