@@ -172,7 +172,6 @@ class _Motion:
         )
 
     def modes(self, indices: Sequence[int]) -> list[str]:
-        """Modes of motion at some step ends."""
         chosen = self.box[list(indices)]
         channels = {name: chosen[:, column] for column, name in enumerate(observation.STATE)}
         return [

@@ -86,7 +86,6 @@ class _Compiling(Listener):
         self.depth += 1
 
     def on_end(self, event: Event) -> None:
-        """End of a compilation."""
         self.depth -= 1
         if self.depth == 0:
             self.timer.cancel()
@@ -286,7 +285,6 @@ class _Cache(FunctionCache):
         return None
 
     def save(self, key: object, data: object) -> None:
-        """Write numba's data of a compiled function, whole or not at all."""
         path = self._path(key)
         if path.is_dir():
             self._drop(path)

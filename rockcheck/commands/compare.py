@@ -105,11 +105,12 @@ def _finding(
         for figure in found.figures
     ]
     models = f"{found.candidate} against {found.reference}"
-    words = {role: motion.words() for role, motion in motions.items()}
     notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
     blocks: list[Block] = [
         Text(headline(found)),
-        Text(facts=[(role, ", ".join(said)) for role, said in words.items() if said]),
+        Text(
+            facts=[(role, ", ".join(one.words())) for role, one in motions.items() if one.words()]
+        ),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
         Table(
             "comparison",

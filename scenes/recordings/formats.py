@@ -207,7 +207,6 @@ class _Block:
 
     @property
     def height(self) -> int:
-        """Number of lines of the block."""
         return -(-int(self.count[:12]) // max(self.across, 1))
 
 
