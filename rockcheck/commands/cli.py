@@ -142,12 +142,6 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
     ]
 
 
-def _with_value(word: str, after: str) -> str:
-    """An argument; an option of `BARE` without a value gets its default."""
-    value, pattern = BARE.get(word, ("", ""))
-    return f"{word}={value}" if value and not re.fullmatch(pattern, after) else word
-
-
 class _EachOnce(typer.core.TyperCommand):
     """A command that refuses an option given twice, unless the option gathers values.
 
@@ -159,8 +153,13 @@ class _EachOnce(typer.core.TyperCommand):
             named = word.partition("=")[0]
             if instead := GONE.get(f"{ctx.info_name} {named}"):
                 raise InputError(f"is gone: {instead}", named)
-        if any(name in BARE for one in self.params for name in one.opts):
-            args = [_with_value(*pair) for pair in itertools.pairwise([*args, ""])]
+        own = BARE.keys() & itertools.chain.from_iterable(one.opts for one in self.params)
+        args = [
+            f"{word}={BARE[word][0]}"
+            if word in own and not re.fullmatch(BARE[word][1], after)
+            else word
+            for word, after in itertools.pairwise([*args, ""])
+        ]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (

@@ -4,11 +4,12 @@
 models.
 """
 
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, NoReturn, get_args
+from typing import Annotated, get_args
 
 import numpy as np
 import typer
@@ -449,49 +450,46 @@ def conformance(
     Writes a card an engine: a page, JSON, JUnit and Markdown. Exit 1 where an engine fails one.
     With --tune, finds what an engine needs for a restitution: it drops a block, and slides it.
     """
-    from rockcheck.validation.studies.conformance.study import Conformance, named, written
+    from rockcheck.validation.studies.conformance.study import (
+        WANTED,
+        Conformance,
+        Tune,
+        Tuning,
+        named,
+        written,
+    )
 
     if export is not None:
         _export(usable_folder(export))
         return
-    given, folders = dict(setting_of(text) for text in sets or []), histories or []
+    given, folders = dict(map(setting_of, sets or [])), histories or []
     known = () if folders else models.engine_names()
-    names = list(
-        dict.fromkeys(engine or [name for name in known if not models.not_installed(name)])
-    )
-    for name in names:
-        _check_engine(name, allow_code or (), own=tune is None)
+    names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
+    _check_engines(names, allow_code or (), own=tune is None)
     if tune is not None:
         if folders:
             raise errors.InputError("does not go with --histories", "--tune")
-        _tune(names, tune, given, played)
+        wanted = WANTED.keys() - {"restitution"}
+        if unknown := given.keys() - wanted:
+            raise errors.unknown_name("setting", min(unknown), wanted)
+        tunes = tuple(Tune(name, tune, **given) for name in names)
+        studied(Tuning(tunes), replace(played, out=played.out / "tuned"))
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
-    players = [named(name, kind, given) for name in names for kind in kinds]
-    players += [written(folder) for folder in folders]
+    players = [named(*pair, given) for pair in itertools.product(names, kinds)]
+    players += map(written, folders)
     studied(Conformance(tuple(players)), played)
 
 
-def _check_engine(name: str, allow_code: Sequence[str], *, own: bool) -> None:
-    models.check_allowed(name, allow_code)
+def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool) -> None:
     known = models.engine_names()
-    if name not in known and not (own and models.is_own(name)):
-        allowed = f"give one of {', '.join(known)}" + ", or module:Class" * own
-        raise errors.InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
-    if reason := models.not_installed(name):
-        raise errors.InputError(reason, f"--engine {name}")
-
-
-def _tune(
-    engines: Sequence[str], restitution: float, given: Mapping[str, Any], played: Played
-) -> NoReturn:
-    from rockcheck.validation.studies.conformance.study import WANTED, Tune, Tuning
-
-    settings = WANTED.keys() - {"restitution"}
-    if unknown := given.keys() - settings:
-        raise errors.unknown_name("setting", min(unknown), settings)
-    wanted = tuple(Tune(name, restitution, **given) for name in engines)
-    studied(Tuning(wanted), replace(played, out=played.out / "tuned"))
+    for name in names:
+        models.check_allowed(name, allow_code)
+        if name not in known and not (own and models.is_own(name)):
+            allowed = f"give one of {', '.join(known)}" + ", or module:Class" * own
+            raise errors.InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
+        if reason := models.not_installed(name):
+            raise errors.InputError(reason, f"--engine {name}")
 
 
 def _export(folder: Path) -> None:
