@@ -145,11 +145,9 @@ def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
 
     [] if the lines do not divide into equal columns.
     """
-    width, rest = divmod(sum(len(line) for _, line in rows), count)
-    uneven = len({len(line) for _, line in rows[:-1]}) > 1 or any(
-        len(line) % width for _, line in rows if width
-    )
-    if rest or uneven or not width:
+    lengths = [len(line) for _, line in rows]
+    width, rest = divmod(sum(lengths), count)
+    if rest or not width or len(set(lengths[:-1])) > 1 or any(one % width for one in lengths):
         return []
     return [
         (n, line[k : k + width].strip()) for n, line in rows for k in range(0, len(line), width)
