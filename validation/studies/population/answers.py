@@ -381,7 +381,7 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
 def _gaps(found: Found) -> Answer:
     """Which gap is safe, with the wall and without."""
-    data, said, blocks = gaps_of(found), [], list[Block]()
+    data, said = gaps_of(found), list[str]()
     rows, safe, free = (data[key] for key in ("gaps", "none_overturns_up_to", "free_overturned"))
     if rows:
         said.append(
@@ -389,18 +389,13 @@ def _gaps(found: Found) -> Answer:
             if safe is not None
             else f"Some overturn already at the smallest gap, {rows[0]['gap']:g} m."
         )
-        blocks = _over_gaps([row | row["wall_speed"] for row in rows])
     if not data["monotonic"]:
         said.append("A larger gap is not always worse: see each.")
     if data["clearance"] is not None:
         falls = f"; {free} run{'s overturn' if free > 1 else ' overturns'}" if free else ""
         said.append(f"Without the wall the largest reach is {data['clearance']:.3g} m{falls}.")
-    return said, data, blocks
-
-
-def _over_gaps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
     across = [row["gap"] for row in rows]
-    return [
+    blocks: list[Block] = [
         Plot(
             "gaps",
             "Which gap is safe",
@@ -415,7 +410,7 @@ def _over_gaps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
                 Panel(
                     "speed at the wall, m/s",
                     [
-                        Series(name, across, [row[name] for row in rows])
+                        Series(name, across, [row["wall_speed"][name] for row in rows])
                         for name in ("median", "largest")
                     ],
                 ),
@@ -438,13 +433,15 @@ def _over_gaps(rows: Sequence[Mapping[str, Any]]) -> list[Block]:
                     row["gap"],
                     row["runs"],
                     Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
-                    *(row[name] for name in ("struck", "median", "largest")),
+                    row["struck"],
+                    *row["wall_speed"].values(),
                 ]
                 for row in rows
             ],
             note="Runs that strike the wall, also those that then overturn.",
         ),
     ]
+    return said, data, blocks if rows else []
 
 
 def contributions_of(found: Found) -> list[dict[str, Any]]:

@@ -105,7 +105,7 @@ class Run(OneScene):
     def play(self) -> Played:
         """All variants, one after the other."""
         model = models.build(self.model, dict(self.settings))
-        ran = [_ran(changed(self.scene, numbers), model) for numbers in self.variants]
+        ran = [_ran(self.scene, numbers, model) for numbers in self.variants]
         runs, history = tuple(one for one, _ in ran), ran[0][1]
         if not self.shown:
             return Played(runs=runs)
@@ -121,14 +121,12 @@ class Run(OneScene):
         )
 
 
-def changed(scene: Scene, numbers: Numbers) -> Scene:
+def _ran(scene: Scene, numbers: Numbers, model: Any) -> tuple[Ran, History | None]:
     """The scene with these numbers; a wall whose gap is infinite is taken away."""
     gone = [place.split(".")[1] for place, value in numbers if value == np.inf]
     scene = files.with_numbers(scene, {place: v for place, v in numbers if v != np.inf})
-    return scene.replace(walls=[w for w in scene.walls if w.side not in gone]) if gone else scene
-
-
-def _ran(scene: Scene, model: Any) -> tuple[Ran, History | None]:
+    if gone:
+        scene = scene.replace(walls=[w for w in scene.walls if w.side not in gone])
     try:
         history = model.simulate(scene)
     except ModelFailure as failure:
