@@ -121,9 +121,9 @@ class Spectra(Study):
                 "agreement": compared,
             },
             files={
-                f"{self._stem(panel)}.{kind}": write(one, self._about(panel, one))
+                f"{self._stem(panel)}.{kind}": content
                 for panel, one in by_panel.items()
-                for kind, write in (("csv", _csv), ("npz", _npz))
+                for kind, content in self._files(panel, one).items()
             },
             exit_code=3 if any(isinstance(one, pool.Failure) for one in done.values()) else 0,
         )
@@ -254,6 +254,17 @@ class Spectra(Study):
         for number in dict.fromkeys(panel.figure for panel in spectra):
             mine = [panel for panel in spectra if panel.figure == number]
             first = mine[0]
+            pulses, pulse = None, first.scene.excitation
+            if isinstance(pulse, Ricker | Sine):
+                # amplitude (m/s^2) and period (s) along the axes, and where the user's own one is
+                f, a = request.frequencies, request.amplitudes
+                amplitudes, periods = (some.tolist() for some in node_pulse(first.scene, a, f))
+                own = f[0] * periods[0] / pulse.period, a[0] * pulse.amplitude / amplitudes[0]
+                pulses = {
+                    "amplitude": amplitudes,
+                    "period": periods,
+                    "own": [*map(float, own)] if number is None else None,
+                }
             yield Plot(
                 self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
                 (title_of(number) if number else first.title)
@@ -266,7 +277,7 @@ class Spectra(Study):
                     "frequencies": request.frequencies.tolist(),
                     "amplitudes": request.amplitudes.tolist(),
                     "record": first.scene.excitation.kind == "record",
-                    "pulse": _pulse(first, request),
+                    "pulse": pulses,
                     "panels": [self._panel(one, spectra[one], motions[one]) for one in mine],
                     "height": 4.0,
                 },
@@ -299,12 +310,14 @@ class Spectra(Study):
             ],
         }
 
-    def _about(self, panel: Panel, one: Spectrum) -> str:
-        """The settings of a spectrum's files, as JSON.
+    def _files(self, panel: Panel, one: Spectrum) -> dict[str, bytes]:
+        """A spectrum as CSV and as NPZ, with its settings.
 
-        A record's samples are left out: its name identifies it.
+        The CSV has one row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0
+        safe, 1 overturned right. A record's samples are left out of the settings: its name
+        identifies it.
         """
-        return json.dumps(
+        about = json.dumps(
             {
                 "name": self._stem(panel),
                 "title": panel.title,
@@ -319,57 +332,27 @@ class Spectra(Study):
                 "versions": provenance.versions(),
             }
         )
+        rows = zip(one.amplitude_ratios.tolist(), one.outcomes.tolist(), strict=True)
+        table = writing.table_text(
+            ["amplitude_ratio\\frequency_ratio", *map(repr, one.frequency_ratios.tolist())],
+            ([amplitude, *row] for amplitude, row in rows),
+        )
+        arrays = io.BytesIO()
+        law: Any = one.depends_on_law
+        np.savez_compressed(
+            arrays,
+            outcomes=one.outcomes,
+            frequency_ratios=one.frequency_ratios,
+            amplitude_ratios=one.amplitude_ratios,
+            undecided=one.undecided,
+            settings=np.array(about),
+            **({} if law is None else {"depends_on_law": law}),
+        )
+        return {
+            "csv": f"# rockcheck spectrum {about}\n{table}".encode(),
+            "npz": arrays.getvalue(),
+        }
 
 
 def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
-
-
-def _pulse(panel: Panel, request: tiles.Request) -> dict[str, Any] | None:
-    """Amplitude (m/s^2) and period (s) of the pulses along the axes; None for a record.
-
-    `own` has the frequency and amplitude ratio of the user's own pulse; None for the paper's.
-    """
-    pulse = panel.scene.excitation
-    if not isinstance(pulse, Ricker | Sine):
-        return None
-    f, a = request.frequencies, request.amplitudes
-    amplitudes, periods = (some.tolist() for some in node_pulse(panel.scene, a, f))
-    return {
-        "amplitude": amplitudes,
-        "period": periods,
-        "own": [
-            float(f[0]) * periods[0] / pulse.period,
-            float(a[0]) * pulse.amplitude / amplitudes[0],
-        ]
-        if panel.figure is None
-        else None,
-    }
-
-
-def _npz(spectrum: Spectrum, about: str) -> bytes:
-    content = io.BytesIO()
-    law: Any = spectrum.depends_on_law
-    np.savez_compressed(
-        content,
-        outcomes=spectrum.outcomes,
-        frequency_ratios=spectrum.frequency_ratios,
-        amplitude_ratios=spectrum.amplitude_ratios,
-        undecided=spectrum.undecided,
-        settings=np.array(about),
-        **({} if law is None else {"depends_on_law": law}),
-    )
-    return content.getvalue()
-
-
-def _csv(spectrum: Spectrum, about: str) -> bytes:
-    """Outcomes as CSV: one row an amplitude ratio, one column a frequency ratio.
-
-    -1 overturned left, 0 safe, 1 overturned right.
-    """
-    rows = zip(spectrum.amplitude_ratios.tolist(), spectrum.outcomes.tolist(), strict=True)
-    table = writing.table_text(
-        ["amplitude_ratio\\frequency_ratio", *map(repr, spectrum.frequency_ratios.tolist())],
-        ([amplitude, *row] for amplitude, row in rows),
-    )
-    return f"# rockcheck spectrum {about}\n{table}".encode()

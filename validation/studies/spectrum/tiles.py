@@ -80,27 +80,22 @@ class Nodes(Task):
         """Its hash."""
         return self.hash
 
-    def scenes(self) -> list[Scene]:
-        """The scene of each node."""
-        return [
-            node_scene(self.scene, *node)
-            for node in zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
-        ]
-
     def play(self) -> Played:
         """Outcomes or motions of the nodes, or whether they overturn after one impact."""
         player: Any = models.build(self.model, self.settings)
         where = self.scene, self.amplitudes, self.frequencies
         if self.what == "motions":
             return _motions(play_motions(*where, model=player, parts=PARTS, jobs=pool.cores()))
+        nodes = zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
+        scenes = (node_scene(self.scene, *node) for node in nodes)
         if self.what == "one impact":
             kinds = [
                 [event.kind for event in player.simulate(one).event_list]
-                for one in (each.replace(output_step=each.duration) for each in self.scenes())
+                for one in (each.replace(output_step=each.duration) for each in scenes)
             ]
             return Played("".join("NY"[some.count("floor impact") == 1] for some in kinds))
         if not compiled(player):
-            return Played("".join(_letter(one, player) for one in self.scenes()))
+            return Played("".join(_letter(one, player) for one in scenes))
         sides, failed = play_nodes(*where, model=player, jobs=pool.cores())
         return Played("".join(letters_of(sides, np.argwhere(failed))))
 
