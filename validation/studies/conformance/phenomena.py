@@ -216,11 +216,6 @@ def housner(m: Motion) -> float:
     return math.sqrt(max(after, 0.0) / before) / (1.0 - 1.5 * math.sin(alpha) ** 2)
 
 
-def period(m: Motion) -> float:
-    """The quarter period, up to the first impact, over Housner's without small angles."""
-    return _when(m.t, -m.theta, 0.0) / quarter_period(SLENDER.weaker_pivot, G, TILT)
-
-
 def falls(m: Motion) -> float:
     """1 if the block overturns, else 0."""
     return float(m.history.outcome.startswith("overturned"))
@@ -305,11 +300,6 @@ SINES = tuple(
 )
 #: Towers of one shape under one sine: the two small ones fall.
 SIZES = {0.25: True, 0.5: True, 1.0: False, 2.0: False, 4.0: False}  # R, m
-
-
-def _direct(m: Motion) -> float:
-    """1 if the block overturns without an impact, else 0."""
-    return falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)
 
 
 def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Motion) -> float:
@@ -491,7 +481,8 @@ PHENOMENA: dict[str, Phenomenon] = {
             "RC-11",
             "free-rocking period",
             (ROCK,),
-            period,
+            # up to the first impact; Housner's without small angles
+            lambda m: _when(m.t, -m.theta, 0.0) / quarter_period(SLENDER.weaker_pivot, G, TILT),
             1.0,
             0.01,
             "of the quarter period",
@@ -687,7 +678,13 @@ PHENOMENA: dict[str, Phenomenon] = {
             "RC-22",
             "overturning without impact",
             SINES,
-            lambda *ms: _wrong(map(_integral, SINES), _direct, *ms),
+            lambda *ms: _wrong(
+                map(_integral, SINES),
+                lambda m: (
+                    falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)
+                ),
+                *ms,
+            ),
             0.0,
             0.0,
             "wrong outcomes",
