@@ -11,6 +11,7 @@ import numpy as np
 
 from rockcheck.scenes import (
     Block,
+    Excitation,
     Floats,
     Floor,
     InputError,
@@ -40,7 +41,6 @@ LONGEST, MOST_SAMPLES = 15.0, 300
 #: Rows of a history.
 ROWS = 100
 
-Excitation = Rest | Ricker | Sine | Record
 WALLED: tuple[tuple[Literal["left", "right"], ...], ...] = (
     (),
     ("left",),

@@ -356,7 +356,11 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     speed = radius / motion.unit
     power = -(motion.u * motion.across + vg * motion.up) / speed
     if model.friction != "bouc-wen":
-        power = power + _friction_power(motion)
+        along, mu = motion.sign * motion.slip, scene.floor.friction
+        power = power - np.where(motion.within("slide"), mu * np.abs(1.0 + vg) * np.abs(along), 0.0)
+        tilted = motion.within("slide-rock", "ladder")
+        forces, _ = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
+        power[tilted] += forces[1] * along[tilted]
     whole, quiet = _whole_groups(scene, motion.history)
     step = scene.output_step / motion.unit
     work, moved = integrals(step, power), integrals(step, np.abs(power))
@@ -415,18 +419,6 @@ def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
     acceleration = excitation.acceleration(times)
     steps = 0.5 * np.diff(times) * (acceleration[1:] + acceleration[:-1])
     return np.asarray(np.concatenate([[0.0], np.cumsum(steps)])[np.searchsorted(times, t)])
-
-
-def _friction_power(motion: Motion) -> Floats:
-    """Power of the floor's friction, natural units."""
-    along, mu = motion.sign * motion.slip, motion.scene.floor.friction
-    power = np.where(
-        motion.within("slide"), -mu * np.abs(1.0 + motion.vertical) * np.abs(along), 0.0
-    )
-    tilted = motion.within("slide-rock", "ladder")
-    forces, _ = motion.forces(tilted, np.where(along >= 0.0, 1.0, -1.0))
-    power[tilted] = forces[1] * along[tilted]
-    return power
 
 
 def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import numpy as np
@@ -151,6 +153,10 @@ class Approximate(Player):
         return played
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
+        """Depth is the deepest penetration over what the model states.
+
+        An engine states the distance moved in a step, the CM the deflection of its spring.
+        """
         try:
             history = models.build(self.label, self.settings(scene, number)).simulate(scene)
         except (ModelFailure, InputError) as error:
@@ -158,26 +164,22 @@ class Approximate(Player):
         figures = {"ends": 0.0, "finite": not_finite(history)}
         if not figures["finite"]:
             motion = Motion(scene, history)
-            figures |= {"depth": self.depth(motion), "source": energy_without_source(motion)}
+            x, y, spin = (
+                float(np.max(np.abs(history.channels[name])))
+                for name in ("x_dot", "y_dot", "theta_dot")
+            )
+            speed = (x + y) * motion.unit / motion.radius + spin * motion.unit
+            shaken = sum(
+                np.max(np.abs(base.acceleration(history.channels["t"])))
+                for base in (scene.excitation, scene.vertical)
+            )
+            level = 1.0 + shaken / scene.gravity + spin**2 * motion.unit**2
+            way = math.sqrt(DEPTH) if self.label == "cm" else self.step
+            figures["depth"] = motion.deepest / (2.0 * (speed * way + level * way**2) + 1e-5)
+            figures["source"] = energy_without_source(motion)
         return CheckedRun(
             figures=figures, outcome=history.outcome, counts={"events": len(history.event_list)}
         )
-
-    def depth(self, motion: Motion) -> float:
-        """Deepest penetration over what the model states.
-
-        An engine states the distance moved in a step, the CM the deflection of its spring.
-        """
-        spin = float(np.max(np.abs(motion.channels["theta_dot"])))
-        ways = sum(np.max(np.abs(motion.channels[name])) for name in ("x_dot", "y_dot"))
-        speed = ways * motion.unit / motion.radius + spin * motion.unit
-        shaken = sum(
-            np.max(np.abs(base.acceleration(motion.channels["t"])))
-            for base in (motion.scene.excitation, motion.scene.vertical)
-        )
-        level = 1.0 + shaken / motion.scene.gravity + spin**2 * motion.unit**2
-        way = math.sqrt(DEPTH) if self.label == "cm" else self.step
-        return motion.deepest / (2.0 * (speed * way + level * way**2) + 1e-5)
 
 
 ROUNDING = "scenes at which rounding decides"
@@ -319,10 +321,8 @@ def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
-    changed = deepcopy(tables)
-    part: Any = changed
-    for key in path[:-1]:
-        part = part[key]
+    changed: Any = deepcopy(tables)
+    part = reduce(getitem, path[:-1], changed)
     if value:
         part[path[-1]] = value[0]
     else:
