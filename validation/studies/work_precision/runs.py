@@ -136,12 +136,15 @@ DURATION = 5.0
 
 
 WALLS = {
-    f"{name} {1e3 * gap:g} mm e {e:g}": pulse(
-        *PULSES[name],
-        walls=(Wall(side="left", gap=gap, restitution=e),),
-        name=f"{name} {1e3 * gap:g} mm e {e:g}",
-    ).replace(duration=DURATION)
-    for name, gap, e in itertools.product(PULSES, GAPS, RESTITUTIONS)
+    scene.name: scene.replace(duration=DURATION)
+    for scene in (
+        pulse(
+            *PULSES[name],
+            walls=(Wall(side="left", gap=gap, restitution=e),),
+            name=f"{name} {1e3 * gap:g} mm e {e:g}",
+        )
+        for name, gap, e in itertools.product(PULSES, GAPS, RESTITUTIONS)
+    )
 }
 QUICK_WALLS = ("long 53 mm e 0.5", "medium 53 mm e 0", "short 3 mm e 0")
 
@@ -548,18 +551,18 @@ def error_at(line: pd.DataFrame, cpu: float) -> float:
     return math.nan
 
 
-def cost_at(line: pd.DataFrame, level: float = LEVEL) -> tuple[float, bool]:
-    """CPU s a simulated second at a median error of `level`.
+def cost_at(line: pd.DataFrame) -> tuple[float, bool]:
+    """CPU s a simulated second at a median error of `LEVEL`.
 
     The second value is true where the coarsest setting already reaches the level. Between settings
     both logarithms are interpolated linearly; NaN where no setting reaches the level. The cheapest
     counts.
     """
     points = list(zip(line.rms, line.cpu, strict=True))
-    costs = [(cpu, n == 0) for n, (rms, cpu) in enumerate(points) if rms <= level]
+    costs = [(cpu, n == 0) for n, (rms, cpu) in enumerate(points) if rms <= LEVEL]
     for (e, a), (f, b) in itertools.pairwise(points):
-        if e > level >= f > 0.0 and math.isfinite(e):
-            costs.append((a * (b / a) ** (math.log(e / level) / math.log(e / f)), False))
+        if e > LEVEL >= f > 0.0 and math.isfinite(e):
+            costs.append((a * (b / a) ** (math.log(e / LEVEL) / math.log(e / f)), False))
     return min(costs, default=NOTHING)
 
 

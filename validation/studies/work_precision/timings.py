@@ -25,7 +25,6 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
-from rockcheck.ebm.core.state import Rows
 from rockcheck.ebm.spectrum import node_pulse
 from rockcheck.scenes import (
     PAPER_BLOCK,
@@ -144,16 +143,6 @@ CASES = (
 )
 
 
-def packed_of(case: BatchCase, model: EventBasedModel, nodes: int) -> Rows:
-    """The runs of a batch: `nodes` pulses along each axis of the grid, or `nodes` scales."""
-    if case.scene is not None:
-        return pack_pulses(case.scene, model, *grid(case.scene, nodes))
-    scene = load_scene("fig4a")
-    motion, scales = scene.excitation, np.linspace(1.4, 1.8, nodes).tolist()
-    whole = scene.replace(duration=motion.quiet_after)
-    return pack([whole.replace(excitation=motion.scaled(one / 1.6)) for one in scales], model)
-
-
 def batch_size(runs: int, threads: int) -> BatchSize:
     """Times a batch of `runs` random pulses on `threads` threads."""
     scene, model = PLAIN, EventBasedModel(tolerance=LEVEL)
@@ -171,11 +160,20 @@ def batch_size(runs: int, threads: int) -> BatchSize:
 def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     """A case's cost on one core, a row a tolerance.
 
-    All tolerances are played in turn with the timing of one right-hand side.
+    Its runs are `nodes` pulses along each axis of the grid, or `nodes` scales of El Centro. All
+    tolerances are played in turn with the timing of one right-hand side.
     """
     case = next(case for case in CASES if case.name == name)
     reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
-    packed = packed_of(case, reference_model, nodes)
+    if case.scene is not None:
+        packed = pack_pulses(case.scene, reference_model, *grid(case.scene, nodes))
+    else:
+        scene, scales = load_scene("fig4a"), np.linspace(1.4, 1.8, nodes).tolist()
+        motion = scene.excitation
+        whole = scene.replace(duration=motion.quiet_after)
+        packed = pack(
+            [whole.replace(excitation=motion.scaled(one / 1.6)) for one in scales], reference_model
+        )
     play = partial(run_batch, packed, until_decided=case.scene is not None, strict=False, jobs=1)
     reference = play(reference_model)
     costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
