@@ -680,6 +680,7 @@ PHENOMENA: dict[str, Phenomenon] = {
             SINES,
             lambda *ms: _wrong(
                 map(_integral, SINES),
+                # whether it overturns on the side to which it tips first
                 lambda m: (
                     falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)
                 ),

@@ -479,10 +479,7 @@ def export(folder: Path) -> list[str]:
     for name, scene in SCENES.items():
         if scene.excitation.kind != "rest" or scene.vertical.kind != "rest":
             t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
-            base = (
-                base_motion.velocity_of(scene.excitation),
-                base_motion.velocity_of(scene.vertical),
-            )
+            bases = scene.excitation, scene.vertical
             writing.write_whole(
                 folder / f"{name}-base.csv",
                 writing.table_text(
@@ -498,9 +495,9 @@ def export(folder: Path) -> list[str]:
                             t,
                             *(
                                 [base_motion.velocity_at(at, *one) for at in t.tolist()]
-                                for one in base
+                                for one in map(base_motion.velocity_of, bases)
                             ),
-                            *(one.acceleration(t) for one in (scene.excitation, scene.vertical)),
+                            *(one.acceleration(t) for one in bases),
                         ]
                     ).tolist(),
                 ),

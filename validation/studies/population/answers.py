@@ -705,8 +705,11 @@ def _by_hand(found: Found) -> Answer:
         note="Estimates to be judged, not judges: in how many runs it happens by the method and by"
         " the simulation, and in how many both agree; medians of estimate and motion.",
     )
-    said = [f"Hand methods let it overturn: {', '.join(told)}."] if told else []
-    return said, {"criteria": rows}, [table]
+    return (
+        [f"Hand methods let it overturn: {', '.join(told)}."] if told else [],
+        {"criteria": rows},
+        [table],
+    )
 
 
 def _models(found: Found) -> Iterator[Block]:

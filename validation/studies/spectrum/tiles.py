@@ -86,8 +86,10 @@ class Nodes(Task):
         where = self.scene, self.amplitudes, self.frequencies
         if self.what == "motions":
             return _motions(play_motions(*where, model=player, parts=PARTS, jobs=pool.cores()))
-        nodes = zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
-        scenes = (node_scene(self.scene, *node) for node in nodes)
+        scenes = (
+            node_scene(self.scene, *node)
+            for node in zip(self.amplitudes.tolist(), self.frequencies.tolist(), strict=True)
+        )
         if self.what == "one impact":
             kinds = [
                 [event.kind for event in player.simulate(one).event_list]

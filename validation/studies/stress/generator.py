@@ -345,13 +345,12 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
         size = _pick(r, (alpha, 0.5 * alpha, 0.1, *(10.0**size for size in SIZES if size < 0)))
         return sign * (size if size < 1.5 else 0.1)
 
-    low = tuple(size for size in SIZES if size < 1)
     start = _drawn(
         r,
         ("initial_rotation", 1.0 if excitation.kind == "rest" else 0.4, tilt),
         ("initial_angular_velocity", 0.4, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
         ("initial_velocity", 0.3, lambda: _sign(r) * 10.0 ** int(_pick(r, SIZES))),
-        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, low))),
+        ("initial_height", 0.2, lambda: 10.0 ** int(_pick(r, [one for one in SIZES if one < 1]))),
     )
     return _scene(
         kind,

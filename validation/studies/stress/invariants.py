@@ -18,7 +18,6 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
-    Excitation,
     Floats,
     History,
     InputError,
@@ -392,33 +391,25 @@ def energy_without_source(motion: Motion) -> float:
     between the rows (a record can be finer than they are) where the block stands, and where nothing
     but the base changes its velocity.
     """
-    scene, energy = motion.scene, motion.energy
+    scene, energy, t = motion.scene, motion.energy, motion.channels["t"]
     work, moved = np.zeros(len(energy)), np.zeros(len(energy))
     for excitation, velocity in (
         (scene.excitation, motion.across),
         (scene.vertical, motion.up),
     ):
-        impulse = -np.diff(_base_velocity(excitation, motion.channels["t"]))
+        times = t
+        if isinstance(excitation, Record):  # linear between its samples, and zero after the last
+            kinks = excitation.time_step * np.arange(len(excitation.unscaled))
+            kinks = np.append(kinks, np.nextafter(kinks[-1], np.inf))
+            times = np.union1d(t, kinks[kinks < t[-1]])
+        acceleration = excitation.acceleration(times)
+        gained = np.cumsum(0.5 * np.diff(times) * (acceleration[1:] + acceleration[:-1]))
+        impulse = -np.diff(np.append(0.0, gained)[np.searchsorted(times, t)])
         part = 0.5 * (velocity[1:] + velocity[:-1]) * impulse
         work[1:] += np.cumsum(part)
         moved[1:] += np.cumsum(np.abs(part))
     size = scene.gravity * motion.radius + np.abs(energy[0]) + moved
     return float(np.max((energy - energy[0] - work) / size))
-
-
-def _base_velocity(excitation: Excitation, t: Floats) -> Floats:
-    """Integral of the base acceleration from the first of the times `t` on.
-
-    Exact for a record, which is linear between samples.
-    """
-    times = t
-    if isinstance(excitation, Record):
-        kinks = excitation.time_step * np.arange(len(excitation.unscaled))
-        kinks = np.append(kinks, np.nextafter(kinks[-1], np.inf))  # where it ends
-        times = np.union1d(t, kinks[kinks < t[-1]])
-    acceleration = excitation.acceleration(times)
-    steps = 0.5 * np.diff(times) * (acceleration[1:] + acceleration[:-1])
-    return np.asarray(np.concatenate([[0.0], np.cumsum(steps)])[np.searchsorted(times, t)])
 
 
 def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:

@@ -13,6 +13,7 @@ from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import reduce
+from itertools import chain
 from operator import getitem
 from typing import Any
 
@@ -269,44 +270,41 @@ def shrink(
 
 
 def _simpler(scene: Scene) -> Iterator[Scene]:
-    """The scene with one simplification each, the greatest first."""
-    for tables in _changes(scene):
-        with suppress(InputError):
-            simpler = Scene(**tables)
-            if simpler != scene:
-                yield simpler
-
-
-def _changes(scene: Scene) -> Iterator[dict[str, Any]]:
-    """The scene's tables with one simplification each, the greatest first; not all are valid.
+    """The scene with one simplification each, the greatest first, where it is valid.
 
     A part is left out, a run or list is shorter, the scale is another; at last one number is zero
     or has fewer digits.
     """
     tables = files.tables_of(scene)
     places = sorted(_places(tables), key=lambda place: (len(place[0]), FIRST.get(place[0][0], 2)))
-    yield from (_with(tables, path) for path, _ in places)
-    unit = math.sqrt(scene.block.radius / scene.gravity)
-    yield from (
-        tables | {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
-        for factor in (0.25, 0.5, 0.9)
-        if factor * scene.duration > 0.01 * unit
-    )
-    yield from (
-        _with(tables, path, value[:count])
-        for path, value in places
-        if isinstance(value, list)
-        for count in (len(value) // 2, -1)
-    )
-    if not 0.5 < scene.block.radius < 2.0:  # rounding would change it again
-        yield tables | {"block": scene.block.scaled(1.0 / scene.block.radius)}
     numbers = [(path, value) for path, value in places if isinstance(value, float)]
-    yield from (_with(tables, path, 0.0) for path, _ in numbers)
-    yield from (
-        _with(tables, path, float(f"{value:.{digits}g}"))
-        for digits in (1, 2, 4, 8)
-        for path, value in numbers
-    )
+    unit, radius = math.sqrt(scene.block.radius / scene.gravity), scene.block.radius
+    for changed in chain(
+        (_with(tables, path) for path, _ in places),
+        (
+            tables | {key: factor * getattr(scene, key) for key in ("duration", "output_step")}
+            for factor in (0.25, 0.5, 0.9)
+            if factor * scene.duration > 0.01 * unit
+        ),
+        (
+            _with(tables, path, value[:count])
+            for path, value in places
+            if isinstance(value, list)
+            for count in (len(value) // 2, -1)
+        ),
+        # near 1 m rounding would change it again
+        [tables | {"block": scene.block.scaled(1.0 / radius)}] if not 0.5 < radius < 2.0 else [],
+        (_with(tables, path, 0.0) for path, _ in numbers),
+        (
+            _with(tables, path, float(f"{value:.{digits}g}"))
+            for digits in (1, 2, 4, 8)
+            for path, value in numbers
+        ),
+    ):
+        with suppress(InputError):
+            simpler = Scene(**changed)
+            if simpler != scene:
+                yield simpler
 
 
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:

@@ -122,11 +122,13 @@ class WorkPrecision(Study):
         times = 1 if self.quick else COLD_STARTS
         yield Measure("cold start", "filled", times, where="timed", expected=1.5 * times)
 
-    def _savings(self) -> Iterator[Task]:
+    def _savings(self) -> Iterable[Task]:
         rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
-        for name in timings.KINDS:
-            if not name.startswith("batches") or name.endswith("quick") == self.quick:
-                yield Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
+        return (
+            Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
+            for name in timings.KINDS
+            if not name.startswith("batches") or name.endswith("quick") == self.quick
+        )
 
     def _models(self) -> Iterator[Task]:
         """Interleaved, so that other load of the machine affects all models equally.
