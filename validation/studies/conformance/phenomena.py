@@ -129,8 +129,9 @@ def cone(m: Motion) -> float:
 # Bouncing.
 
 
-def _drop(e: float) -> Scene:
-    return Scene(
+#: By restitution: a drop onto the floor, and a hit on the wall.
+DROPS = {
+    e: Scene(
         name=f"drop-e-{e:g}",
         block=SQUAT,
         floor=Floor(friction=0.3, restitution=e),
@@ -138,10 +139,10 @@ def _drop(e: float) -> Scene:
         duration=0.65,
         output_step=1e-3,
     )
-
-
-def _hit(e: float) -> Scene:
-    return Scene(
+    for e in (0.0, *RESTITUTIONS)
+}
+HITS = {
+    e: Scene(
         name=f"wall-e-{e:g}",
         block=SQUAT,
         floor=Floor(friction=0.0),
@@ -150,6 +151,8 @@ def _hit(e: float) -> Scene:
         duration=0.3,
         output_step=1e-3,
     )
+    for e in (0.0, *RESTITUTIONS)
+}
 
 
 def _rebound(m: Motion) -> float:
@@ -181,14 +184,17 @@ ROCK = Scene(
 CRITICAL = math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter
 
 
-def _flicked(name: str, part: float) -> Scene:
-    return Scene(
+#: By name, a block that is set in motion so that it just falls, or just does not.
+FLICKED = {
+    name: Scene(
         name=name,
         block=SLENDER,
         floor=Floor(friction=0.6),
         initial_angular_velocity=part * CRITICAL,
         duration=6.0,
     )
+    for name, part in (("tip", 1.03), ("return", 0.97))
+}
 
 
 def uplift(m: Motion) -> float:
@@ -282,10 +288,6 @@ def _pulsed(name: str, block: Block, pulse: Record | Sine, **more: Any) -> Scene
         excitation=pulse,
         **{"floor": Floor(friction=1.333), "duration": 6.0, **more},
     )
-
-
-def _rectangle(size: float, length: float) -> Record:
-    return Record.from_samples([size, size], time_step=length)
 
 
 LENGTH = 0.4  # s
@@ -410,7 +412,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-06",
             "rebound from the floor at e = 0.25 … 1",
-            tuple(map(_drop, RESTITUTIONS)),
+            tuple(DROPS[e] for e in RESTITUTIONS),
             partial(_worst, _rebound),
             0.0,
             0.03,
@@ -423,7 +425,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-07",
             "rebound from a wall at e = 0.25 … 1",
-            tuple(map(_hit, RESTITUTIONS)),
+            tuple(HITS[e] for e in RESTITUTIONS),
             partial(_worst, _speed_back),
             0.0,
             0.03,
@@ -436,7 +438,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-08",
             "no bounce at e = 0",
-            (_drop(0.0), _hit(0.0)),
+            (DROPS[0.0], HITS[0.0]),
             lambda drop, hit: max(_rebound(drop), abs(_speed_back(hit))),
             0.0,
             0.03,
@@ -493,7 +495,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-12",
             "what must tip, tips",
-            (_flicked("tip", 1.03),),
+            (FLICKED["tip"],),
             falls,
             1.0,
             0.0,
@@ -505,7 +507,7 @@ PHENOMENA: dict[str, Phenomenon] = {
         Phenomenon(
             "RC-13",
             "what must not tip, does not",
-            (_flicked("return", 0.97),),
+            (FLICKED["return"],),
             falls,
             0.0,
             0.0,
@@ -621,7 +623,9 @@ PHENOMENA: dict[str, Phenomenon] = {
                 _pulsed(
                     f"step-{part:g}",
                     STUBBY,
-                    _rectangle(part * overturning_velocity(STUBBY, G) / KICK, KICK),
+                    Record.from_samples(
+                        np.full(2, part * overturning_velocity(STUBBY, G) / KICK), time_step=KICK
+                    ),
                 )
                 for part in MARGINS
             ),
@@ -640,7 +644,7 @@ PHENOMENA: dict[str, Phenomenon] = {
                 _pulsed(
                     "newmark",
                     SQUAT,
-                    _rectangle(PUSH, PUSHED),
+                    Record.from_samples([PUSH, PUSH], time_step=PUSHED),
                     floor=Floor(friction=0.3),
                     duration=1.5,
                 ),
@@ -660,8 +664,12 @@ PHENOMENA: dict[str, Phenomenon] = {
                 _pulsed(
                     f"rectangle-{part:g}",
                     NEEDLE,
-                    _rectangle(
-                        part * rectangular_pulse_ratio(LENGTH, NEEDLE_P) * G * NEEDLE.slope, LENGTH
+                    Record.from_samples(
+                        np.full(
+                            2,
+                            part * rectangular_pulse_ratio(LENGTH, NEEDLE_P) * G * NEEDLE.slope,
+                        ),
+                        time_step=LENGTH,
                     ),
                 )
                 for part in MARGINS

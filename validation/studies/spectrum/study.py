@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import Spectrum
+from rockcheck.ebm import EventBasedModel, Spectrum
+from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse
 from rockcheck.scenes import Ricker, Scene, Sine, reading, writing
 from rockcheck.validation.execute import models, pool, provenance
@@ -163,9 +164,20 @@ class Spectra(Study):
 
     def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
-        one = book.spectrum(panel, self.request)
+        request, walls = self.request, panel.scene.walls
+        player = models.build(request.model, request.settings)
+        others = (
+            other_laws(
+                player,
+                walls=any(wall.restitution > 0.0 for wall in walls),
+                flat=may_fly(panel.scene),
+            )
+            if isinstance(player, EventBasedModel)
+            else ()
+        )
+        one = book.spectrum(panel, request)
         laws = [
-            book.spectrum(panel, self.request, law) for law in self.request.other_laws(panel.scene)
+            book.spectrum(panel, request, {**request.settings, "impacts": law}) for law in others
         ]
         known = [law for law in laws if law is not None]
         if one is None or not laws or len(known) < len(laws):

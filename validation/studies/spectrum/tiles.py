@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
-from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import (
     LEFT,
     RIGHT,
@@ -272,20 +271,6 @@ class Request:
             if low >= high:
                 raise InputError(f"{said}: the lower end comes first", f"--{name}")
             object.__setattr__(self, name, np.linspace(low, high, self.size))
-
-    def other_laws(self, scene: Scene) -> list[dict[str, Any]]:
-        """The settings with each other law of impacts on which outcomes may depend."""
-        player = models.build(self.model, self.settings)
-        if not isinstance(player, EventBasedModel):
-            return []
-        return [
-            {**self.settings, "impacts": law}
-            for law in other_laws(
-                player,
-                walls=any(wall.restitution > 0.0 for wall in scene.walls),
-                flat=may_fly(scene),
-            )
-        ]
 
 
 class _Waiting(Exception):

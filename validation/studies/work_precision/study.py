@@ -4,7 +4,7 @@ import itertools
 import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any, Literal, get_args
 
@@ -58,6 +58,8 @@ COLD_STARTS = 3
 LOOKS: Mapping[str, Style] = {"default": "dots", "adaptive": "marked"}
 #: Below are rounding errors.
 FLOOR = 1e-13
+#: The level that no error against the other reference can fall below.
+FORM = Series("model form: EBM against unilateral", style="level")
 
 
 @dataclass(frozen=True)
@@ -357,11 +359,6 @@ def _spread(label: str, trends: pd.DataFrame) -> list[Any]:
     ]
 
 
-def _form_of(form: float) -> Series:
-    """The level that no error against the other reference can fall below."""
-    return Series("model form: EBM against unilateral", y=[form], style="level")
-
-
 def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
     """Median error with its 10-90 % band over CPU time: a panel a family, a line a model."""
     panels = []
@@ -380,7 +377,7 @@ def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
             )
             for (label,), mine in runs.grouped(shown, "line")
         ]
-        panels.append(Panel(family, [*series, _form_of(max(_about(family)[1], FLOOR))]))
+        panels.append(Panel(family, [*series, replace(FORM, y=[max(_about(family)[1], FLOOR)])]))
     return Plot(
         title.lower().replace(" ", "-"),
         f"Work and precision: {title.lower()}",
@@ -451,7 +448,7 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
                 )
             )
         if reference == "ebm":
-            series.append(_form_of(form))
+            series.append(replace(FORM, y=[form]))
         panels.append(Panel(f"against {reference}", series))
     return Plot(
         "error-over-step",
