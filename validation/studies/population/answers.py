@@ -380,7 +380,6 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
 
 def _gaps(found: Found) -> Answer:
-    """Which gap is safe, with the wall and without."""
     data, said = gaps_of(found), list[str]()
     rows, safe, free = (data[key] for key in ("gaps", "none_overturns_up_to", "free_overturned"))
     if rows:

@@ -567,8 +567,8 @@ CHANGES = {
 }
 
 
-def _loaded(text: str, change: str = "") -> Any:
-    """MuJoCo's model of a description, with one of `CHANGES`."""
+def _loaded(text: str, change: str) -> Any:
+    """MuJoCo's model of a description, with one of `CHANGES`; "" is none."""
     import mujoco
 
     for pattern, new in CHANGES.get(change, ()):
