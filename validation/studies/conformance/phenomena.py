@@ -483,7 +483,7 @@ PHENOMENA: dict[str, Phenomenon] = {
             "RC-11",
             "free-rocking period",
             (ROCK,),
-            # up to the first impact; Housner's without small angles
+            # up to the first impact, over Housner's without small angles
             lambda m: _when(m.t, -m.theta, 0.0) / quarter_period(SLENDER.weaker_pivot, G, TILT),
             1.0,
             0.01,
@@ -688,7 +688,7 @@ PHENOMENA: dict[str, Phenomenon] = {
             SINES,
             lambda *ms: _wrong(
                 map(_integral, SINES),
-                # whether it overturns on the side to which it tips first
+                # whether it overturns without having tipped to the other side
                 lambda m: (
                     falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)
                 ),

@@ -122,7 +122,7 @@ class Run(OneScene):
 
 
 def _ran(scene: Scene, numbers: Numbers, model: Any) -> tuple[Ran, History | None]:
-    """The scene with these numbers; a wall whose gap is infinite is taken away."""
+    """A run of the scene with these numbers; a wall whose gap is infinite is taken away."""
     gone = [place.split(".")[1] for place, value in numbers if value == np.inf]
     scene = files.with_numbers(scene, {place: v for place, v in numbers if v != np.inf})
     if gone:

@@ -168,11 +168,14 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     if case.scene is not None:
         packed = pack_pulses(case.scene, reference_model, *grid(case.scene, nodes))
     else:
-        scene, scales = load_scene("fig4a"), np.linspace(1.4, 1.8, nodes).tolist()
-        motion = scene.excitation
-        whole = scene.replace(duration=motion.quiet_after)
+        scene = load_scene("fig4a")
+        whole = scene.replace(duration=scene.excitation.quiet_after)
         packed = pack(
-            [whole.replace(excitation=motion.scaled(one / 1.6)) for one in scales], reference_model
+            [
+                whole.replace(excitation=scene.excitation.scaled(scale / 1.6))
+                for scale in np.linspace(1.4, 1.8, nodes).tolist()
+            ],
+            reference_model,
         )
     play = partial(run_batch, packed, until_decided=case.scene is not None, strict=False, jobs=1)
     reference = play(reference_model)
