@@ -517,7 +517,7 @@ class _Horizon:
     def row(self) -> int:
         """The first row beyond the horizon of predictability (see `DISTURBANCE`)."""
         self.found, scene, history = 1, self.motion.scene, self.motion.history
-        rows = [len(history.channels["t"])]
+        compared: list[tuple[History, History, float]] = []
         # The horizon belongs to the scene, however coarse the model is. Rounding is a disturbance,
         # too: finer tolerances must agree on the answer.
         for by in (10.0, 100.0):
@@ -526,12 +526,16 @@ class _Horizon:
                     self.model.model_copy(update={"tolerance": EXACT / times}).simulate(scene)
                     for times in (by, 100.0 * by)
                 )
-                rows.append(_agree(a, b, 0.1 * SEEN))
+                compared.append((a, b, 0.1 * SEEN))
         for disturbed in _disturbed(scene, self.seed):
             with suppress(ModelFailure):
-                rows.append(_agree(history, self.model.simulate(disturbed), SEEN))
+                compared.append((history, self.model.simulate(disturbed), SEEN))
+        # the rows, from the first on, in which theta differs by no more than is seen, rad
+        rows = [
+            int(np.argmax(np.append(_differences(a, b) > seen, True))) for a, b, seen in compared
+        ]
         grown = np.flatnonzero(_amplified(self.motion) > math.log(SEEN / EXACT))
-        return min(*rows, *(int(first) for first in grown[:1]))
+        return min([len(history.channels["t"]), *rows, *map(int, grown[:1])])
 
 
 def _amplified(motion: Motion) -> Floats:
@@ -558,11 +562,6 @@ def _amplified(motion: Motion) -> Floats:
 def _differences(a: History, b: History) -> Floats:
     rows = min(len(a.channels["t"]), len(b.channels["t"]))
     return np.abs(a.channels["theta"][:rows] - b.channels["theta"][:rows])
-
-
-def _agree(a: History, b: History, seen: float) -> int:
-    """Number of rows, from the first on, in which theta differs by no more than `seen`, rad."""
-    return int(np.argmax(np.append(_differences(a, b) > seen, True)))
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:

@@ -96,17 +96,18 @@ class WorkPrecision(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """All at once; what is timed first."""
-        return [
-            task
-            for name, part in (
-                ("ebm", self._batches),
-                ("skipping", self._savings),
-                ("models", self._models),
-                ("convergence", self._convergence),
-            )
-            if self.what in ("all", name)
-            for task in part()
-        ]
+        rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
+        parts: dict[What, Iterable[Task]] = {
+            "ebm": self._batches(),
+            "skipping": (
+                Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
+                for name in timings.KINDS
+                if not name.startswith("batches") or name.endswith("quick") == self.quick
+            ),
+            "models": self._models(),
+            "convergence": self._convergence(),
+        }
+        return [task for name, part in parts.items() if self.what in ("all", name) for task in part]
 
     def _batches(self) -> Iterator[Task]:
         nodes = 20 if self.quick else timings.NODES
@@ -123,14 +124,6 @@ class WorkPrecision(Study):
             yield Measure("cold start", "none", 1, where="timed", expected=15.0)
         times = 1 if self.quick else COLD_STARTS
         yield Measure("cold start", "filled", times, where="timed", expected=1.5 * times)
-
-    def _savings(self) -> Iterable[Task]:
-        rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
-        return (
-            Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
-            for name in timings.KINDS
-            if not name.startswith("batches") or name.endswith("quick") == self.quick
-        )
 
     def _models(self) -> Iterator[Task]:
         """Interleaved, so that other load of the machine affects all models equally.
