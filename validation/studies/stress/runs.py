@@ -154,10 +154,7 @@ class Approximate(Player):
         return played
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
-        """Depth is the deepest penetration over what the model states.
-
-        An engine states the distance moved in a step, the CM the deflection of its spring.
-        """
+        """Plays a scene and checks its history."""
         try:
             history = models.build(self.label, self.settings(scene, number)).simulate(scene)
         except (ModelFailure, InputError) as error:
@@ -165,6 +162,8 @@ class Approximate(Player):
         figures = {"ends": 0.0, "finite": not_finite(history)}
         if not figures["finite"]:
             motion = Motion(scene, history)
+            # The deepest penetration over what the model states: an engine the distance moved in a
+            # step, the CM the deflection of its spring.
             x, y, spin = (
                 float(np.max(np.abs(history.channels[name])))
                 for name in ("x_dot", "y_dot", "theta_dot")
