@@ -354,7 +354,7 @@ def energy_error(model: EventBasedModel, motion: Motion) -> float | None:
     energy = motion.energy / (scene.gravity * radius)
     speed = radius / motion.unit
     power = -(motion.u * motion.across + vg * motion.up) / speed
-    if model.friction != "bouc-wen":
+    if model.friction != "bouc-wen":  # the floor's friction, too
         along, mu = motion.sign * motion.slip, scene.floor.friction
         power = power - np.where(motion.within("slide"), mu * np.abs(1.0 + vg) * np.abs(along), 0.0)
         tilted = motion.within("slide-rock", "ladder")
@@ -397,8 +397,10 @@ def energy_without_source(motion: Motion) -> float:
         (scene.excitation, motion.across),
         (scene.vertical, motion.up),
     ):
+        # The velocity of the base: the integral, exact for a record, which is linear between its
+        # samples and zero after the last one.
         times = t
-        if isinstance(excitation, Record):  # linear between its samples, and zero after the last
+        if isinstance(excitation, Record):
             kinks = excitation.time_step * np.arange(len(excitation.unscaled))
             kinks = np.append(kinks, np.nextafter(kinks[-1], np.inf))
             times = np.union1d(t, kinks[kinks < t[-1]])
