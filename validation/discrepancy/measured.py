@@ -7,6 +7,7 @@ Signs are the scene's: theta counterclockwise positive, x the centroid relative 
 
 import dataclasses
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -62,7 +63,18 @@ class Measured(Frozen):
             raise InputError(f"no measured history of scene {scene.name!r}", "files")
         given = self.files[scene.name]
         paths = (given,) if isinstance(given, str) else given
-        history = self._mean(paths)
+        if not paths:
+            raise InputError("no file is given", "files")
+        tests = [read_measured(path, offset=self.offset) for path in paths]
+        said: list[str] = []
+        if self.align:
+            offsets = [0.0, *(time_shift(tests[0], test) for test in tests[1:])]
+            tests = [shifted(test, offset) for test, offset in zip(tests, offsets, strict=True)]
+            said = [
+                f"{Path(path).name} is shifted by {offset:+.4g} s"
+                for path, offset in zip(paths[1:], offsets[1:], strict=True)
+            ]
+        history = mean_history(tests)
         t, ends = history.channels["t"], (-1e-9, scene.duration + 1e-9)
         inside = (t >= ends[0]) & (t <= ends[1])
         if not np.any(inside):
@@ -79,23 +91,9 @@ class Measured(Frozen):
             outcome=history.outcome if inside[-1] else outcome_of(channels),
             event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             block=scene.block.per_unit_mass,
+            notes=(*history.notes, *said),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
-
-    def _mean(self, paths: Sequence[str]) -> History:
-        if not paths:
-            raise InputError("no file is given", "files")
-        tests = [read_measured(path, offset=self.offset) for path in paths]
-        said: list[str] = []
-        if self.align:
-            offsets = [0.0, *(time_shift(tests[0], test) for test in tests[1:])]
-            tests = [shifted(test, offset) for test, offset in zip(tests, offsets, strict=True)]
-            said = [
-                f"{Path(path).name} is shifted by {offset:+.4g} s"
-                for path, offset in zip(paths[1:], offsets[1:], strict=True)
-            ]
-        mean = mean_history(tests)
-        return dataclasses.replace(mean, notes=(*mean.notes, *said))
 
 
 def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
@@ -112,7 +110,14 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
         raise InputError(f"{shown}: empty")
     columns: dict[str, tuple[str, float]] = {}
     for column in map(str.strip, heading.iloc[0]):
-        name, factor = _meaning(column, shown)
+        plain = re.sub("^time(?=_|$)", "t", column)
+        near = max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default="")
+        if near and plain not in MEANINGS:
+            raise InputError(
+                f"{shown}: column {printable(column)!r}: give a unit of {near}:"
+                f" {', '.join(UNITS[near])}"
+            )
+        name, factor = MEANINGS.get(plain, (column, 1.0))
         if name in (known for known, _ in columns.values()):
             raise InputError(
                 f"{shown}: column {printable(column)!r} gives {printable(name)} a second time"
@@ -127,23 +132,6 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     si = all(factor == 1.0 for _, factor in columns.values())
     outcome = history.outcome if si else outcome_of(channels)
     return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
-
-
-def _meaning(column: str, shown: str) -> tuple[str, float]:
-    """A column's name in a history, and the factor to SI units."""
-    plain = (
-        "t" + column.removeprefix("time")
-        if column == "time" or column.startswith("time_")
-        else column
-    )
-    if plain in MEANINGS:
-        return MEANINGS[plain]
-    if name := max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default=""):
-        raise InputError(
-            f"{shown}: column {printable(column)!r}: give a unit of {name}:"
-            f" {', '.join(UNITS[name])}"
-        )
-    return column, 1.0
 
 
 # Repeats of one test: their mean history, their scatter u_D, and their alignment in time.
