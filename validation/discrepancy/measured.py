@@ -7,7 +7,6 @@ Signs are the scene's: theta counterclockwise positive, x the centroid relative 
 
 import dataclasses
 import math
-import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -110,14 +109,7 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
         raise InputError(f"{shown}: empty")
     columns: dict[str, tuple[str, float]] = {}
     for column in map(str.strip, heading.iloc[0]):
-        plain = re.sub("^time(?=_|$)", "t", column)
-        near = max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default="")
-        if near and plain not in MEANINGS:
-            raise InputError(
-                f"{shown}: column {printable(column)!r}: give a unit of {near}:"
-                f" {', '.join(UNITS[near])}"
-            )
-        name, factor = MEANINGS.get(plain, (column, 1.0))
+        name, factor = _meaning(column, shown)
         if name in (known for known, _ in columns.values()):
             raise InputError(
                 f"{shown}: column {printable(column)!r} gives {printable(name)} a second time"
@@ -132,6 +124,23 @@ def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
     si = all(factor == 1.0 for _, factor in columns.values())
     outcome = history.outcome if si else outcome_of(channels)
     return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
+
+
+def _meaning(column: str, shown: str) -> tuple[str, float]:
+    """A column's name in a history, and the factor to SI units."""
+    plain = (
+        "t" + column.removeprefix("time")
+        if column == "time" or column.startswith("time_")
+        else column
+    )
+    if plain in MEANINGS:
+        return MEANINGS[plain]
+    if name := max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default=""):
+        raise InputError(
+            f"{shown}: column {printable(column)!r}: give a unit of {name}:"
+            f" {', '.join(UNITS[name])}"
+        )
+    return column, 1.0
 
 
 # Repeats of one test: their mean history, their scatter u_D, and their alignment in time.
