@@ -64,11 +64,10 @@ class Discrepancy(Shown):
         """One row a measure: measure, value (NaN where it could not be computed), unit, note."""
         import pandas as pd
 
-        rows = [
-            (f.measure, math.nan if f.value is None else f.value, f.unit, f.note)
-            for f in self.figures
-        ]
-        return pd.DataFrame(rows, columns=["measure", "value", "unit", "note"])
+        return pd.DataFrame(
+            [(f.measure, self[f.measure], f.unit, f.note) for f in self.figures],
+            columns=["measure", "value", "unit", "note"],
+        )
 
 
 def compare(

@@ -415,16 +415,14 @@ def _bounce_height(motion: figures.WindowedHistory) -> float:
 
 
 def _quarter_period(motion: figures.WindowedHistory) -> float:
-    scene = _scene(motion)
-    pivot = _released(motion)[0]
+    scene, pivot, _ = _released(motion)
     impacts = motion.events("floor impact")
     _need(bool(impacts), "a floor impact")
     return impacts[0].t - quarter_period(pivot, scene.gravity, abs(scene.initial_rotation))
 
 
 def _impact_ratio(motion: figures.WindowedHistory) -> float:
-    scene = _scene(motion)
-    old, new = _released(motion)
+    scene, old, new = _released(motion)
     impacts = [event.t for event in motion.events("floor impact")]
     _need(len(impacts) >= 2, "two floor impacts")
     t, theta = motion.channel("t"), motion.channel("theta")
@@ -464,8 +462,8 @@ def _stopped(motion: figures.WindowedHistory, scene: Scene, speed: float) -> Non
         raise figures.Undefined("the window ends before the block has stopped")
 
 
-def _released(motion: figures.WindowedHistory) -> tuple[Pivot, Pivot]:
-    """The pivot on which a block released from a tilt rocks first, and the other one."""
+def _released(motion: figures.WindowedHistory) -> tuple[Scene, Pivot, Pivot]:
+    """The scene, the pivot on which its block, released from a tilt, rocks first, and the other."""
     scene = _scene(motion)
     left, right = scene.block.pivot("left"), scene.block.pivot("right")
     old, new = (left, right) if scene.initial_rotation > 0.0 else (right, left)
@@ -474,7 +472,7 @@ def _released(motion: figures.WindowedHistory) -> tuple[Pivot, Pivot]:
         0.0 < abs(scene.initial_rotation) < old.alpha and not any(moving) and not scene.walls,
         "a block released at rest from a tilt",
     )
-    return old, new
+    return scene, old, new
 
 
 def _need(holds: bool, what: str) -> None:

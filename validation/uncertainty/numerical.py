@@ -106,16 +106,29 @@ def numerical_uncertainty(
     if hasattr(model, "coarser"):
         runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
         return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
+    method, finer = "a hundredth of the tolerance", model.finer().simulate(scene)
+    if _side(given) != _side(finer):
+        return failed(given, "the outcome changes with the tolerance", method)
+    # `SAFETY` times the change: the finer run errs by a few hundredths of it.
+    rms = _changes(scene, given, finer)["theta_rms"]
+    figures = zip(_scalars(scene, given), _scalars(scene, finer), strict=True)
     return Numerical(
-        method="a hundredth of the tolerance",
-        quantities=_from_tolerance(scene, given, model.finer().simulate(scene)),
+        method=method,
+        quantities=(
+            _quantity("theta_rms", "alpha", rms, SAFETY * rms),
+            *(
+                _quantity(name, unit, value, SAFETY * abs(better - value))
+                for (name, unit, value), (_, _, better) in figures
+            ),
+            _quantity("outcome", "", given.outcome),
+        ),
     )
 
 
-def failed(history: History, reason: str) -> Numerical:
-    """No converged quantity: the coarser or finer run failed, for this reason."""
+def failed(history: History, reason: str, method: str = "") -> Numerical:
+    """No converged quantity, for this reason, such as a coarser or finer run that failed."""
     return Numerical(
-        method="", quantities=(_quantity("outcome", "", history.outcome, reason=reason),)
+        method=method, quantities=(_quantity("outcome", "", history.outcome, reason=reason),)
     )
 
 
@@ -192,22 +205,6 @@ def _between_rows(history: History) -> float:
     if not 0 < top < len(theta) - 1:
         return 0.0
     return float(abs(theta[top - 1] - 2.0 * theta[top] + theta[top + 1])) / 8.0
-
-
-def _from_tolerance(scene: Scene, given: History, finer: History) -> tuple[Quantity, ...]:
-    """u_num is `SAFETY` times the change: the finer run errs by a few hundredths of the change."""
-    if _side(given) != _side(finer):
-        return failed(given, "the outcome changes with the tolerance").quantities
-    rms = _changes(scene, given, finer)["theta_rms"]
-    figures = zip(_scalars(scene, given), _scalars(scene, finer), strict=True)
-    return (
-        _quantity("theta_rms", "alpha", rms, SAFETY * rms),
-        *(
-            _quantity(name, unit, value, SAFETY * abs(better - value))
-            for (name, unit, value), (_, _, better) in figures
-        ),
-        _quantity("outcome", "", given.outcome),
-    )
 
 
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
