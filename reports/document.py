@@ -65,33 +65,25 @@ VERDICTS = {
 def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
     mark = _mark(cell)
-    column = replace(column, digits=mark.digits or column.digits)
-    return f"{VERDICTS[mark.verdict][0]} {_value(mark.value, column, write)}".strip()
+    value, kind, digits = mark.value, column.kind, mark.digits or column.digits
+    said = str(value)
+    if value is None or value != value:  # NaN
+        said = ""
+    elif kind == "model":
+        said = label_of(said)
+    elif isinstance(value, bool):
+        said = "yes" if value else "no"
+    elif kind == "used" and isinstance(value, int | float) and value > 1.0:
+        said = f"{value:.3g}×" if value < math.inf else "beyond"
+    elif kind in ("percent", "used") and isinstance(value, int | float):
+        said = f"{100.0 * value:.{max(digits - 2, 0) if kind == 'percent' else 0}f} %"
+    elif kind == "number" and isinstance(value, float):
+        said = write(value, digits)
+    return f"{VERDICTS[mark.verdict][0]} {said}".strip()
 
 
 def _mark(cell: Any) -> Mark:
     return cell if isinstance(cell, Mark) else Mark(cell)
-
-
-def _value(value: Any, column: Column, write: Callable[[float, int], str]) -> str:
-    if value is None or (isinstance(value, float) and math.isnan(value)):
-        return ""
-    if column.kind == "model":
-        return label_of(str(value))
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if column.kind in ("percent", "used") and isinstance(value, int | float):
-        return _share(value, column)
-    if column.kind == "number" and isinstance(value, float):
-        return write(value, column.digits)
-    return str(value)
-
-
-def _share(value: float, column: Column) -> str:
-    if column.kind == "used" and value > 1.0:
-        return f"{value:.3g}×" if value < math.inf else "beyond"
-    after = max(column.digits - 2, 0) if column.kind == "percent" else 0
-    return f"{100.0 * value:.{after}f} %"
 
 
 def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[tuple[Mark, Column, str]]:

@@ -42,8 +42,9 @@ STYLES: dict[str, dict[str, Any]] = {
 
 def figure_of(plot: Plot) -> Figure:
     """The figure of a plot; lines, unless its kind has a drawer of its own."""
-    of_kind = {"spectra": spectra, "stable-steps": stable_steps, "strips": strips}
-    return of_kind.get(plot.kind, lines)(plot)
+    return {"spectra": spectra, "stable-steps": stable_steps, "strips": strips}.get(
+        plot.kind, lines
+    )(plot)
 
 
 def lines(plot: Plot) -> Figure:

@@ -120,9 +120,10 @@ def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) ->
     with figure_style() as new_figure:
         figure = new_figure(figsize=(3.4, 0.9))
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        style = "steps-post" if step else "default"
         for x, y, look in curves:
-            ax.plot(x, y, color=look.light, linewidth=0.7, drawstyle=style)
+            ax.plot(
+                x, y, color=look.light, linewidth=0.7, drawstyle="steps-post" if step else "default"
+            )
         if step:
             ax.set_ylim(0.0, 1.0)
         else:
@@ -216,8 +217,8 @@ def summary(view: SceneView) -> str:
     said = []
     for model, history in view.histories.items():
         impacts = len(figures.WindowedHistory(history).events(*figures.IMPACTS))
-        peak = number(history.peak_rotation / view.scene.block.alpha)
-        reached = f"peak {peak} α, " if history.overturned_at is None else ""
+        peak = f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, "
+        reached = peak if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
 
@@ -237,8 +238,7 @@ def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
 
 
 def _largest(values: np.ndarray) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.max(np.abs(known))) if len(known) else 0.0
+    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
 
 
 def _values(ax: Any, view: SceneView, channel: Channel) -> None:
@@ -334,26 +334,18 @@ def _differences(ax: Any, view: SceneView, channel: Channel, against: str) -> No
         ax.plot(view.t, difference, **view.looks[model].line | {"linewidth": 0.6})
     ax.axhline(0.0, color="#888888", linewidth=0.4, zorder=1)
     ax.set_yscale("asinh", linear_width=fine)
-    ticks = _decades(fine, largest)
-    ax.set_yticks(list(ticks), list(ticks.values()))
-    ax.minorticks_off()
-    ax.set_ylim(-1.3 * largest, 1.3 * largest)
-    ax.set_ylabel("difference", color="#555555", fontsize=6.5)
-    ax.tick_params(axis="y", labelsize=5.5, colors="#555555")
-
-
-def _decades(fine: float, largest: float) -> dict[float, str]:
-    """Places and words of at most five ticks of an asinh axis.
-
-    They are zero, and plus and minus two decades.
-    """
+    # Zero, and plus and minus the top power of ten and one at most two decades below it.
     top = math.floor(math.log10(max(largest, fine)))
     low = max(math.ceil(math.log10(fine)), top - 2)
     ticks = {0.0: "0"}
     for power in {min(low, top), top}:
         words = f"10{str(power).translate(SUPERSCRIPTS)}"
         ticks |= {10.0**power: words, -(10.0**power): f"−{words}"}
-    return ticks
+    ax.set_yticks(list(ticks), list(ticks.values()))
+    ax.minorticks_off()
+    ax.set_ylim(-1.3 * largest, 1.3 * largest)
+    ax.set_ylabel("difference", color="#555555", fontsize=6.5)
+    ax.tick_params(axis="y", labelsize=5.5, colors="#555555")
 
 
 def _tracks(ax: Any, view: SceneView) -> None:
@@ -370,8 +362,9 @@ def _tracks(ax: Any, view: SceneView) -> None:
                 color=view.looks[model].light,
                 linestyle="",
             )
-    labels = [_short(view.looks[model].label) for model in shown]
-    ax.set_yticks(range(len(shown)), labels, fontsize=6)
+    ax.set_yticks(
+        range(len(shown)), [_short(view.looks[model].label) for model in shown], fontsize=6
+    )
     ax.set_ylim(len(shown) - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.text(

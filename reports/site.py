@@ -7,7 +7,7 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -153,8 +153,16 @@ def write_site(
             for name, stamp in stamps.items()
             if afresh or stamp_in(folder / pages.links[name]) != stamp
         }
-        for done, _ in enumerate(_write_pages(pages, waiting, jobs), 1):
-            on_progress(done, len(waiting) + 1)
+        few = sum(PRINTED if pages.views[name].printed else 1 for name in waiting) < FEW
+        calls = [
+            pool.Call(pages.write, one)
+            if few
+            else pool.Call(_write_page, (folder, pages.wanted, *one))
+            for one in (*waiting.items(), (INDEX, ""))
+        ]
+        written = side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
+        for done, _ in enumerate(written, 1):
+            on_progress(done, len(calls))
         _remove(folder, {INDEX, *pages.links.values()})
     return folder / INDEX
 
@@ -194,12 +202,14 @@ class _Pages:
         found: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
         self.links = {view.name: f"{PAGES}/{view.slug}.html" for view in found}
-        studies = [one for one in STUDIES if (folder / one[1]).exists()]
         #: What every page shows, and calls.
         self.common: dict[str, Any] = {
             "site": {
                 "name": f"rockcheck: {self.run.suite}",
-                "links": [*self.links.items(), *studies],
+                "links": [
+                    *self.links.items(),
+                    *(one for one in STUDIES if (folder / one[1]).exists()),
+                ],
             },
             "run": self.run,
             "looks": looks(self.run.models),
@@ -348,21 +358,6 @@ _pages_of = cache(_Pages)
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-def _write_pages(pages: _Pages, stamps: Mapping[str, str], jobs: int) -> Iterator[None]:
-    """Write these pages, each with its stamp, and last the index.
-
-    They are made in processes of their own where that is quicker.
-    """
-    few = sum(PRINTED if pages.views[name].printed else 1 for name in stamps) < FEW
-    calls = [
-        pool.Call(pages.write, one)
-        if few
-        else pool.Call(_write_page, (pages.folder, pages.wanted, *one))
-        for one in (*stamps.items(), (INDEX, ""))
-    ]
-    yield from side_by_side(calls, 1 if few else min(jobs, len(stamps)), least=2)
 
 
 def _belongings(page: Path) -> set[str]:

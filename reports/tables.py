@@ -63,8 +63,9 @@ def checks_table(cells: Iterable[results.Cell], name: str = "") -> Table:
 
 def verdict_mark(cell: results.Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
-    judged = cell.verdict != "pass" or bool(cell.checks)
-    return Mark(VERDICTS[cell.verdict][0], cell.verdict) if judged else Mark("nothing judged")
+    if cell.verdict == "pass" and not cell.checks:
+        return Mark("nothing judged")
+    return Mark(VERDICTS[cell.verdict][0], cell.verdict)
 
 
 def worst_table(run: results.Run, links: Mapping[str, str]) -> Table:
@@ -325,13 +326,14 @@ def glance(run: results.Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict
         if one and one["cell"].model != run.reference and one["rms"]
     )
     accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
-    changed = [pair for pair in accepted if _moved(pair[1])]
     return {
         "farthest": max(others, key=lambda one: one["rms"].value, default=None),
         "apart": [
             (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
         ],
-        "changed": sorted(changed, key=lambda pair: -used(pair[1])),
+        "changed": sorted(
+            (pair for pair in accepted if _moved(pair[1])), key=lambda pair: -used(pair[1])
+        ),
         "judged": len(accepted),
     }
 

@@ -147,31 +147,25 @@ class SceneView(View):
     @cached_property
     def values(self) -> dict[str, dict[str, Floats]]:
         """By model and channel (also x and y, m): values on `t`, NaN where the history has none."""
-        return {model: self._channels(history) for model, history in self.histories.items()}
-
-    def _channels(self, history: History) -> dict[str, Floats]:
         block = self.scene.block
-        found = {name: self._on_axis(history, name) for name in COLUMNS[1:-1]}
-        motion = (found[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
-        found |= {
-            "energy": np.asarray(kinematics.energy(block, self.scene.gravity, *motion)),
-            "hop": np.asarray(kinematics.pivot_height(block, found["y"], found["theta"])),
-        }
-        found["theta"] = found["theta"] / block.alpha
-        return {c.name: c.scale * found[c.name] for c in CHANNELS} | {
-            name: found[name] for name in ("x", "y")
-        }
-
-    def _on_axis(self, history: History, name: str) -> Floats:
-        """A column on `t`, linear between its rows.
-
-        NaN outside them and where there is no such column.
-        """
-        times = np.asarray(history.channels["t"], dtype=float)
-        unknown = np.full(len(times), math.nan)
-        values = np.asarray(history.channels.get(name, unknown), dtype=float)
-        inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
-        return np.where(inside, np.interp(self.t, times, values), math.nan)
+        values: dict[str, dict[str, Floats]] = {}
+        for model, history in self.histories.items():
+            times = np.asarray(history.channels["t"], dtype=float)
+            inside = (self.t >= times[0] - 1e-9) & (self.t <= times[-1] + 1e-9)
+            found = dict.fromkeys(COLUMNS[1:-1], np.full(len(self.t), math.nan))
+            for name in found.keys() & history.channels.keys():
+                column = np.asarray(history.channels[name], dtype=float)
+                found[name] = np.where(inside, np.interp(self.t, times, column), math.nan)
+            motion = (found[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
+            found |= {
+                "energy": np.asarray(kinematics.energy(block, self.scene.gravity, *motion)),
+                "hop": np.asarray(kinematics.pivot_height(block, found["y"], found["theta"])),
+            }
+            found["theta"] = found["theta"] / block.alpha
+            values[model] = {c.name: c.scale * found[c.name] for c in CHANNELS} | {
+                name: found[name] for name in ("x", "y")
+            }
+        return values
 
     @cached_property
     def falls(self) -> dict[str, float]:
