@@ -98,13 +98,12 @@ class EnsembleView(View):
 
     def page(self) -> Finding:
         """All that its page shows."""
-        heads = [Column("model", kind="model"), text("verdict"), text("outcome")]
         blocks: list[Block] = [
             Text(self.record.description, facts=self.facts()),
             Text(CHAOS),
             Table(
                 "verdicts",
-                heads,
+                [Column("model", kind="model"), text("verdict"), text("outcome")],
                 [
                     [cell.model, verdict_mark(cell), cell.outcome or cell.reason]
                     for cell in self.cells
@@ -209,12 +208,16 @@ class EnsembleView(View):
             )
             odd = pair.reference.fallen != pair.candidate.fallen
             same, apart = ((x[rows].tolist(), y[rows].tolist()) for rows in (~odd, odd))
-            series = [
-                Series("", (LEAST, MOST), (LEAST, MOST), style="thin"),
-                Series("", *same, look=known[model].key, style="points"),
-                Series("one falls", *apart, look=known[model].key, style="cross"),
-            ]
-            panels.append(Panel(known[model].label, series))
+            panels.append(
+                Panel(
+                    known[model].label,
+                    [
+                        Series("", (LEAST, MOST), (LEAST, MOST), style="thin"),
+                        Series("", *same, look=known[model].key, style="points"),
+                        Series("one falls", *apart, look=known[model].key, style="cross"),
+                    ],
+                )
+            )
         ticks = {LEAST: f"{LEAST:g}", 0.01: "0.01", 0.1: "0.1", MOST: "1", FALLEN: "fell"}
         x_axis, y_axis = (
             Axis(f"{PEAK} by {of}", log=True, limits=(LEAST * 0.8, FALLEN * 1.5), ticks=ticks)
@@ -240,16 +243,22 @@ class EnsembleView(View):
                     for name in STATISTICS_SHOWN
                 )
                 rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
-        columns = [
-            Column("model", kind="model"),
-            Column("both fall"),
-            Column("only the reference falls"),
-            Column("only the model falls"),
-            Column("both stay"),
-            *(Column(name, title, help=formula(name)) for name, title in STATISTICS_SHOWN.items()),
-        ]
-        name = f"against-{slugs_of([against])[against]}"
-        return Table(name, columns, rows, f"Agreement with {self.looks[against].label}")
+        return Table(
+            f"against-{slugs_of([against])[against]}",
+            [
+                Column("model", kind="model"),
+                Column("both fall"),
+                Column("only the reference falls"),
+                Column("only the model falls"),
+                Column("both stay"),
+                *(
+                    Column(name, title, help=formula(name))
+                    for name, title in STATISTICS_SHOWN.items()
+                ),
+            ],
+            rows,
+            f"Agreement with {self.looks[against].label}",
+        )
 
     def peaks(self) -> Table:
         """Peak rotation (alpha) and outcome of every scene by every model."""

@@ -157,12 +157,15 @@ def times_table(run: results.Run) -> Table:
             for at in places
         )
         rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
-    columns = [
-        Column("model", kind="model"),
-        Column("ratio", "geometric mean, ×"),
-        *(Column(f"scene {place}", place) for place in places),
-    ]
-    return Table("times", columns, rows)
+    return Table(
+        "times",
+        [
+            Column("model", kind="model"),
+            Column("ratio", "geometric mean, ×"),
+            *(Column(f"scene {place}", place) for place in places),
+        ],
+        rows,
+    )
 
 
 def measures_table(view: SceneView, against: str) -> Table:
@@ -269,15 +272,15 @@ def runs_table(
         ]
         for cell in cells
     ]
-    columns = [
-        Column("model", kind="model"),
-        text("settings"),
-        *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
-        *map(text, ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]),
-    ]
+    texts = ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]
     return Table(
         "models",
-        columns,
+        [
+            Column("model", kind="model"),
+            text("settings"),
+            *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
+            *map(text, texts),
+        ],
         rows,
         "Models, settings and run times",
         folded=histories is not None,

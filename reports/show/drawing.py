@@ -143,8 +143,7 @@ def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
     Acceleration is in g, velocity in m/s, both over time in s. Spectral acceleration, in g at
     5 % damping, is over the period in s.
     """
-    size = 9.0, 1.9 * len(recordings) + 0.4
-    figure = NotebookFigure(figsize=size, layout="constrained")
+    figure = NotebookFigure(figsize=(9.0, 1.9 * len(recordings) + 0.4), layout="constrained")
     for (name, record), (acceleration, velocity, spectrum) in zip(
         recordings,
         figure.subplots(len(recordings), 3, squeeze=False, width_ratios=(3, 3, 2)),

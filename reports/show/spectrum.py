@@ -113,8 +113,7 @@ def figure(plot: Plot) -> Figure:
     """
     data = plot.data
     panels = data["panels"]
-    alone = len(panels) == 1
-    pulse, width = (data["pulse"], PAGE / 1.6) if alone else (None, PAGE)
+    pulse, width = (data["pulse"], PAGE / 1.6) if len(panels) == 1 else (None, PAGE)
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
     handles, columns = _legend(data)

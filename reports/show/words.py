@@ -113,9 +113,11 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
         f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
         f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
     )
-    gyration = number(math.sqrt(block.gyration_squared))
     return [
-        ("mass's centre", f"{place}; radius of gyration {gyration} m"),
+        (
+            "mass's centre",
+            f"{place}; radius of gyration {number(math.sqrt(block.gyration_squared))} m",
+        ),
         ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
     ]
 
@@ -152,11 +154,10 @@ def history_html(history: History) -> str:
 
 def discrepancy_html(found: Discrepancy) -> str:
     """The table of a comparison in a notebook."""
-    rows = [(f.label, number(f.value), f.unit, f.note) for f in found.figures]
     caption = f"{found.candidate} against {found.reference}, {found.start:g} to {found.end:g} s"
     return html_table(
         f"{caption}; not the whole time: {found.gap}" if found.gap else caption,
-        rows,
+        [(f.label, number(f.value), f.unit, f.note) for f in found.figures],
         ("measure", "value", "unit", ""),
     )
 

@@ -265,8 +265,13 @@ class Pair:
     @cached_property
     def energies(self) -> Floats:
         """Energy per unit mass of both, J/kg."""
-        columns = map(self.channels, ("y", "theta", "x_dot", "y_dot", "theta_dot"))
-        return np.asarray(kinematics.energy(self.known.block, self.known.gravity, *columns))
+        return np.asarray(
+            kinematics.energy(
+                self.known.block,
+                self.known.gravity,
+                *map(self.channels, ("y", "theta", "x_dot", "y_dot", "theta_dot")),
+            )
+        )
 
     def mean(self, values: Floats) -> float:
         """Mean over time, by the trapezoidal rule."""
@@ -308,13 +313,8 @@ class Pair:
         return match_impacts(*both)
 
 
-@dataclass(frozen=True)
-class MatchedImpacts:
-    """Matched impacts as (reference, candidate), and those of either without a counterpart."""
-
-    pairs: Sequence[tuple[Event, Event]]
-    only_reference: Sequence[Event]
-    only_candidate: Sequence[Event]
+#: Matched impacts as (reference, candidate), and those of either without a counterpart.
+MatchedImpacts = tuple[list[tuple[Event, Event]], list[Event], list[Event]]
 
 
 def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
@@ -341,13 +341,12 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         if i not in partners and j not in taken:
             partners[i] = j
             taken.add(j)
-    alone = (
+    only_reference, only_candidate = (
         [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
         for events, matched in ((reference, partners), (candidate, taken))
     )
-    return MatchedImpacts(
-        [(reference[i], candidate[j]) for i, j in sorted(partners.items())], *alone
-    )
+    pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
+    return pairs, only_reference, only_candidate
 
 
 def _strong(impacts: Sequence[Event]) -> list[bool]:

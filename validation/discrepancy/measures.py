@@ -62,20 +62,19 @@ def _farthest(points: Floats, line: Floats) -> float:
 
 
 def _agree_until(pair: figures.Pair) -> tuple[float, str]:
-    matched = pair.impacts
-    alone = (pair.reference, matched.only_reference), (pair.candidate, matched.only_candidate)
+    _, only_reference, only_candidate = pair.impacts
+    alone = (pair.reference, only_reference), (pair.candidate, only_candidate)
     found = [(e.t, f"{e.kind} only in {h.model}") for h, events in alone for e in events]
     return min(found, default=(pair.end, "all events agree"))
 
 
 def _unmatched(pair: figures.Pair) -> tuple[float, str]:
-    found = pair.impacts
-    alone = len(found.only_reference) + len(found.only_candidate)
-    return float(alone), f"{len(found.pairs)} impacts matched"
+    pairs, only_reference, only_candidate = pair.impacts
+    return float(len(only_reference) + len(only_candidate)), f"{len(pairs)} impacts matched"
 
 
 def _impact_time(pair: figures.Pair) -> tuple[float, str]:
-    pairs = pair.impacts.pairs
+    pairs, *_ = pair.impacts
     if not pairs:
         return 0.0, "no impact has a counterpart"
     first, second = max(pairs, key=lambda two: abs(two[1].t - two[0].t))

@@ -26,10 +26,10 @@ def figures(history, **more):
 
 
 def times(found):
+    pairs, *alone = found
     return (
-        [(first.t, second.t) for first, second in found.pairs],
-        [e.t for e in found.only_reference],
-        [e.t for e in found.only_candidate],
+        [(first.t, second.t) for first, second in pairs],
+        *([e.t for e in events] for events in alone),
     )
 
 
