@@ -22,7 +22,6 @@ from rich.text import Text as Line
 from rockcheck.reports.drawers import figure_of, live_data, side_by_side
 from rockcheck.reports.show.spectrum import write_scripts
 from rockcheck.reports.show.words import (
-    dash_array,
     duration,
     moment,
     number,
@@ -290,7 +289,7 @@ TEMPLATES = Environment(
     finalize=lambda value: errors.inert(value) if type(value) is str else value,
 )
 TEMPLATES.filters |= {
-    one.__name__: one for one in (number, unit, duration, moment, window, dash_array, readable)
+    one.__name__: one for one in (number, unit, duration, moment, window, readable)
 }
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 else:  # it is imported only to draw: that takes a second
     Figure = Any
 
-#: Widths of a text column and of a page of text in common journals, inches.
-COLUMN, PAGE = 3.5, 7.1
+#: Width of a page of text in common journals, inches.
+PAGE = 7.1
 FORMATS = ("svg", "png", "pdf")
 ENDINGS = ", ".join(f".{kind}" for kind in FORMATS)
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -19,7 +19,10 @@ def _later(name: str) -> Callable[[Any], Figure]:
 
 #: The views of this package's classes (entry point of the group `rockcheck.views`).
 VIEWS = {
-    Scene: View(html=words.scene_html, figure=_later("drawing:scene_figure")),
+    Scene: View(
+        html=lambda scene: words.html_table(scene.name, words.scene_facts(scene)),
+        figure=_later("drawing:scene_figure"),
+    ),
     History: View(html=words.history_html, figure=_later("drawing:history_figure")),
     Discrepancy: View(html=words.discrepancy_html, figure=_later("drawing:discrepancy_figure")),
     Spectrum: View(html=words.spectrum_html, figure=_later("spectrum:spectrum_figure")),

@@ -12,7 +12,7 @@ import numpy as np
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
-from rockcheck.reports.style import SUPERSCRIPTS, Look
+from rockcheck.reports.style import SUPERSCRIPTS
 from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine, errors
 from rockcheck.validation import Discrepancy
 from rockcheck.validation.discrepancy import figures
@@ -122,11 +122,6 @@ def mass_facts(block: Block) -> list[tuple[str, str]]:
     ]
 
 
-def scene_html(scene: Scene) -> str:
-    """The table of a scene in a notebook."""
-    return html_table(scene.name, scene_facts(scene))
-
-
 def history_html(history: History) -> str:
     """The table of a history in a notebook.
 
@@ -227,8 +222,3 @@ def window(figure: figures.Figure) -> str:
             f" ({number(figure.until)} s)" if figure.until is not None else ""
         )
     return f"first {number(figure.until)} s" if figure.until is not None else "whole run"
-
-
-def dash_array(look: Look) -> str:
-    """The dash pattern of a model's line, as SVG's `stroke-dasharray`."""
-    return " ".join(f"{2.0 * length:g}" for length in look.dash) or "none"

@@ -4,8 +4,6 @@ Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impa
 instant"). This names the one that a history took, without judging it.
 """
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
@@ -96,33 +94,29 @@ def parting_landing(scene: Scene) -> Landing | None:
     Played by the unilateral event-based model at tolerance 1e-13: under the flush laws where a wall
     bounces, under the flat laws where the block lands flat. Raises what `simulate` raises.
     """
-    laws = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
+    groups = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
     if may_fly(scene) and LANDS_FLAT in _played(scene, "moreau").cost.rules:
-        laws.append(FLAT_LAWS)
-    found = [landing for some in laws if (landing := _parting(scene, some)) is not None]
-    return min(found, key=lambda landing: landing.t, default=None)
-
-
-def _parting(scene: Scene, laws: Sequence[ImpactLaw]) -> Landing | None:
-    motions = {
-        law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha for law in laws
-    }
-    rows = min(len(motion) for motion in motions.values())
-    apart = np.ptp([motion[:rows] for motion in motions.values()], axis=0)
-    if not (apart > TELLS).any():
-        return None
-    told = int(np.argmax(apart > TELLS))
-    parts = int(np.flatnonzero(apart[:told] <= SAME)[-1]) + 1  # all start alike
+        groups.append(FLAT_LAWS)
     window = max(2, round(WINDOW / scene.output_step))
-    start = max(0, parts - window)
-    return Landing(
-        t=float(scene.output_times[parts - 1]),
-        start=start,
-        parts=parts,
-        branches={
-            law: tuple(motion[start : told + window].tolist()) for law, motion in motions.items()
-        },
-    )
+    found = []
+    for laws in groups:
+        motions = {
+            law: np.asarray(_played(scene, law).channels["theta"]) / scene.block.alpha
+            for law in laws
+        }
+        rows = min(map(len, motions.values()))
+        apart = np.ptp([motion[:rows] for motion in motions.values()], axis=0)
+        told = int(np.argmax(apart > TELLS))  # 0 where the laws do not part: all start alike
+        if told:
+            parts = int(np.flatnonzero(apart[:told] <= SAME)[-1]) + 1
+            start = max(0, parts - window)
+            branches = {
+                law: tuple(motion[start : told + window].tolist())
+                for law, motion in motions.items()
+            }
+            t = float(scene.output_times[parts - 1])
+            found.append(Landing(t=t, start=start, parts=parts, branches=branches))
+    return min(found, key=lambda landing: landing.t, default=None)
 
 
 def _played(scene: Scene, law: ImpactLaw) -> History:
