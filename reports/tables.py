@@ -239,13 +239,11 @@ def uncertainty_table(view: SceneView) -> Table:
 def runs_table(
     run: results.Run,
     cells: Sequence[results.Cell],
-    root: str = "",
     histories: Mapping[str, Any] | None = None,
 ) -> Table:
     """Settings, run times and outcomes of a place's cells.
 
-    Of an ensemble (no `histories`) the CPU time of all its scenes. `root` is the way to the run's
-    folder.
+    Of an ensemble (no `histories`) the CPU time of all its scenes. Links lead from a scene's page.
     """
     of = "cpu_seconds" if histories is None else "wall_seconds"
     base = next((cell for cell in cells if cell.model == run.reference), None)
@@ -265,7 +263,7 @@ def runs_table(
             *(_costs(cell, of, base) if cell.status == "done" else [""] * 5),
             Mark(cell.fate or cell.reason, more="; ".join([*cell.notes, *gains[cell.model]])),
             *(
-                Mark("CSV", link=f"{root}/{path}") if path and cell.model in histories else ""
+                Mark("CSV", link=f"../{path}") if path and cell.model in histories else ""
                 for path in (cell.history, events_path(Path(cell.history or "-")).as_posix())
                 if histories is not None
             ),

@@ -132,7 +132,16 @@ class SceneView(View):
 
     @cached_property
     def _read(self) -> dict[str, History | str]:
-        return {cell.model: _history_of(cell, self.folder) for cell in self.cells}
+        found: dict[str, History | str] = {}
+        for cell in self.cells:
+            found[cell.model] = cell.reason or "no history"
+            if cell.status == "done" and cell.history is not None:
+                try:
+                    reading.within(self.folder, str(events_path(Path(cell.history))))
+                    found[cell.model] = History.load(reading.within(self.folder, cell.history))
+                except InputError as error:
+                    found[cell.model] = str(error)
+        return found
 
     @cached_property
     def t(self) -> Floats:
@@ -424,13 +433,3 @@ def slugs_of(names: Iterable[str]) -> dict[str, str]:
 def all_figures(cell: results.Cell) -> list[figures.Figure]:
     """The figures of a cell, those with a check first."""
     return [*(check.figure for check in cell.checks), *cell.figures]
-
-
-def _history_of(cell: results.Cell, folder: Path) -> History | str:
-    if cell.status != "done" or cell.history is None:
-        return cell.reason or "no history"
-    try:
-        reading.within(folder, str(events_path(Path(cell.history))))
-        return History.load(reading.within(folder, cell.history))
-    except InputError as error:
-        return str(error)
