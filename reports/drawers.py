@@ -69,8 +69,11 @@ def lines(plot: Plot) -> Figure:
             _scale(ax, "x", plot.x)
             _scale(ax, "y", plot.y)
             if plot.data:
-                other = (lambda x: x * per, lambda x: x / per)
-                ax.secondary_xaxis("top", functions=other, xlabel=plot.data["other_label"])
+                ax.secondary_xaxis(
+                    "top",
+                    functions=(lambda x: x * per, lambda x: x / per),
+                    xlabel=plot.data["other_label"],
+                )
         for ax in grid.flat[len(plot.panels) :]:
             ax.set_axis_off()
         if handles:

@@ -152,11 +152,16 @@ def times_table(run: results.Run) -> Table:
     base, rows = taken.get(run.reference, {}), []
     for model, own in taken.items():
         ratios = {at: own[at] / base[at] for at in own if own[at] * base.get(at, 0.0) > 0.0}
-        shown = (
-            Mark(ratio(ratios.get(at)), more=duration(own[at]) if at in own else "")
-            for at in places
+        rows.append(
+            [
+                model,
+                geometric_mean(ratios.values()) if ratios else None,
+                *(
+                    Mark(ratio(ratios.get(at)), more=duration(own[at]) if at in own else "")
+                    for at in places
+                ),
+            ]
         )
-        rows.append([model, geometric_mean(ratios.values()) if ratios else None, *shown])
     return Table(
         "times",
         [
@@ -370,7 +375,6 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
     differs = len({_side(outcome_of(one)) for one in done}) > 1
-    nearest = max(cell.checks, key=used, default=None)
     return {
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
@@ -380,7 +384,7 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
         "outcome": outcome_of(cell),
         "apart": differs,
         "why_apart": why_apart(cell) if differs else "",
-        "nearest": nearest,
+        "nearest": max(cell.checks, key=used, default=None),
         "used": max(map(used, cell.checks), default=0.0) if cell.status == "done" else math.inf,
     }
 

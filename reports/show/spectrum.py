@@ -188,10 +188,14 @@ def _units(axes: Any, data: Any) -> None:
     """Add axes with the frequency (Hz) and the peak acceleration (g) of the pulses."""
     hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
     g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
-    frequency = (lambda x: x * hertz, lambda x: x / hertz)
-    axes.secondary_xaxis("top", functions=frequency, xlabel="frequency of the pulse, Hz")
-    acceleration = (lambda y: y * g, lambda y: y / g)
-    axes.secondary_yaxis("right", functions=acceleration, ylabel="peak acceleration, g")
+    axes.secondary_xaxis(
+        "top",
+        functions=(lambda x: x * hertz, lambda x: x / hertz),
+        xlabel="frequency of the pulse, Hz",
+    )
+    axes.secondary_yaxis(
+        "right", functions=(lambda y: y * g, lambda y: y / g), ylabel="peak acceleration, g"
+    )
 
 
 def outcome_key(panels: Any) -> dict[str, str]:

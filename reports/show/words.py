@@ -140,11 +140,13 @@ def history_html(history: History) -> str:
         "settings": ", ".join(f"{key} {value}" for key, value in history.settings.items()),
         "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",
     }
-    rows = [
-        *((name, said) for name, said in facts.items() if said),
-        *(("note", note) for note in history.notes),
-    ]
-    return html_table(f"{history.name}, {history.model}", rows)
+    return html_table(
+        f"{history.name}, {history.model}",
+        [
+            *((name, said) for name, said in facts.items() if said),
+            *(("note", note) for note in history.notes),
+        ],
+    )
 
 
 def discrepancy_html(found: Discrepancy) -> str:
