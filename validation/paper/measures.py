@@ -6,6 +6,7 @@ and its arguments, and returns rows of figures and the values for the finding's 
 
 import operator
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
@@ -543,20 +544,19 @@ def claims_of(paper: Paper) -> list[Claim]:
     A sentence holds if all its rows hold, or, where it says "generally", more than `GENERALLY` of
     them.
     """
-    return [_judged(paper, about) for about in SENTENCES["claim"]]
-
-
-def _judged(paper: Paper, about: Mapping[str, Any]) -> Claim:
-    rows, says = globals()[about["measure"]](paper, **about.get("with", {}))
-    judged = [row.holds for row in rows if row.holds is not None]
-    held = sum(judged)
-    enough = held > GENERALLY * len(judged) if "generally" in about else all(judged)
-    said = about["finding"].format(held=held, all=len(judged), **says)
-    against = [row.what for row in rows if row.holds is False]
-    if held and 0 < len(against) <= MOST_NAMED:
-        said += f" Not so: {'; '.join(against)}."
-    verdict = "holds" if enough else "holds in part" if held else "does not hold"
-    return Claim(about, verdict, said, rows)
+    claims = []
+    for about in SENTENCES["claim"]:
+        rows, says = globals()[about["measure"]](paper, **about.get("with", {}))
+        counts = Counter(map(operator.attrgetter("holds"), rows))
+        held, judged = counts[True], counts[True] + counts[False]
+        enough = held > GENERALLY * judged if "generally" in about else held == judged
+        against = [row.what for row in rows if row.holds is False]
+        said = about["finding"].format(held=held, all=judged, **says)
+        if held and 0 < len(against) <= MOST_NAMED:
+            said += f" Not so: {'; '.join(against)}."
+        verdict = "holds" if enough else "holds in part" if held else "does not hold"
+        claims.append(Claim(about, verdict, said, rows))
+    return claims
 
 
 def findings_of(paper: Paper) -> list[Beyond]:

@@ -141,13 +141,18 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
     order = _order(apart)
     converge = apart == sorted(apart) and order is not None and order >= LEAST_ORDER
     parted = apart[0] if converge else max(apart)
-    sides = [_side(history) or "stands" for history in runs]
+    sides = list(map(_side, runs))
     unsure = reason = ""
     if len(set(sides)) > 1:
         unsure = reason = f"the outcome changes with the step: {', '.join(sides)} at h, 2h, 3h, 4h"
     elif parted > LARGE:
         reason = f"the histories part by {parted:.2g} with the step, more than {LARGE:g}"
-    between = {"peak_rotation": _between_rows(finest) / alpha, "end_time": scene.output_step}
+    # The peak exceeds the rows at most as the parabola through the top three does.
+    theta, missed = np.abs(finest.channels["theta"]), 0.0
+    top = int(np.argmax(theta))
+    if 0 < top < len(theta) - 1:
+        missed = float(abs(theta[top - 1] - 2.0 * theta[top] + theta[top + 1])) / 8.0
+    between = {"peak_rotation": missed / alpha, "end_time": scene.output_step}
     found = []
     for name, unit, value in shown:
         own = [one[name] for one in changes]
@@ -198,18 +203,9 @@ def _quantity(
     )
 
 
-def _between_rows(history: History) -> float:
-    """Bound on how far the peak |theta| exceeds the rows, rad: parabola through the top three."""
-    theta = np.abs(history.channels["theta"])
-    top = int(np.argmax(theta))
-    if not 0 < top < len(theta) - 1:
-        return 0.0
-    return float(abs(theta[top - 1] - 2.0 * theta[top] + theta[top + 1])) / 8.0
-
-
 def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
-    if _side(history):
+    if _side(history) != "stands":
         return [("end_time", "s", float(history.channels["t"][-1]))]
     found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
     if "slip" in history.channels:
@@ -221,7 +217,7 @@ def _side(history: History) -> str:
     return (
         history.outcome.removeprefix("overturned ")
         if history.outcome.startswith("overturned")
-        else ""
+        else "stands"
     )
 
 
