@@ -262,13 +262,12 @@ class _Pages:
             writing.made(self.folder, PAGES, "data") / f"{view.slug}.js",
             writing.script_text("window.rockcheck", payload(view)),
         )
-        files = write_scene_file(
-            view.scene, writing.made(self.folder, PAGES, "scene-files"), view.slug
-        )
         beside = [None, *self.scenes, None]
         place = beside.index(view)
         return {
-            "files": files,
+            "files": write_scene_file(
+                view.scene, writing.made(self.folder, PAGES, "scene-files"), view.slug
+            ),
             "previous": beside[place - 1],
             "following": beside[place + 1],
             "facts": scene_facts(view.scene),
