@@ -217,8 +217,8 @@ def summary(view: SceneView) -> str:
     said = []
     for model, history in view.histories.items():
         impacts = len(figures.WindowedHistory(history).events(*figures.IMPACTS))
-        peak = f"peak {number(history.peak_rotation / view.scene.block.alpha)} α, "
-        reached = peak if history.overturned_at is None else ""
+        peak = number(history.peak_rotation / view.scene.block.alpha)
+        reached = f"peak {peak} α, " if history.overturned_at is None else ""
         said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
     return "; ".join(said) + "."
 

@@ -63,9 +63,11 @@ def checks_table(cells: Iterable[results.Cell], name: str = "") -> Table:
 
 def verdict_mark(cell: results.Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
-    if cell.verdict == "pass" and not cell.checks:
-        return Mark("nothing judged")
-    return Mark(VERDICTS[cell.verdict][0], cell.verdict)
+    return (
+        Mark(VERDICTS[cell.verdict][0], cell.verdict)
+        if cell.verdict != "pass" or cell.checks
+        else Mark("nothing judged")
+    )
 
 
 def worst_table(run: results.Run, links: Mapping[str, str]) -> Table:
