@@ -56,10 +56,11 @@ def play(scenes: Sequence[Scene], model: EventBasedModel) -> Runs:
     from rockcheck.ebm.batch import pack, run_decided
 
     found = run_decided(pack(scenes, model), model, jobs=1)
+    rotations = found.peak / np.array([scene.block.alpha for scene in scenes])
     return Runs(
         side=found.side.tolist(),
         failed=found.failed.tolist(),
-        figures={"peak_rotation": (found.peak / [scene.block.alpha for scene in scenes]).tolist()},
+        figures={"peak_rotation": rotations.tolist()},
     )
 
 
@@ -102,9 +103,10 @@ def curve_of(
     median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
     fitted = ndtr(np.log(intensities / median) / dispersion)
     points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
+    sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     medians = [
         fit_lognormal(intensities, hits[rows].sum(axis=0), decided[rows].sum(axis=0))[0]
-        for rows in np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
+        for rows in sets
     ]
     known = [one for one in medians if not math.isnan(one)]
     low, high = _ends(known).tolist() if known and len(known) >= 0.9 * draws else NO_FIT
