@@ -12,7 +12,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, fields, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -110,11 +110,10 @@ class Study(ABC):
 
     def find(self, store: Store, task: Task) -> Any:
         """The kept record of a task; None if there is none, or its fields do not fit."""
-        found = store.get_record(RECORDS, self.file(task))
-        try:
-            return None if found is None else self._adapter.validate_python(found["record"])
-        except (KeyError, ValueError):
-            return None
+        with suppress(KeyError, ValueError):
+            found = store.get_record(RECORDS, self.file(task)) or {}
+            return self._adapter.validate_python(found["record"])
+        return None
 
     def keep(self, store: Store, task: Task, record: Any) -> None:
         """Keep the record of a task."""
@@ -146,11 +145,43 @@ def run(
     played is gathered; the exit code is then `INTERRUPTED`, unless the finding has another. Raises
     `InputError` where the folder cannot be used or no cluster answers.
     """
-    if scheduler is not None:
-        pool.check_scheduler(scheduler)
-    return _Run(
-        study, folder, os.cpu_count() or 1 if jobs is None else jobs, scheduler, force, on_progress
-    ).finding(minutes)
+    if scheduler is not None and not pool.local_workers(scheduler):
+        with pool.connected(scheduler):  # raises where none answers
+            pass
+    jobs = os.cpu_count() or 1 if jobs is None else jobs
+    began = time.monotonic()
+    going = _Run(study, folder, jobs, scheduler, force, on_progress)
+    ended = 0
+    with going.stack:
+        going.stack.callback(pool.THREADS.reset, pool.THREADS.set(jobs))
+        try:
+            going.play(began + 60.0 * minutes if minutes else math.inf)
+        except KeyboardInterrupt:
+            ended = progress.INTERRUPTED
+    complete = not ended and len(going.done) == len(going.known)
+    if minutes and not (ended or complete):
+        progress.announce(f"{study.name}: its {minutes:g} minutes are over")
+    # In the order of the tasks: a finding must not depend on which ended first.
+    found = study.gather({task: going.done[task] for task in going.known if task in going.done})
+    going.store.prune()
+    return replace(
+        found,
+        failures={
+            task.label: one.reason
+            for task, one in going.done.items()
+            if isinstance(one, pool.Failure)
+        }
+        | {**found.failures},
+        exit_code=found.exit_code or ended,
+        complete=complete and found.complete,
+        made=Made(
+            created=datetime.now(UTC).isoformat(timespec="seconds"),
+            jobs=jobs,
+            wall_seconds=time.monotonic() - began,
+            versions=provenance.versions(),
+            hardware=provenance.hardware(),
+        ),
+    )
 
 
 class _Run:
@@ -165,7 +196,6 @@ class _Run:
     ) -> None:
         self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
         self.force, self.heard = force, heard
-        self.began = time.monotonic()
         self.store = Store(folder, study.kinds)
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
@@ -173,41 +203,6 @@ class _Run:
         #: `Task.where` of the tasks that workers play.
         self.elsewhere = (
             ("worker", "here") if scheduler is not None else ("worker",) if jobs > 0 else ()
-        )
-
-    def finding(self, minutes: float | None) -> Finding:
-        ended = 0
-        with self.stack:
-            self.stack.callback(pool.THREADS.reset, pool.THREADS.set(self.jobs))
-            try:
-                self._play(self.began + 60.0 * minutes if minutes else math.inf)
-            except KeyboardInterrupt:
-                ended = progress.INTERRUPTED
-        complete = not ended and len(self.done) == len(self.known)
-        if minutes and not (ended or complete):
-            progress.announce(f"{self.study.name}: its {minutes:g} minutes are over")
-        # In the order of the tasks: a finding must not depend on which ended first.
-        found = self.study.gather(
-            {task: self.done[task] for task in self.known if task in self.done}
-        )
-        self.store.prune()
-        return replace(
-            found,
-            failures={
-                task.label: one.reason
-                for task, one in self.done.items()
-                if isinstance(one, pool.Failure)
-            }
-            | {**found.failures},
-            exit_code=found.exit_code or ended,
-            complete=complete and found.complete,
-            made=Made(
-                created=datetime.now(UTC).isoformat(timespec="seconds"),
-                jobs=self.jobs,
-                wall_seconds=time.monotonic() - self.began,
-                versions=provenance.versions(),
-                hardware=provenance.hardware(),
-            ),
         )
 
     @cached_property
@@ -218,7 +213,7 @@ class _Run:
             else pool.Cluster(self.scheduler, self.study.memory_mb)
         )
 
-    def _play(self, until: float) -> None:
+    def play(self, until: float) -> None:
         """Waves of tasks, until the study has no more."""
         while waiting := self._next():
             self._estimate(waiting)

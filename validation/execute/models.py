@@ -278,6 +278,14 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     """
     began = time.perf_counter()
     history = _simulate(work, scene)
+    found = None
+    if uncertainty:
+        try:
+            found = numerical.numerical_uncertainty(
+                build_own(work.family, work.settings), scene, history
+            )
+        except (ModelFailure, InputError) as error:
+            found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
     cost = {key: value for key, value in vars(history.cost).items() if value is not None}
     return Played(
         {
@@ -290,7 +298,7 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
                 for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
             },
             "uncertainty": dict(history.uncertainty),
-            "numerical": _numerical(work, scene, history) if uncertainty else None,
+            "numerical": found and found.model_dump(mode="json"),
             "cost": {**cost, "worker_seconds": time.perf_counter() - began},
         },
         history.packed(),
@@ -335,17 +343,3 @@ def _simulate(work: Work, scene: Scene) -> History:
     if not len(returned.channels["t"]):
         raise ModelFailure("the history is empty")
     return dataclasses.replace(returned, model=work.label)
-
-
-def _numerical(work: Work, scene: Scene, history: History) -> dict[str, Any] | None:
-    """Numerical uncertainty of a run; None for a model without a step.
-
-    If a coarser run fails, the result is not converged.
-    """
-    try:
-        found = numerical.numerical_uncertainty(
-            build_own(work.family, work.settings), scene, history
-        )
-    except (ModelFailure, InputError) as error:
-        found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
-    return None if found is None else found.model_dump(mode="json")

@@ -391,7 +391,7 @@ def connected(address: str) -> Iterator[Any]:
     "local:N" starts N workers on this machine. Work of a worker that dies goes to the others.
     Raises `InputError` where no scheduler answers, or `distributed` is missing.
     """
-    count = _local_workers(address)
+    count = local_workers(address)
     from distributed import Client, LocalCluster
 
     if count:
@@ -414,21 +414,17 @@ def connected(address: str) -> Iterator[Any]:
         yield client
 
 
-def check_scheduler(address: str) -> None:
-    """Raise `InputError` for an address that `connected` cannot use; starts no workers."""
-    if not _local_workers(address):
-        with connected(address):
-            pass
-
-
-def _local_workers(address: str) -> int:
-    """N of "local:N", 0 for the address of a scheduler."""
+def local_workers(address: str) -> int:
+    """N of "local:N", 0 for the address of a scheduler; raises `InputError` as `connected`."""
     if find_spec("distributed") is None:
         raise InputError("needs the package distributed: pip install distributed", "--scheduler")
     kind, _, count = address.partition(":")
     if kind not in ("local", ""):  # for an empty address Dask would start a cluster of its own
         return 0
     if not kind or not count.isdecimal() or not 1 <= int(count) <= 256:
-        said = "is not allowed: give an address, or local:N with 1 to 256 workers"
-        raise InputError(f"{printable(address)!r} {said}", "--scheduler")
+        raise InputError(
+            f"{printable(address)!r} is not allowed: give an address, or local:N with 1 to 256"
+            " workers",
+            "--scheduler",
+        )
     return int(count)

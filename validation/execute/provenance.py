@@ -210,9 +210,10 @@ def version_of(library: str) -> str:
 def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
     libraries = {library for known in models.FAMILIES.values() for library in known.libraries}
-    found = {name: version_of(name) for name in sorted(libraries | {"pandas"})}
     return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {
-        name: version for name, version in found.items() if version != "absent"
+        name: version_of(name)
+        for name in sorted(libraries | {"pandas"})
+        if version_of(name) != "absent"
     }
 
 
