@@ -141,7 +141,8 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     head = subprocess.run(
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
     ).stdout.strip()
-    moments = across.read_history(Path("runs.jsonl"))
+    lines = Path("runs.jsonl").read_text("utf-8").splitlines()
+    moments = [across.Moment.model_validate_json(line) for line in lines]
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
     first, second, third = (one.figures[name] for one in moments)
@@ -151,7 +152,7 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     assert 'href="trend/index.html"' in Path("a/index.html").read_text("utf-8")
     os.truncate("runs.jsonl", Path("runs.jsonl").stat().st_size - 1)  # as some editors do
     ran("a", 0.001, "--history", "runs.jsonl")
-    assert len(across.read_history(Path("runs.jsonl"))) == 4
+    assert len(Path("runs.jsonl").read_text("utf-8").splitlines()) == 4
     assert f"{name}: " in capsys.readouterr().out
 
 

@@ -193,29 +193,12 @@ class Moment(Stored):
 
 
 def moment_of(run: results.Run, folder: Path) -> Moment:
-    """A run as a line of a history; the suite lies in `folder`."""
-    names = [
-        (f"{cell.scene}, {cell.model}: {check.figure.title}", check) for cell, check in run.checks()
-    ]
-    return Moment(
-        created=run.created,
-        commit=commit_of(folder),
-        rockcheck=run.versions.get("rockcheck", ""),
-        suite=run.suite,
-        verdict=run.words,
-        wall_seconds=run.wall_seconds,
-        figures={
-            name: None if check.figure.of_a_fall else check.figure.value for name, check in names
-        },
-        not_passed=tuple(name for name, check in names if check.weighs != "pass"),
-    )
+    """A run as a line of a history; the suite lies in `folder`.
 
-
-def commit_of(folder: Path) -> str:
-    """The commit that is checked out in `folder`, "-dirty" appended if files have changed.
-
-    Outside of a repository the continuous integration's commit, "" without one.
+    The commit is that checked out in `folder`, "-dirty" appended if files have changed. Outside of
+    a repository it is the continuous integration's, "" without one.
     """
+    commit = next((os.environ[name][:12] for name in COMMITS if os.environ.get(name)), "")
     if git := shutil.which("git"):
         found = subprocess.run(
             [
@@ -230,16 +213,40 @@ def commit_of(folder: Path) -> str:
             stdin=subprocess.DEVNULL,
         )
         if found.returncode == 0:
-            return printable(found.stdout.strip())
-    return printable(next((os.environ[name][:12] for name in COMMITS if os.environ.get(name)), ""))
+            commit = found.stdout.strip()
+    names = [
+        (f"{cell.scene}, {cell.model}: {check.figure.title}", check) for cell, check in run.checks()
+    ]
+    return Moment(
+        created=run.created,
+        commit=printable(commit),
+        rockcheck=run.versions.get("rockcheck", ""),
+        suite=run.suite,
+        verdict=run.words,
+        wall_seconds=run.wall_seconds,
+        figures={
+            name: None if check.figure.of_a_fall else check.figure.value for name, check in names
+        },
+        not_passed=tuple(name for name, check in names if check.weighs != "pass"),
+    )
 
 
 def remember(path: Path, moment: Moment) -> list[Moment]:
     """Append a run to the history; returns all its runs of the same suite, the oldest first.
 
-    Raises `InputError`.
+    Raises `InputError`, naming the line that is unusable.
     """
-    known = read_history(path) if path.exists() else []
+    known: list[Moment] = []
+    lines = reading.read_text(path).splitlines() if path.exists() else []
+    for n, line in enumerate(lines, 1):
+        try:
+            if line.strip():
+                known.append(Moment.model_validate_json(line))
+        except ValidationError as error:
+            raise InputError(
+                f"{printable(path)}, line {n}: not a run of a history:"
+                f" {errors.from_validation(error)}"
+            ) from None
     try:
         with path.open("a+b") as stream:
             if stream.tell():  # an editor may have left the last line without its end
@@ -249,22 +256,6 @@ def remember(path: Path, moment: Moment) -> list[Moment]:
     except OSError as error:
         raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     return [one for one in (*known, moment) if one.suite == moment.suite]
-
-
-def read_history(path: Path) -> list[Moment]:
-    """The runs of a history. Raises `InputError`, naming the line, for an unusable line."""
-    found = []
-    for n, line in enumerate(reading.read_text(path).splitlines(), 1):
-        if not line.strip():
-            continue
-        try:
-            found.append(Moment.model_validate_json(line))
-        except ValidationError as error:
-            raise InputError(
-                f"{printable(path)}, line {n}: not a run of a history:"
-                f" {errors.from_validation(error)}"
-            ) from None
-    return found
 
 
 #: Most figures drawn (those that varied most), and most moved figures listed; the table has
@@ -325,10 +316,12 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
 
 def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment]) -> Panel:
     bad = [n for n, moment in enumerate(moments, 1) if name in moment.not_passed]
-    marked = Series("not passed", bad, [values[n - 1] for n in bad], style="points")
     return Panel(
         name.replace(": ", "\n", 1),
-        [Series("", list(range(1, len(moments) + 1)), values), marked],
+        [
+            Series("", list(range(1, len(moments) + 1)), values),
+            Series("not passed", bad, [values[n - 1] for n in bad], style="points"),
+        ],
     )
 
 

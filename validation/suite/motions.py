@@ -48,7 +48,6 @@ from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from rockcheck.scenes import (
     Finite,
-    Floor,
     Frozen,
     NonNegative,
     Positive,
@@ -121,8 +120,12 @@ def _motions(
     upward = sets.verticals_of(files, given) if given.vertical else {}
     if given.vertical:
         left_out = [one for one in left_out if isinstance(one, sets.Odd)]
+    # labels as allowed in names of scenes; endings only where names would be equal
+    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name, _ in motions]
     found = []
-    for label, (name, across) in zip(_labels([name for name, _ in motions]), motions, strict=True):
+    for (name, across), brief in zip(motions, short, strict=True):
+        word = brief if short.count(brief) == 1 else name
+        label = re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", word)[-_LONGEST_RECORD:].strip() or "record"
         parts = {"excitation": (label, across)}
         if name in upward:
             parts["vertical"] = f"{label}, vertical", upward[name]
@@ -156,16 +159,6 @@ def _shaken(
     name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
     duration = max(scene.duration, change["excitation"].quiet_after)
     return files.uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
-
-
-def _labels(names: Sequence[str]) -> list[str]:
-    """Names of records as allowed in names of scenes; endings only where names would be equal."""
-    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
-    chosen = (
-        one if short.count(one) == 1 else name for one, name in zip(short, names, strict=True)
-    )
-    plain = (re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", name) for name in chosen)
-    return [name[-_LONGEST_RECORD:].strip() or "record" for name in plain]
 
 
 #: Time step of the generated records, s.
@@ -244,13 +237,6 @@ class Noise(Frozen):
         return Record.from_samples(amplitude * shaped / np.max(np.abs(shaped)), RECORD_STEP)
 
 
-def _rubbing(floor: Floor, friction: float) -> Floor:
-    """The floor with this kinetic friction; static friction above it keeps its ratio to it."""
-    ratio = floor.mu_s / floor.friction if floor.friction > 0.0 else 1.0
-    static = None if floor.static_friction is None else max(ratio * friction, friction)
-    return floor.replace(friction=friction, static_friction=static)
-
-
 class Ensemble(Frozen):
     """One `[[ensemble]]` table of a suite; see the module."""
 
@@ -280,7 +266,11 @@ class Ensemble(Frozen):
         if motion is not None:
             change["excitation"] = motion.draw(chance)
         if self.friction is not None:
-            change["floor"] = _rubbing(base.floor, self.friction.draw(chance))
+            floor, kinetic = base.floor, self.friction.draw(chance)
+            # static friction above the kinetic one keeps its ratio to it
+            ratio = floor.mu_s / floor.friction if floor.friction > 0.0 else 1.0
+            static = None if floor.static_friction is None else max(ratio * kinetic, kinetic)
+            change["floor"] = floor.replace(friction=kinetic, static_friction=static)
         if self.gap is not None:
             change["walls"] = tuple(
                 Wall(side=w.side, gap=self.gap.draw(chance), restitution=w.restitution)
