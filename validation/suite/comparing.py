@@ -230,8 +230,11 @@ def by_any(
         rivals = {law: one for law, one in found.items() if not law or first.measure in BY_ANY}
         law = min(rivals, key=lambda law: _away(rivals[law].figure(first.measure)))
         nearest = found[law].figure(first.measure)
-        note = "; ".join(filter(None, (nearest.note, law)))
-        change = {"against": first.against, "note": note, "window": window}
+        change = {
+            "against": first.against,
+            "note": "; ".join(filter(None, (nearest.note, law))),
+            "window": window,
+        }
         yield Compared(nearest.model_copy(update=change), found[law].gap, found[law].fall)
 
 

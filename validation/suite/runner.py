@@ -23,7 +23,7 @@ from rockcheck.validation.suite import comparing, motions, results, suites, tole
 from rockcheck.validation.uncertainty import numerical, population
 
 #: Parts of the cost that add up over the batches of an ensemble.
-ADDED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations", "worker_seconds")
+ADDED = (*models.SUMMED, "worker_seconds")
 #: Remark on a gap in a measured history.
 SHIFTS = (
     "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
@@ -93,7 +93,7 @@ class SuiteStudy(Study):
             for item in self.items
             if (missing := models.not_installed(item.variant.family))
         }
-        self.playable = in_order([item for item in self.items if item not in self.ended])
+        self.playable = [item for item in self.items if item not in self.ended]
         self.read_back: set[comparing.Planned] = set()
         #: Batches of which some scenes failed without a result.
         self.traces: set[comparing.Planned] = set()
@@ -135,8 +135,21 @@ class SuiteStudy(Study):
             )
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[comparing.Planned]:
-        """All cells and batches of models that are installed."""
-        return self.playable
+        """All cells and batches of models that are installed, in the order in which they begin.
+
+        First one cell for each compiled code, since the others with that code wait for it; then the
+        cells that take long, the longest scenes with the most walls first; cells of models that are
+        compiled as a whole are quick, and fill the processes up to the end.
+        """
+        first = {item.compiles: item for item in reversed(self.playable)}
+        return sorted(
+            self.playable,
+            key=lambda item: (
+                not item.compiles or first[item.compiles] is not item,
+                models.family(item.variant.family).compiled != "",
+                -item.scene.duration * (1 + len(item.scene.walls)),
+            ),
+        )
 
     def file(self, task: Any) -> str:
         """Name of the cell's files."""
@@ -275,7 +288,18 @@ class SuiteStudy(Study):
             scene.name, planned.model, own.given.reference, "theta_rms"
         )
         if moved and reference and own.kind(same_equations) == "numerical":
-            checks = list(_checks(own, required, found.figures, floor, as_expected(reference)))
+            # the reference's own figures; one that is not as expected itself is no yardstick
+            odd = {
+                check.figure.windowed
+                for check in reference.checks
+                if check.verdict != "pass" and not check.figure.against
+            }
+            beside = {
+                one.windowed: one.value
+                for one in reference.figures
+                if not one.against and one.windowed not in odd
+            }
+            checks = list(_checks(own, required, found.figures, floor, beside))
         return results.Cell(
             **self._about(parts)
             | {
@@ -429,33 +453,3 @@ def _checks(
             floor=floor(measure),
             beside=beside.get(place.what) if line and kind == "absolute" else None,
         )
-
-
-def as_expected(reference: results.Cell) -> dict[str, float | None]:
-    """The reference's own figures by "measure@window", but for those not as expected.
-
-    One that is not as expected itself is no yardstick.
-    """
-    own = {one.windowed: one.value for one in reference.figures if not one.against}
-    for check in reference.checks:
-        if check.verdict != "pass" and not check.figure.against:
-            own.pop(check.figure.windowed, None)
-    return own
-
-
-def in_order(items: Sequence[comparing.Planned]) -> list[comparing.Planned]:
-    """The order in which cells begin.
-
-    First one cell for each compiled code, since the others with that code wait for it; then the
-    cells that take long, the longest scenes with the most walls first; cells of models that are
-    compiled as a whole are quick, and fill the processes up to the end.
-    """
-    first = {item.compiles: item for item in reversed(items)}
-    return sorted(
-        items,
-        key=lambda item: (
-            not item.compiles or first[item.compiles] is not item,
-            models.family(item.variant.family).compiled != "",
-            -item.scene.duration * (1 + len(item.scene.walls)),
-        ),
-    )

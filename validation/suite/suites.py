@@ -505,10 +505,8 @@ def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
             if not isinstance(alternative.get("name"), str):
                 raise errors.InputError("each alternative needs a name", "grid.axes")
         names = [str(part["name"]) for part in (grid.scene, *choice) if "name" in part]
-        table = functools.reduce(_merged, choice, grid.scene)
-        yield files.scene_from(
-            {**table, "name": "-".join(names)}, folder=folder, default_name="scene"
-        )
+        table = {**functools.reduce(_merged, choice, grid.scene), "name": "-".join(names)}
+        yield files.scene_from(table, folder=folder, default_name="scene")
 
 
 def _merged(base: Any, change: Any) -> Any:

@@ -20,14 +20,13 @@ OUTCOMES = (
 )
 
 
-def shown(run: results.Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
-    """The scenes and ensembles shown one by one, in the suite's order: the worst `most`, or all.
+def shown(run: results.Run) -> tuple[str, ...]:
+    """The scenes and ensembles shown one by one, in the suite's order: at most `MOST_SHOWN` scenes.
 
-    The worst are those with the worst verdict, and of these the nearest to a limit. Ensembles are
-    always shown.
+    Those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
     """
     cells = run.by_scene()
-    if len(cells) <= most:
+    if len(cells) <= MOST_SHOWN:
         return tuple(cells)
     ensembles = {ensemble.name for ensemble in run.ensembles}
 
@@ -39,7 +38,7 @@ def shown(run: results.Run, most: int = MOST_SHOWN) -> tuple[str, ...]:
         )
 
     scenes = [place for place in cells if place not in ensembles]
-    chosen = ensembles | set(sorted(scenes, key=badness, reverse=True)[:most])
+    chosen = ensembles | set(sorted(scenes, key=badness, reverse=True)[:MOST_SHOWN])
     return tuple(place for place in cells if place in chosen)
 
 
@@ -57,10 +56,21 @@ def finding_of(run: results.Run) -> Finding:
         return Finding(
             "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), wrong]
         )
+    cells = run.by_scene()
+    rows = [
+        ["" if n else scene, *_verdict_row(cell)]
+        for scene in shown(run)
+        for n, cell in enumerate(cells[scene].values())
+    ]
+    columns = [
+        *map(text, ("scene", "model", "nearest to its limit")),
+        Column("used", kind="used"),
+        text("verdict"),
+    ]
     better, waits = list(improvements(run)), run.without_tolerance
     makes = "`rockcheck accept` makes today's the expected ones"
     blocks: list[Block] = [
-        verdict_table(run),
+        Table("verdicts", columns, rows, most=len(rows)),
         Text(items=not_shown(run)),
         wrong,
         Text(f"better than expected; {makes}:" if better else ""),
@@ -74,30 +84,8 @@ def finding_of(run: results.Run) -> Finding:
     return Finding("run", run.suite, f"verdict: {run.words}", blocks)
 
 
-def verdict_table(run: results.Run) -> Table:
-    """A row per cell: the check nearest to its limit, the used share of the limit, the verdict.
-
-    Of a large run, the scenes that are `shown`.
-    """
-    cells = run.by_scene()
-    rows = [
-        ["" if n else scene, *_verdict_row(cell)]
-        for scene in shown(run)
-        for n, cell in enumerate(cells[scene].values())
-    ]
-    return Table(
-        "verdicts",
-        [
-            *map(text, ("scene", "model", "nearest to its limit")),
-            Column("used", kind="used"),
-            text("verdict"),
-        ],
-        rows,
-        most=len(rows),
-    )
-
-
 def _verdict_row(cell: results.Cell) -> list[Any]:
+    """The model, the check nearest to its limit, the used share of the limit, the verdict."""
     # a yes-or-no measure, or a limit of 0, is never near its limit
     weighed = [
         one
@@ -246,15 +234,12 @@ def used(check: results.Check) -> float:
         return math.inf
     if not limit or check.figure.measure in YES_NO:
         return math.inf if fails else 0.0
-    part = _part(check, value, limit)
-    return part if fails else min(1.0, part)
-
-
-def _part(check: results.Check, value: float, limit: float) -> float:
+    most = math.inf if fails else 1.0
     if check.ideal is None:  # an "at least" measure: the needed share of the value
-        return limit / value if value > 0.0 else math.inf
+        return min(limit / value if value > 0.0 else math.inf, most)
     role = getattr(tolerances.MEASURES.get(check.figure.measure), "role", "error")
-    return tolerances.apart(value, check.ideal, 0.0 if role == "error" else check.floor) / limit
+    floor = 0.0 if role == "error" else check.floor
+    return min(tolerances.apart(value, check.ideal, floor) / limit, most)
 
 
 def share(check: results.Check) -> str:
@@ -388,12 +373,13 @@ def _entry(cell: results.Cell | None, judged: bool) -> str:
     if not judged and cell.status == "done":
         return _plain(cell.fate)
     numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
-    worst_of = share(max(numerical, key=_known_and_bad)) if numerical else ""
-    return f"{MARKS[cell.verdict]} {_plain(worst_of)}{sure}".strip()
-
-
-def _known_and_bad(check: results.Check) -> tuple[bool, bool, float]:
-    return check.verdict == "fail", check.figure.value is not None, used(check)
+    worst = max(
+        numerical,
+        key=lambda one: (one.verdict == "fail", one.figure.value is not None, used(one)),
+        default=None,
+    )
+    said = _plain(share(worst)) if worst else ""
+    return f"{MARKS[cell.verdict]} {said}{sure}".strip()
 
 
 def _plain(text: str) -> str:

@@ -18,7 +18,7 @@ import pytest
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite import results, suites, tables
-from rockcheck.validation.suite.runner import SuiteStudy, in_order, run_suite
+from rockcheck.validation.suite.runner import SuiteStudy, run_suite
 
 OWN_NAMES = ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
 OWN = [f"faulty:{name}" for name in OWN_NAMES]
@@ -284,7 +284,7 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
-    cells = in_order(SuiteStudy(suites.load_suite("paper"), tmp_path).items)
+    cells = SuiteStudy(suites.load_suite("paper"), tmp_path).tasks({})
     begun = [(cell.variant.label, cell.place) for cell in cells]
     assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
     assert {model for model, _ in begun[3:10]} == {"mujoco", "pybullet"}

@@ -157,7 +157,7 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
     assert tables.shown(run) == tuple(one.scene for one in worst)
     assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
-    assert len(tables.verdict_table(run).rows) == tables.MOST_SHOWN + 1
+    assert len(tables.finding_of(run).table("verdicts").rows) == tables.MOST_SHOWN + 1
     text = tables.markdown(run)
     assert ("| out |" in text, "| far 3 |" in text) == (True, False)
     assert "|\n\nand 30 more scenes" in text  # not a row of the table
