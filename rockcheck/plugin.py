@@ -83,8 +83,7 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)
         assert cell is not None
-        wrong = list(tables.cell_lines(cell, strict))
-        if wrong:
+        if wrong := list(tables.cell_lines(cell, strict)):
             pytest.fail("\n".join(wrong), pytrace=False)
         if all(check.verdict == "not defined" for check in cell.checks):
             pytest.fail(

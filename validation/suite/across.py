@@ -234,7 +234,7 @@ def moment_of(run: results.Run, folder: Path) -> Moment:
 def remember(path: Path, moment: Moment) -> list[Moment]:
     """Append a run to the history; returns all its runs of the same suite, the oldest first.
 
-    Raises `InputError`, naming the line that is unusable.
+    Raises `InputError`, naming a line that is unusable.
     """
     known: list[Moment] = []
     lines = reading.read_text(path).splitlines() if path.exists() else []

@@ -38,10 +38,11 @@ BY_ANY = ("outcome_agrees", "peak_ratio")
 class Planned(Task):
     """A cell to be played: a scene, or the scenes `numbers` of an `ensemble`, by a model.
 
-    An ensemble's scenes are drawn from `scene`. `key` is the hash of all that the result depends
-    on.
+    An ensemble's scenes are drawn from `scene`. `place` is the name of the scene, or of the
+    ensemble. `key` is the hash of all that the result depends on.
     """
 
+    place: str = field(compare=False)
     scene: Scene = field(compare=False)
     variant: models.Work = field(compare=False)
     model: str
@@ -49,11 +50,6 @@ class Planned(Task):
     uncertainty: bool = field(default=False, compare=False)
     ensemble: motions.Ensemble | None = field(default=None, compare=False)
     numbers: range = field(default=range(0), compare=False)
-
-    @property
-    def place(self) -> str:
-        """Name of the scene, or of the ensemble."""
-        return self.ensemble.name if self.ensemble else self.scene.name
 
     @property
     def name(self) -> str:
@@ -243,9 +239,7 @@ def _away(figure: Figure) -> float:
     return math.inf if figure.value is None or ideal is None else abs(figure.value - ideal)
 
 
-def compared(
-    store: Store, scene: Scene, planned: Planned, asked: Mapping[str, Asked]
-) -> ComparisonRecord:
+def compared(store: Store, planned: Planned, asked: Mapping[str, Asked]) -> ComparisonRecord:
     """The comparisons of a cell; `asked` by name of the reference, OWN_FIGURES for its own figures.
 
     Kept in the store. Each has all figures over the whole time, and those `asked` over a window.
@@ -256,11 +250,11 @@ def compared(
     ):
         horizon = _of_scene(
             store,
-            scene,
+            planned.scene,
             tolerances.HORIZON,
             "ebm.horizon",
             float,
-            lambda: predictability_horizon(scene),
+            lambda: predictability_horizon(planned.scene),
         )
     against = [
         [name, reference.key if reference else "", extra]
@@ -268,20 +262,15 @@ def compared(
     ]
     # with the code of this module and of `compare`
     depends = [planned.key, against, horizon, provenance.code_digest(__name__)]
-    name = name_of(scene.name, planned.model, provenance.digest(json.dumps(depends)))
-    return kept(
-        store, name, ComparisonRecord, lambda: _compute(store, scene, planned, asked, horizon)
-    )
+    name = name_of(planned.place, planned.model, provenance.digest(json.dumps(depends)))
+    return kept(store, name, ComparisonRecord, lambda: _compute(store, planned, asked, horizon))
 
 
 def _compute(
-    store: Store,
-    scene: Scene,
-    planned: Planned,
-    asked: Mapping[str, Asked],
-    horizon: float | None,
+    store: Store, planned: Planned, asked: Mapping[str, Asked], horizon: float | None
 ) -> ComparisonRecord:
-    candidate, landing = store.load(planned.name), landing_of(store, scene)
+    candidate, scene = store.load(planned.name), planned.scene
+    landing = landing_of(store, scene)
     parted = landing.t if landing else math.inf
     figures: list[Compared] = []
     for reference, extra in asked.values():

@@ -106,7 +106,8 @@ class SuiteStudy(Study):
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
         """
-        own, kind = self.own[ensemble.name if ensemble else scene.name], variant.family
+        place = ensemble.name if ensemble else scene.name
+        own, kind = self.own[place], variant.family
         asked = {"uncertainty": provenance.code_digest(numerical.__name__)}
         parts: list[tuple[range, dict[str, Any]]] = [
             (range(0), asked if own.given.uncertainty else {})
@@ -121,6 +122,7 @@ class SuiteStudy(Study):
             ]
         for numbers, depends in parts:
             yield comparing.Planned(
+                place,
                 scene,
                 variant,
                 variant.label,
@@ -280,7 +282,7 @@ class SuiteStudy(Study):
             return results.Cell(**self._about(parts, record.reason))
         scene, own = planned.scene, self.own[planned.place]
         required = own.required(scene.name, planned.model)
-        found = comparing.compared(self.store, scene, planned, self._asked(planned, required))
+        found = comparing.compared(self.store, planned, self._asked(planned, required))
         floor = partial(tolerances.floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]

@@ -487,9 +487,9 @@ def _scenes(given: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
             for n, table in enumerate(given.scene, 1)
         ),
         (
-            files.uncertain_scene(scene, {}, {})
+            files.uncertain_scene(_combined(grid.scene, choice, folder), {}, {})
             for grid in given.grid
-            for scene in _combined(grid, folder)
+            for choice in itertools.product(*grid.axes)
         ),
     ):
         name = scene.scene.name
@@ -499,14 +499,12 @@ def _scenes(given: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
     return found
 
 
-def _combined(grid: Grid, folder: Path) -> Iterator[Scene]:
-    for choice in itertools.product(*grid.axes):
-        for alternative in choice:
-            if not isinstance(alternative.get("name"), str):
-                raise errors.InputError("each alternative needs a name", "grid.axes")
-        names = [str(part["name"]) for part in (grid.scene, *choice) if "name" in part]
-        table = {**functools.reduce(_merged, choice, grid.scene), "name": "-".join(names)}
-        yield files.scene_from(table, folder=folder, default_name="scene")
+def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]], folder: Path) -> Scene:
+    if not all(isinstance(alternative.get("name"), str) for alternative in choice):
+        raise errors.InputError("each alternative needs a name", "grid.axes")
+    names = [str(part["name"]) for part in (base, *choice) if "name" in part]
+    table = {**functools.reduce(_merged, choice, base), "name": "-".join(names)}
+    return files.scene_from(table, folder=folder, default_name="scene")
 
 
 def _merged(base: Any, change: Any) -> Any:

@@ -85,7 +85,6 @@ def finding_of(run: results.Run) -> Finding:
 
 
 def _verdict_row(cell: results.Cell) -> list[Any]:
-    """The model, the check nearest to its limit, the used share of the limit, the verdict."""
     # a yes-or-no measure, or a limit of 0, is never near its limit
     weighed = [
         one

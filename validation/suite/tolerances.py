@@ -173,9 +173,10 @@ def floor_of(measure: figures.Measure, scene: Scene, numerical: Numerical | None
         if numerical
         else []
     )
-    p, step = scene.frequency_parameter, scene.output_step
     rows = (
-        figures.between_rows(measure.unit, p, scene.gravity, step)
+        figures.between_rows(
+            measure.unit, scene.frequency_parameter, scene.gravity, scene.output_step
+        )
         if measure.role == "quantity"
         else 0.0
     )
