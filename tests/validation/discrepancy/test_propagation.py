@@ -1,6 +1,7 @@
 """What a spread of the inputs makes of the figures, on a scene with a closed form: the peak of free
 rocking is its first tilt."""
 
+import numpy as np
 import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
@@ -92,6 +93,8 @@ def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
         pytest.approx(0.5 - NORMAL / 2 / 32, abs=0.012),
         pytest.approx(0.5 + NORMAL / 2 / 32, abs=0.012),
     )
+    # Most of the time some lie and some stand: what lies goes on lying.
+    assert found.u_input("theta_rms") == pytest.approx(0.5 * (0.5 * np.pi / ALPHA), rel=0.1)
     names = [one.name for one in found.figures]
     assert (found.model, names, found.figures[0].high) == (
         "ebm",
