@@ -227,11 +227,10 @@ class _Run:
                     )
                 elif time.monotonic() < until:
                     self._end(task, pool.guarded(self.study.play, task))
-            if not calls:
-                continue
-            for ended in self._workers.run(calls, until=until):
-                self._end(ended.call.key, ended.outcome)
-            if time.monotonic() >= until:
+            if calls:
+                for ended in self._workers.run(calls, until=until):
+                    self._end(ended.call.key, ended.outcome)
+            if len(self.done) < len(self.known):  # the time is over
                 return
 
     def _next(self) -> list[Task]:
