@@ -149,6 +149,20 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
     assert 0 < gains < 60
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_pivot_that_stands_lands_on_the_floor_and_gains_nothing_from_an_elastic_wall(sense):
+    walls = [Wall(side=side, gap=5.0, restitution=1.0) for side in ("left", "right")]
+    b = setting_of(0.4, walls=walls, pivot="bilateral", friction="no-slip")
+    for w in sense * np.linspace(0.01, 1.0, 50):
+        s, c = math.sin(0.3), math.cos(0.3)
+        struck = run_at([0.0, c, 0.1 * sense, -c * w, sense * s * w, w], **ROCKS, sense=sense).state
+        strike._wall_impact(b, struck, True, 1e-9)
+        assert (struck.motion.w, struck.gains) == (pytest.approx(-w), 0)
+        landed = run_at([0.0, math.cos(0.4), 0.0, 0.0, 0.0, -w], **ROCKS, sense=sense).state
+        strike._floor_impact(b, landed, 1e-9)
+        assert landed.motion.vy == -sense * math.sin(0.4) * landed.motion.w != 0.0
+
+
 @pytest.mark.parametrize("slip", [0.3, -0.3])
 @pytest.mark.parametrize("sense", [1, -1])
 def test_a_block_that_lands_flush_with_a_wall_is_thrown_back(sense, slip):
