@@ -323,7 +323,7 @@ def _touching(block, base, state):
         near = touched_walls(block, motion, first, False)
         return _Touching(first, first, floor, v, 0, near, 0, near)
     side = favoured(block, base, state)
-    first = 1 if side >= 0 else -1
+    first = side or 1
     walls = touched_walls(block, motion, 1, True)
     near = touched_walls(block, motion, first, False)
     away = touched_walls(block, motion, -first, False)

@@ -214,10 +214,9 @@ def _corner_impact(block, state, sw, e, resting):
 def _strike_all(block, base, run, resting):
     """Unilateral pivot: resolves all contacts touched at this instant."""
     state, mode, motion, work = run.state, run.state.mode, run.state.motion, run.stack
-    sense = mode.sense
-    if mode.family == Family.FLAT:
-        # The sense in which a selection calculates, too.
-        sense = 1 if modes.favoured(block, base, state) >= 0 else -1
+    # That of a flat block is the one in which a selection calculates.
+    flat_block = mode.family == Family.FLAT
+    sense = (modes.favoured(block, base, state) or 1) if flat_block else mode.sense
     sign = float(sense)
     phi = abs(motion.theta)
     flat = motion.theta == 0.0
