@@ -43,11 +43,10 @@ def decided(block, base, state):
     still = base.vertical.form.kind == Shape.STILL
     ahead = 0.0
     if t < quiet:
-        # Which is not certain, however little is to come.
-        at_its_peak = t <= base.horizontal.form.quiet and abs(theta) >= peak
-        ahead = math.inf if at_its_peak or not still else impulse_ahead(base.horizontal, t)
-    turning = ahead > 0.0 and abs(theta) >= peak
-    verdict = -1.0 if turning else _by_energy(block, state, ahead)
+        ahead = impulse_ahead(base.horizontal, t) if still else math.inf
+    # At its peak nothing is certain, however little is to come.
+    uncertain = ahead == math.inf or (ahead > 0.0 and abs(theta) >= peak)
+    verdict = -1.0 if uncertain else _by_energy(block, state, ahead)
     if verdict <= 0.0 and still and abs(theta) > side_of(block, theta).alpha:
         verdict = _falls(block, base, state)
     return verdict

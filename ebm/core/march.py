@@ -44,7 +44,9 @@ def loop_with(friction: ModuleType) -> object:
     def step(block, base, run):
         """One Taylor step, and the event that ends it."""
         state = run.state
-        expand(block, base, run, smooth_until(base, state) - state.t)
+        smooth = smooth_until(base, state)
+        expand(block, base, run, smooth - state.t)
+        state.smooth_until = smooth  # not before: what is known of the base would be read again
         if not finite(state, state.length > 0.0):
             return
         locate(block, run)
@@ -108,8 +110,7 @@ def begin(block, base, run):
 def smooth_until(base, state):
     """The time up to which the base motion is smooth, or at which the run ends."""
     kink = min(ground.next_kink(base.horizontal, state.t), ground.next_kink(base.vertical, state.t))
-    state.smooth_until = min(kink, state.t_end)
-    return state.smooth_until
+    return min(kink, state.t_end)
 
 
 @inner_kernel

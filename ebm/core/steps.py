@@ -53,14 +53,12 @@ def may_go_on(block, base, run):
 @inner_kernel
 def sample(block, run):
     """Writes the rows of this step."""
-    state, records = run.state, run.records
-    t, step, code = state.t, run.state.control.output_step, mode_code(state)
+    state, t, step = run.state, run.state.t, run.state.control.output_step
     state.whole = state.guard == Guard.NONE and state.tau >= state.smooth_until - t
     until = state.smooth_until if state.whole else t + state.tau
-    while state.rows < records.out.shape[0] and state.rows * step < until:
+    while state.rows < run.records.out.shape[0] and state.rows * step < until:
         motion_at(block, state, run.a, state.rows * step - t, state.sampled)
-        write(records, state.rows, state.sampled, code)
-        state.rows += 1
+        write(run, state.sampled)
 
 
 @inner_kernel
@@ -69,7 +67,7 @@ def advance(block, base, run):
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     order, tau, t = state.order, state.tau, state.t
     rises = mode.family == Family.TILT and a[Row.OMEGA, 0] > 0.0
-    energy = energy_of(block, motion)
+    energy = energy_of(block, motion) if run.state.control.until_decided else 0.0
     motion_at(block, state, run.a, tau, motion)
     turns = rises and mode.sense * motion.w < 0.0
     if turns and not stays_below(a, Row.PHI, order, tau, state.peak):
@@ -187,17 +185,16 @@ def rest(block, base, run):
 @inner_kernel
 def sample_rest(run, until):
     """Writes the rows of a block at rest, up to a time."""
-    state, records = run.state, run.records
-    code = mode_code(state)
-    while state.rows < records.out.shape[0] and state.rows * run.state.control.output_step <= until:
-        write(records, state.rows, state.motion, code)
-        state.rows += 1
+    state, step = run.state, run.state.control.output_step
+    while state.rows < run.records.out.shape[0] and state.rows * step <= until:
+        write(run, state.motion)
 
 
 @inner_kernel
-def write(records, row, motion, code):
-    """Writes one row of the history."""
-    out = records.out
+def write(run, motion):
+    """Writes the next row of the history."""
+    row, out = run.state.rows, run.records.out
     out[row, 0], out[row, 1], out[row, 2] = motion.x, motion.y, motion.theta
     out[row, 3], out[row, 4], out[row, 5] = motion.vx, motion.vy, motion.w
-    records.out_mode[row] = code
+    run.records.out_mode[row] = mode_code(run.state)
+    run.state.rows = row + 1
