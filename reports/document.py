@@ -61,48 +61,54 @@ VERDICTS = {
 }
 
 
-def words(cell: Any, column: Column, write: Callable[[float, int], str] = number) -> str:
-    """A cell's value for people; a sign before it where it has a verdict."""
-    mark = _mark(cell)
-    value, kind, digits = mark.value, column.kind, mark.digits or column.digits
-    said = str(value)
-    if value is None or value != value:  # NaN
-        said = ""
-    elif kind == "model":
-        said = label_of(said)
-    elif isinstance(value, bool):
-        said = "yes" if value else "no"
-    elif kind == "used" and isinstance(value, int | float) and value > 1.0:
-        said = f"{value:.3g}×" if value < math.inf else "beyond"
-    elif kind in ("percent", "used") and isinstance(value, int | float):
-        said = f"{100.0 * value:.{max(digits - 2, 0) if kind == 'percent' else 0}f} %"
-    elif kind == "number" and isinstance(value, float):
-        said = write(value, digits)
-    return f"{VERDICTS[mark.verdict][0]} {said}".strip()
+def row_cells(
+    row: Sequence[Any], columns: Sequence[Column], write: Callable[[float, int], str] = number
+) -> list[tuple[Mark, Column, str]]:
+    """The cells of a row: each as a mark, its column, and its words.
 
-
-def _mark(cell: Any) -> Mark:
-    return cell if isinstance(cell, Mark) else Mark(cell)
-
-
-def row_cells(row: Sequence[Any], columns: Sequence[Column]) -> list[tuple[Mark, Column, str]]:
-    """The cells of a row for the page: each as a mark, its column, and its words."""
+    `write` says how a number with so many digits is written.
+    """
+    marks = [cell if isinstance(cell, Mark) else Mark(cell) for cell in row]
     return [
-        (_mark(cell), column, words(cell, column))
-        for cell, column in zip(row, columns, strict=True)
+        (mark, column, _words(mark, column, write))
+        for mark, column in zip(marks, columns, strict=True)
     ]
+
+
+def _words(mark: Mark, column: Column, write: Callable[[float, int], str]) -> str:
+    """A cell's value for people; a sign before it where it has a verdict."""
+    digits = mark.digits or column.digits
+    match column.kind, mark.value:
+        case _, value if value is None or value != value:  # NaN
+            said = ""
+        case "model", value:
+            said = label_of(str(value))
+        case _, bool(value):
+            said = "yes" if value else "no"
+        case "used", int(value) | float(value) if value > 1.0:
+            said = f"{value:.3g}×" if value < math.inf else "beyond"
+        case "used", int(value) | float(value):
+            said = f"{100.0 * value:.0f} %"
+        case "percent", int(value) | float(value):
+            said = f"{100.0 * value:.{max(digits - 2, 0)}f} %"
+        case "number", float(value):
+            said = write(value, digits)
+        case _, value:
+            said = str(value)
+    return f"{VERDICTS[mark.verdict][0]} {said}".strip()
 
 
 def show(found: Finding, screen: Console) -> None:
     """The answer and the blocks that a terminal has room for."""
     for block in (block for block in found.blocks if block.on == "all"):
-        if isinstance(block, Table):
-            screen.print(_grid(block.shown))
-            if len(block.rows) > block.most:
-                screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
-        elif isinstance(block, Text):
-            for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
-                screen.print(line, style=VERDICTS[block.verdict][1], soft_wrap=True)
+        match block:
+            case Table():
+                screen.print(_grid(block.shown))
+                if len(block.rows) > block.most:
+                    screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
+            case Text():
+                for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
+                    screen.print(line, style=VERDICTS[block.verdict][1], soft_wrap=True)
     for where, reason in found.failures.items():
         screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
     if not found.complete:
@@ -123,11 +129,8 @@ def _grid(table: Table) -> Grid:
     for row in table.rows[: table.most]:
         grid.add_row(
             *(
-                Line(
-                    errors.inert(words(cell, column, "{:.{}g}".format)),
-                    VERDICTS[_mark(cell).verdict][1],
-                )
-                for cell, column in zip(row, table.columns, strict=True)
+                Line(errors.inert(said), VERDICTS[mark.verdict][1])
+                for mark, column, said in row_cells(row, table.columns, "{:.{}g}".format)
                 if column.brief
             )
         )
@@ -155,20 +158,17 @@ def markdown(found: Finding) -> str:
 
 def block_markdown(block: Table | Plot | Text) -> str:
     """A block as Markdown, as the documentation and `summary.md` have it."""
-    title = f"## {block.title}\n\n" if block.title else ""
-    if isinstance(block, Text):
-        lists = ([f"{name}: {value}" for name, value in block.facts], block.items)
-        parts = [block.text, *("\n".join(f"- {item}" for item in items) for items in lists)]
-        return title + "\n\n".join(filter(None, parts))
-    if isinstance(block, Plot) or block.on == "file":
-        return ""
-    block = block.shown
-    rows = (
-        [words(cell, column) for cell, column in zip(row, block.columns, strict=True)]
-        for row in block.rows
-    )
-    note = f"\n\n{block.note}" if block.note else ""
-    return title + writing.markdown_table([column.head for column in block.columns], rows) + note
+    match block:
+        case Text():
+            lists = ([f"{name}: {value}" for name, value in block.facts], block.items)
+            parts = [block.text, *("\n".join(f"- {item}" for item in items) for items in lists)]
+        case Table() if block.on != "file":
+            table = block.shown
+            rows = ([said for *_, said in row_cells(row, table.columns)] for row in table.rows)
+            parts = [writing.markdown_table([one.head for one in table.columns], rows), table.note]
+        case _:
+            return ""
+    return "\n\n".join(filter(None, [block.title and f"## {block.title}", *parts]))
 
 
 def _draw(plot: Plot, stem: Path, stamp: str) -> None:
@@ -208,10 +208,8 @@ def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
         )
     for name in before.keys() - {table.name for table in found.tables()}:
         path = folder / f"{name}.csv"
-        heads = [
-            writing.table_text([*row], []) for row in before[name][:1] if path.parent == folder
-        ]
-        if heads and reading.head_of(path, 10_000).startswith(heads[0]):
+        heads = tuple(writing.table_text([*row], []) for row in before[name][:1])
+        if path.parent == folder and reading.head_of(path, 10_000).startswith(heads):
             yield path
     drawn = {plot.name for plot in found.plots()}
     for data in (folder / FIGURES).glob("*.json"):
@@ -230,11 +228,14 @@ def publish(found: Finding, folder: Path) -> Path:
     another are removed. Figures are written as the page shows them, and as the data that
     `write_figure` draws.
     """
-    tables = {f"{table.name}.csv": csv(table) for table in found.tables()}
     for old in (*_left_by_another(folder, found), *folder.glob("failures/*.toml")):
         old.unlink()
     writing.write_whole(folder / "run.json", writing.json_text(found.as_dict()) + "\n")
-    for name, content in {**tables, **found.files, "summary.md": markdown(found)}.items():
+    for name, content in (
+        *((f"{table.name}.csv", csv(table)) for table in found.tables()),
+        *found.files.items(),
+        ("summary.md", markdown(found)),
+    ):
         *parts, last = name.split("/")
         writing.write_whole(writing.made(folder, *parts) / last, content)
     plots = list(found.plots())
@@ -302,10 +303,12 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     `name` and the `links` of its navigation: (title, address).
     """
     *parts, name = address.split("/")
-    page = TEMPLATES.get_template(template).render(
-        root="../" * len(parts), address=address, **context
+    return writing.write_whole(
+        writing.made(folder, *parts) / name,
+        TEMPLATES.get_template(template).render(
+            root="../" * len(parts), address=address, **context
+        ),
     )
-    return writing.write_whole(writing.made(folder, *parts) / name, page)
 
 
 def write_assets(folder: Path) -> None:

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,11 +96,11 @@ def looks(models: Iterable[str]) -> dict[str, Look]:
 
     Models without one of their own get the spare colours, in order.
     """
-    found: dict[str, Look] = {}
-    for model in models:
-        spare = SPARE[sum(name not in LOOKS for name in found) % len(SPARE)]
-        found[model] = LOOKS[model] if model in LOOKS else replace(spare, label=model)
-    return found
+    spare = cycle(SPARE)
+    return {
+        model: LOOKS[model] if model in LOOKS else replace(next(spare), label=model)
+        for model in models
+    }
 
 
 def label_of(model: str) -> str:

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Container, Iterable
+from collections.abc import Collection, Container
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, count
@@ -414,20 +414,18 @@ def scene_views(
     return views
 
 
-def slugs_of(names: Iterable[str]) -> dict[str, str]:
+def slugs_of(names: Collection[str]) -> dict[str, str]:
     """A file name for each scene, safe on any system.
 
     The names differ for different scenes also where case does not count.
     """
-    slugs: dict[str, str] = {}
-    taken: set[str] = set()
+    taken: dict[str, str] = {}
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         numbered = chain([base], (f"{base}-{n}" for n in count(2)))
         slug = next(one for one in numbered if one.lower() not in taken)
-        taken.add(slug.lower())
-        slugs[name] = slug
-    return slugs
+        taken[slug.lower()] = slug
+    return dict(zip(names, taken.values(), strict=True))
 
 
 def all_figures(cell: results.Cell) -> list[figures.Figure]:
