@@ -39,26 +39,6 @@ STATISTICS_SHOWN = {
     "peak_scatter": "scatter",
 }
 PEAK = "peak |θ|/α"
-CHAOS = (
-    "Rocking is chaotic: what one block does in one motion cannot be predicted beyond a few"
-    " impacts, by any model. How many of many blocks rock how far, and how many fall, can. So here"
-    " models are held against each other by their distributions, not by histories."
-)
-INTERVALS = (
-    "Intervals are for 95 % confidence: Wilson's for shares, Student's for the bias (mean of ln"
-    " ratio of the peaks where both rock and neither falls), chi-squared for the scatter (its"
-    " standard deviation). p is the probability of such a distance between two samples of one"
-    " distribution."
-)
-CURVES = (
-    "An overturned block lies beyond every peak, so a curve ends at the share that stays. The"
-    " largest difference of two curves is their Kolmogorov-Smirnov distance; within the shaded band"
-    " the test sees no difference."
-)
-POINTS = (
-    "A point a scene. Dots off the diagonal: chaos and numerical error; crosses: one falls, the"
-    " other stays."
-)
 
 
 @dataclass(frozen=True)
@@ -100,7 +80,12 @@ class EnsembleView(View):
         """All that its page shows."""
         blocks: list[Block] = [
             Text(self.record.description, facts=self.facts()),
-            Text(CHAOS),
+            Text(
+                "Rocking is chaotic: what one block does in one motion cannot be predicted beyond"
+                " a few impacts, by any model. How many of many blocks rock how far, and how many"
+                " fall, can. So here models are held against each other by their distributions,"
+                " not by histories."
+            ),
             Table(
                 "verdicts",
                 [Column("model", kind="model"), text("verdict"), text("outcome")],
@@ -112,7 +97,12 @@ class EnsembleView(View):
             self.distributions(),
             *([self.by_scene()] if len(self.record.samples) > 1 else []),
             *(table for against in self.references if (table := self.agreement(against)).rows),
-            Text(INTERVALS),
+            Text(
+                "Intervals are for 95 % confidence: Wilson's for shares, Student's for the bias"
+                " (mean of ln ratio of the peaks where both rock and neither falls), chi-squared"
+                " for the scatter (its standard deviation). p is the probability of such a"
+                " distance between two samples of one distribution."
+            ),
             replace(checks_table(self.cells), title="Checks"),
             runs_table(self.run, self.cells),
             self.peaks(),
@@ -148,8 +138,8 @@ class EnsembleView(View):
         if "excitation" in drawn.scene:
             return known
         instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
-        base = Scene(**{"name": self.name, **drawn.scene})
-        return known + [fact for fact in scene_facts(base) if not instead.get(fact[0])]
+        base = scene_facts(Scene(**{"name": self.name, **drawn.scene}))
+        return known + [fact for fact in base if not instead.get(fact[0])]
 
     def distributions(self) -> Plot:
         """Share of scenes with a peak below each value, by model; difference from the reference.
@@ -193,7 +183,9 @@ class EnsembleView(View):
                 Panel(f"difference from {known[reference].label}", [*steps(others), band]),
             ],
             x=Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5))),
-            note=CURVES,
+            note="An overturned block lies beyond every peak, so a curve ends at the share that"
+            " stays. The largest difference of two curves is their Kolmogorov-Smirnov distance;"
+            " within the shaded band the test sees no difference.",
             shared=False,
         )
 
@@ -224,7 +216,13 @@ class EnsembleView(View):
             for of in (known[reference].label, "the model")
         )
         return Plot(
-            f"{self.slug}-scenes", "Scene by scene", panels=panels, x=x_axis, y=y_axis, note=POINTS
+            f"{self.slug}-scenes",
+            "Scene by scene",
+            panels=panels,
+            x=x_axis,
+            y=y_axis,
+            note="A point a scene. Dots off the diagonal: chaos and numerical error; crosses: one"
+            " falls, the other stays.",
         )
 
     def agreement(self, against: str) -> Table:
@@ -270,13 +268,18 @@ class EnsembleView(View):
                 ("outcome", sample.outcomes),
             )
         }
-        rows = [[n, *row] for n, row in enumerate(zip(*values.values(), strict=True), 1)]
-        return Table("", list(map(Column, ["scene", *values])), rows, on="file")
+        return Table(
+            "",
+            list(map(Column, ["scene", *values])),
+            [[n, *row] for n, row in enumerate(zip(*values.values(), strict=True), 1)],
+            on="file",
+        )
 
 
 def _distribution(of: motions.Distribution | None) -> str:
-    if of and of.uniform:
-        return f"uniform {number(of.uniform[0])} to {number(of.uniform[1])}"
-    if of and of.lognormal:
-        return f"lognormal, median {number(of.lognormal[0])}, σ {number(of.lognormal[1])}"
+    match of:
+        case motions.Distribution(uniform=(low, high)):
+            return f"uniform {number(low)} to {number(high)}"
+        case motions.Distribution(lognormal=(median, sigma)):
+            return f"lognormal, median {number(median)}, σ {number(sigma)}"
     return ""

@@ -22,11 +22,16 @@ COLOURS = {
     "overturned": "#e8833a",
     "undecided": "#9a9a9a",
 }
-#: Names in `COLOURS` of the outcome letters (`validation.studies.spectrum.tiles`), without a wall
-#: or with one.
-LETTERS = {"S": "safe", "L": "counterclockwise", "R": "clockwise", "U": "undecided"}
 #: Colours of the letters of `validation.paper.measures`: FALLEN, STANDS, GAINED, LOST.
 MARKED = {"F": "#e9e9e9", "T": "#a9c1df", "G": "#009168", "X": "#c4342d"}
+#: Colours of all letters; of the outcome letters (`validation.studies.spectrum.tiles`) without a
+#: wall.
+LETTERS = MARKED | {
+    "S": COLOURS["safe"],
+    "L": COLOURS["counterclockwise"],
+    "R": COLOURS["clockwise"],
+    "U": COLOURS["undecided"],
+}
 #: The mark of a node whose outcome depends on the law of impacts.
 LAW_MARK: dict[str, Any] = {
     "linestyle": "none",
@@ -76,9 +81,7 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
 def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> None:
     from matplotlib.colors import ListedColormap
 
-    colours = {letter: COLOURS[name] for letter, name in LETTERS.items()} | MARKED
-    if not free:
-        colours["R"] = COLOURS["overturned"]
+    colours = LETTERS if free else LETTERS | {"R": COLOURS["overturned"]}
     axes.pcolormesh(
         x,
         y,
@@ -101,9 +104,11 @@ def axis_labels(record: bool) -> tuple[str, str]:
     Frequency and amplitude ratio of a pulse; for a record, the size of the block relative to its
     own and the scale of the record.
     """
-    if record:
-        return "size of the block / its own", "scale of the record"
-    return "\u03c9\u209a / p", "a\u209a / (g tan \u03b1)"
+    return (
+        ("size of the block / its own", "scale of the record")
+        if record
+        else ("\u03c9\u209a / p", "a\u209a / (g tan \u03b1)")
+    )
 
 
 def figure(plot: Plot) -> Figure:
@@ -201,12 +206,14 @@ def _units(axes: Any, data: Any) -> None:
 def outcome_key(panels: Any) -> dict[str, str]:
     """Legend texts of the panels' colours, by the colours' names in `COLOURS`."""
     free, walled = (any(panel["free"] is wall for panel in panels) for wall in (True, False))
-    key = {"safe": "safe"}
-    if free:
-        key["clockwise"] = f"{'no wall: ' if walled else ''}overturned clockwise"
-    other = "overturned" + ("; no wall:" if free and walled else "")
-    key["counterclockwise"] = other + (" counterclockwise" if free else "")
-    return key | {"undecided": "undecided"}
+    clockwise = {"clockwise": f"{'no wall: ' if walled else ''}overturned clockwise"}
+    other = "overturned; no wall: counterclockwise" if walled else "overturned counterclockwise"
+    return {
+        "safe": "safe",
+        **(clockwise if free else {}),
+        "counterclockwise": other if free else "overturned",
+        "undecided": "undecided",
+    }
 
 
 def _legend(data: Any) -> tuple[list[Any], int]:
