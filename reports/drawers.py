@@ -244,10 +244,10 @@ def _short(values: Any) -> list[float | None]:
     ]
 
 
-def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[None]:
+def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4) -> Iterator[Any]:
     """Make these calls, in `jobs` processes (default: one a core) if there are at least `least`.
 
-    A process takes a second to import what draws.
+    Yields their results as they end. A process takes a second to import what draws.
     """
     waiting = deque(calls)
     jobs = min(jobs or cores(), len(waiting))
@@ -258,4 +258,4 @@ def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4)
         for ended in pool.run(waiting):
             if ended.error is not None:
                 raise ended.error
-            yield
+            yield ended.result

@@ -232,8 +232,9 @@ class _Pages:
             template, shown = "finding.html", self._write_ensemble(view)
         else:
             template, shown = "scene.html", self._write_scene(view)
-        shown |= {"view": view, "stamp": stamp} | self.common
-        write_page(self.folder, self.links[name], template, **shown)
+        write_page(
+            self.folder, self.links[name], template, view=view, stamp=stamp, **shown, **self.common
+        )
         for old in before - _belongings(page):
             (self.folder / PAGES / old).unlink(missing_ok=True)
 
@@ -244,11 +245,9 @@ class _Pages:
         paper, one a reference.
         """
         figures = writing.made(self.folder, PAGES, FIGURES)
-        curves = [
-            (view.t, view.drawn[model]["theta"], look)
-            for model, look in view.looks.items()
-            if model in view.values
-        ]
+        curves = (
+            (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
+        )
         save(thumbnail(curves), figures / f"{view.slug}-small", ["svg"])
         stems = {
             against: f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", str(against))
@@ -380,12 +379,15 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
         excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
             tables[key] = {"kind": "record", "file": name, "scale": excitation.scale}
-            head = [f"# {re.sub(r'[^ -~]', '?', excitation.source)}", "time_s,acceleration_m_s2"]
-            rows = (
-                f"{excitation.time_step * n:.12g},{value!r}"
-                for n, value in enumerate(excitation.unscaled)
+            lines = (
+                f"# {re.sub(r'[^ -~]', '?', excitation.source)}",
+                "time_s,acceleration_m_s2",
+                *(
+                    f"{excitation.time_step * n:.12g},{value!r}"
+                    for n, value in enumerate(excitation.unscaled)
+                ),
             )
-            writing.write_whole(folder / name, "\n".join([*head, *rows, ""]))
+            writing.write_whole(folder / name, "\n".join([*lines, ""]))
             records[name] = ""
     text = files.scene_text(tables)
     writing.write_whole(folder / f"{slug}.toml", text)

@@ -129,12 +129,14 @@ def worst_first(run: results.Run) -> list[tuple[results.Cell, results.Check | No
     failed: list[tuple[results.Cell, results.Check | None]] = [
         (cell, None) for cell in run.cells if cell.status != "done"
     ]
-    checks = [
-        (cell, check)
-        for cell, check in run.checks()
-        if check.weighs != "pass" and check.words != "no tolerance yet"
-    ]
-    return failed + sorted(checks, key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])))
+    return failed + sorted(
+        (
+            (cell, check)
+            for cell, check in run.checks()
+            if check.weighs != "pass" and check.words != "no tolerance yet"
+        ),
+        key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])),
+    )
 
 
 def times_table(run: results.Run) -> Table:
@@ -277,14 +279,14 @@ def runs_table(
         ]
         for cell in cells
     ]
-    texts = ("outcome and remarks", "history", "events")[: 1 if histories is None else 3]
     return Table(
         "models",
         [
             Column("model", kind="model"),
             text("settings"),
             *map(Column, ("run time", "against the reference", "set-up", "steps", "evaluations")),
-            *map(text, texts),
+            text("outcome and remarks"),
+            *(text(name) for name in ("history", "events") if histories is not None),
         ],
         rows,
         "Models, settings and run times",
@@ -409,8 +411,7 @@ def outcome_of(cell: results.Cell) -> str:
 
 def _side(outcome: str) -> str:
     """'left', 'right', or '' if the block does not overturn."""
-    words = outcome.split()
-    return words[1] if words and words[0] in ("overturned", "falling") else ""
+    return outcome.split()[1] if outcome.startswith(("overturned ", "falling ")) else ""
 
 
 def accuracy(run: results.Run) -> list[Block]:

@@ -91,10 +91,14 @@ _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 @contextmanager
 def speaking(voice: Voice) -> Iterator[None]:
     """Within this block commands print in this voice."""
-    say = (
-        (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
-    )
-    with within(_voice, voice), announcing(say):
+    with (
+        within(_voice, voice),
+        announcing(
+            (lambda words: print(f"rockcheck: {words}", file=sys.stderr))
+            if voice == "tables"
+            else None
+        ),
+    ):
         yield
 
 
@@ -131,9 +135,8 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
     These are vertical components, with a `hint` how to play them, and files that are no records.
     """
     vertical = [name for name in names if not isinstance(name, sets.Odd)]
-    said = f"vertical; {hint}" if hint else "vertical"
-    lines = [f"{', '.join(vertical)} ({said})"] if vertical else []
-    for line in [*lines, *(name for name in names if isinstance(name, sets.Odd))]:
+    said = f"{', '.join(vertical)} ({'; '.join(filter(None, ['vertical', hint]))})"
+    for line in [*([said] if vertical else []), *(n for n in names if isinstance(n, sets.Odd))]:
         console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 
@@ -174,8 +177,12 @@ def progress(title: str) -> Iterator[OnProgress]:
     (task,) = bar.tasks
 
     def on_progress(done: float, total: float, what: str = "") -> None:
-        words = f"{title}: {printable(what, 24)}" if what else title
-        bar.update(task.id, total=total, description=words, what=what)
+        bar.update(
+            task.id,
+            total=total,
+            description=f"{title}: {printable(what, 24)}" if what else title,
+            what=what,
+        )
         bar.advance(task.id, done - task.completed)  # what is read back counts for no time
 
     over = threading.Event()
@@ -192,8 +199,7 @@ def playing(
     title: str, models: Iterable[tuple[str, Mapping[str, Any]]]
 ) -> AbstractContextManager[OnProgress]:
     """Progress of `models` (family, settings) that play; it says if one may compile first."""
-    slow = any(compiles(*one) for one in models)
-    return progress(f"{title}, may compile first" if slow else title)
+    return progress(title + ", may compile first" * any(compiles(*one) for one in models))
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
@@ -264,8 +270,7 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
                 f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
                 "--set",
             )
-        key, value = setting_of(rest)
-        found[model][key] = value
+        found[model].update([setting_of(rest)])
     return found
 
 

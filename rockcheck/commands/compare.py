@@ -105,7 +105,6 @@ def _finding(
         for figure in found.figures
     ]
     models = f"{found.candidate} against {found.reference}"
-    notes = [f"note on the {role}: {note}" for role, one in histories.items() for note in one.notes]
     blocks: list[Block] = [
         Text(headline(found)),
         Text(
@@ -119,7 +118,14 @@ def _finding(
         ),
         Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
-        Text(items=notes, verdict="changed"),
+        Text(
+            items=[
+                f"note on the {role}: {note}"
+                for role, one in histories.items()
+                for note in one.notes
+            ],
+            verdict="changed",
+        ),
     ]
     return Finding(
         "comparison",

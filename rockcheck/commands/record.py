@@ -70,8 +70,12 @@ def run(
     if plot is not None and found:
         from rockcheck.reports.show.drawing import recordings_figure
 
-        drawn = [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-        save_figure(recordings_figure(drawn), plot)
+        save_figure(
+            recordings_figure(
+                [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
+            ),
+            plot,
+        )
     if found:
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
@@ -128,17 +132,11 @@ def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> No
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:
     """The records, and how they are read. Raises `InputError`."""
     given = dict(setting_of(word, "--read") for word in read)
-    if not records:
-        if given:
-            raise InputError("needs records", "--read")
-        return []
+    if given and not records:
+        raise InputError("needs records", "--read")
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
     reading = {name: value for name, value in recordings.Reading(**given) if value is not None}
-    return [
-        motions.RecordSet(
-            files=tuple(str(sets.record_path(word, Path()).absolute()) for word in records),
-            scale=scale,
-            vertical=vertical,
-            **reading,
-        )
-    ]
+    files = tuple(str(sets.record_path(word, Path()).absolute()) for word in records)
+    return (
+        [motions.RecordSet(files=files, scale=scale, vertical=vertical, **reading)] if files else []
+    )

@@ -4,7 +4,6 @@ And `rockcheck warm`: compiles the models' code ahead, in several processes, so 
 for no compiler.
 """
 
-import os
 import tempfile
 import time
 from collections import deque
@@ -46,10 +45,12 @@ def scenes() -> None:
     from rockcheck.reports.document import show
     from rockcheck.validation.suite.suites import named_suites
 
-    suites = {name: files.read_toml(path) for name, path in named_suites().items()}
     listings = {
         "scene": {name: files.load_scene(name).description for name in files.named_scenes()},
-        "suite": {name: one.get("description", "") for name, one in suites.items()},
+        "suite": {
+            name: files.read_toml(path).get("description", "")
+            for name, path in named_suites().items()
+        },
         "model": {name: family.summary for name, family in models.FAMILIES.items()},
     }
     tables = [
@@ -151,8 +152,10 @@ def run(
             f"{printable(path)}: cannot be written: {error.strerror}", "--output"
         ) from None
     motion = motion_of(history, what)
-    took = f"simulated in {history.cost.wall_seconds:.2g} s"
-    console().print(f"{title}: {', '.join([history.fate, *motion.words(), took])}")
+    console().print(
+        f"{title}: {', '.join([history.fate, *motion.words()])},"
+        f" simulated in {history.cost.wall_seconds:.2g} s"
+    )
     for note in history.notes:
         console().print(f"note: {note}", style="yellow", soft_wrap=True)
     for path in histories:
@@ -215,11 +218,11 @@ PARTS: Mapping[str, Callable[[], object]] = {
 }
 
 
-def compile_part(name: str) -> float:
-    """Compile one part of `PARTS`, or find it in the cache; returns how long that took, s."""
+def compile_part(name: str) -> tuple[str, float]:
+    """Compile one part of `PARTS`, or find it in the cache; returns it and its time, s."""
     began = time.perf_counter()
     PARTS[name]()
-    return time.perf_counter() - began
+    return name, time.perf_counter() - began
 
 
 def warm(jobs: JobsOption = None) -> None:
@@ -230,17 +233,16 @@ def warm(jobs: JobsOption = None) -> None:
     compiler.
     """
     from rockcheck.reports.document import show
+    from rockcheck.reports.drawers import side_by_side
 
     console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
     taken: dict[str, float] = {}
-    pool = Pool(min(jobs or os.cpu_count() or 1, len(PARTS)))
-    with progress("compiling") as on_progress, announcing(None), pool:
+    calls = [Call(compile_part, (name,)) for name in PARTS]
+    with progress("compiling") as on_progress, announcing(None):
         on_progress(0, len(PARTS), "")
-        for ended in pool.run(deque(Call(compile_part, (name,), key=name) for name in PARTS)):
-            if ended.error is not None:
-                raise ended.error
-            taken[ended.call.key] = ended.result
-            on_progress(len(taken), len(PARTS), ended.call.key)
+        for name, took in side_by_side(calls, jobs, least=1):
+            taken[name] = took
+            on_progress(len(taken), len(PARTS), name)
     seconds = {name: taken[name] for name in PARTS}
     columns = [text("compiled code for"), Column("s", digits=2)]
     show(Finding("warm", "", "", [Table("compiled", columns, list(seconds.items()))]), console())

@@ -145,13 +145,17 @@ def run(
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
-            jobs = played.jobs or os.cpu_count() or 1
-            page = site.write_site(folder, jobs=jobs, afresh=False, on_progress=on_progress)
+            page = site.write_site(
+                folder,
+                jobs=played.jobs or os.cpu_count() or 1,
+                afresh=False,
+                on_progress=on_progress,
+            )
     else:
         site.remove_site(folder)
     console().print(f"report: {page}", soft_wrap=True)
-    more = {} if suite.judged else {"left_out": suite.left_out}
-    answer(tables.summary(finished) | more | {"report": page})
+    left_out = {} if suite.judged else {"left_out": suite.left_out}
+    answer({**tables.summary(finished), **left_out, "report": page})
     raise typer.Exit(finished.exit_code)
 
 
@@ -195,9 +199,15 @@ def _scene(
 def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> results.Run:
     """Run a suite with a progress bar on stderr."""
     models = ((one.family, one.settings) for one in suite.models.values())
-    with playing(suite.name, models) as told:
-        how |= {"jobs": played.jobs, "scheduler": played.scheduler, "on_progress": told}
-        return run_suite(suite, folder, **how)
+    with playing(suite.name, models) as on_progress:
+        return run_suite(
+            suite,
+            folder,
+            jobs=played.jobs,
+            scheduler=played.scheduler,
+            on_progress=on_progress,
+            **how,
+        )
 
 
 def tell_faults(finished: results.Run, folder: Path) -> None:
@@ -206,15 +216,14 @@ def tell_faults(finished: results.Run, folder: Path) -> None:
     One of rockcheck's own models is to be reported, one of the user's own models to be mended.
     """
     for cell in finished.cells:
-        if not cell.traceback:
-            continue
-        where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
-        said = (
-            f"a fault of rockcheck itself, {where}: please report it with {path}"
-            if cell.unexpected
-            else f"{where}: traceback in {path}"
-        )
-        print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
+        if cell.traceback:
+            where, path = f"{cell.scene}, {cell.model}: {cell.reason}", folder / cell.traceback
+            said = (
+                f"a fault of rockcheck itself, {where}: please report it with {path}"
+                if cell.unexpected
+                else f"{where}: traceback in {path}"
+            )
+            print(printable(f"rockcheck: {said}", 1400), file=sys.stderr)
 
 
 def accept(
@@ -242,12 +251,12 @@ def accept(
     changes, refused = acceptance.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
     failed = finished.exit_code if finished.verdict == "error" else 0
-    done = "would be written to" if dry_run else "in"
     told(
         Finding(
             "accept",
             loaded.name,
-            f"{len(changes)} changes {done} {finished.tolerances_file}",
+            f"{len(changes)} changes {'would be written to' if dry_run else 'in'}"
+            f" {finished.tolerances_file}",
             [
                 Text(items=changes),
                 Text(items=[f"not accepted: {line}" for line in refused], verdict="fail"),
