@@ -72,13 +72,12 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
         chosen = str(
             suite or config.getini("rockcheck_suite") or (own if own.exists() else "paper")
         )
-        allowed = [
-            *config.getini("rockcheck_allow_code"),
-            *config.getoption("--rockcheck-allow-code"),
-        ]
         loaded = suites.load_suite(
             chosen if chosen in suites.named_suites() else config.rootpath / chosen,
-            allow_code=allowed,
+            allow_code=[
+                *config.getini("rockcheck_allow_code"),
+                *config.getoption("--rockcheck-allow-code"),
+            ],
         )
         run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
         cell = run.cell(scene, model)

@@ -33,7 +33,7 @@ from rockcheck.commands import (
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
-from rockcheck.scenes import Floats, Scene, errors, files, printable
+from rockcheck.scenes import Scene, errors, files, printable
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import name_of
@@ -128,11 +128,13 @@ def assess(
     failed.
     """
     given = files.load_uncertain_scene(scene)
-    words = [
-        word if "." in word.partition("=")[0] else f"{models.split(',')[0]}.{word}"
-        for word in settings or ()
-    ]
-    chosen = chosen_models(models, words)
+    chosen = chosen_models(
+        models,
+        [
+            word if "." in word.partition("=")[0] else f"{models.split(',')[0]}.{word}"
+            for word in settings or ()
+        ],
+    )
     clear: tuple[float, ...] = ()
     sides = tuple(wall.side for wall in given.scene.walls)
     if tried.gaps is not None:
@@ -195,12 +197,28 @@ def check_tried(
 
 
 def population_of(tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]) -> Population:
-    """What --levels asks for. Raises `InputError`.
+    """What --levels asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
 
     An incremental dynamic analysis of the `cases` under records; without any, the fragility under
     pulses of the scene's kind.
     """
-    measure, values = levels_of(tried.levels or "")
+    text = tried.levels or ""
+    *measures, low, high, count = ["", "", "", *text.split(":")]
+    try:
+        first, last, number = float(low), float(high), float(count)
+    except ValueError:
+        first = last = number = 0.0
+    if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
+        raise errors.InputError(
+            printable(
+                "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
+                f" {MOST_LEVELS} of them, not {text!r}",
+                160,
+            ),
+            "--levels",
+        )
+    measure = ":".join(filter(None, measures))
+    values = np.linspace(first, last, int(number))
     if not cases:
         if measure not in ("", "pga-ratio"):
             raise errors.InputError(
@@ -219,25 +237,6 @@ def population_of(tried: Tried, scene: Scene, cases: dict[str, files.UncertainSc
             if one.scene.vertical != scene.vertical
         },
     )
-
-
-def levels_of(text: str) -> tuple[str, Floats]:
-    """The measure and the intensities that MEASURE:LOW:HIGH:COUNT means. Raises `InputError`."""
-    *measure, low, high, count = ["", "", "", *text.split(":")]
-    try:
-        first, last, number = float(low), float(high), float(count)
-    except ValueError:
-        first = last = number = 0.0
-    if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
-        raise errors.InputError(
-            printable(
-                "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
-                f" {MOST_LEVELS} of them, not {text!r}",
-                160,
-            ),
-            "--levels",
-        )
-    return ":".join(filter(None, measure)), np.linspace(first, last, int(number))
 
 
 #: Nothing begins later than this; what was left out begins with the next run.
@@ -472,8 +471,10 @@ def conformance(
         wanted = WANTED.keys() - {"restitution"}
         if unknown := given.keys() - wanted:
             raise errors.unknown_name("setting", min(unknown), wanted)
-        tunes = tuple(Tune(name, tune, **given) for name in names)
-        studied(Tuning(tunes), replace(played, out=played.out / "tuned"))
+        studied(
+            Tuning(tuple(Tune(name, tune, **given) for name in names)),
+            replace(played, out=played.out / "tuned"),
+        )
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
     players = [named(*pair, given) for pair in itertools.product(names, kinds)]
@@ -486,8 +487,11 @@ def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool
     for name in names:
         models.check_allowed(name, allow_code)
         if name not in known and not (own and models.is_own(name)):
-            allowed = f"give one of {', '.join(known)}" + ", or module:Class" * own
-            raise errors.InputError(f"{printable(name)!r} is not allowed: {allowed}", "--engine")
+            raise errors.InputError(
+                f"{printable(name)!r} is not allowed: give one of {', '.join(known)}"
+                + ", or module:Class" * own,
+                "--engine",
+            )
         if reason := models.not_installed(name):
             raise errors.InputError(reason, f"--engine {name}")
 
