@@ -8,7 +8,7 @@ import platform
 import re
 import sys
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -78,10 +78,9 @@ def _turn(folder: Path) -> Iterator[None]:
     try:
         lock.acquire(timeout=SILENT)
     except Timeout:
-        other = ""
-        with suppress(errors.InputError):  # it has just gone, or has not said who it is
-            other = printable(reading.read_text(holder, most=1000))
-        whom = f"{other or 'another run'}, which holds {printable(folder / LOCK)}"
+        # Empty where it has just gone, or has not said who it is.
+        other = printable(reading.head_of(holder, 1000)) or "another run"
+        whom = f"{other}, which holds {printable(folder / LOCK)}"
         print(f"rockcheck: waiting up to {PATIENCE:g} s for {whom}", file=sys.stderr)
         try:
             lock.acquire(timeout=PATIENCE)
@@ -360,9 +359,11 @@ def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> N
 
 def _belongings(page: Path) -> set[str]:
     """The files of a scene's page, relative to the folder of pages."""
-    address = r'(?:href|src)="(?:pages/)?((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"'
     return {
-        *re.findall(address, reading.head_of(page, reading.MOST_BYTES)),
+        *re.findall(
+            r'(?:href|src)="(?:pages/)?((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"',
+            reading.head_of(page, reading.MOST_BYTES),
+        ),
         f"figures/{page.stem}-small.svg",
     }
 

@@ -88,6 +88,15 @@ class View:
         """How each model of the run looks."""
         return looks(self.run.models)
 
+    def references_among(self, known: Container[str]) -> tuple[str, ...]:
+        """The `known` models that others are held against here, the run's reference first."""
+        named = (
+            self.run.reference,
+            self.run.model_form,
+            *(figure.against for cell in self.cells for figure in cell.figures),
+        )
+        return tuple(model for model in dict.fromkeys(named) if model in known)
+
 
 @dataclass(frozen=True)
 class SceneView(View):
@@ -254,20 +263,13 @@ class SceneView(View):
             return []
         mode, t = np.asarray(channels["mode"]).astype(str), np.asarray(channels["t"], dtype=float)
         starts = np.flatnonzero(np.r_[True, mode[1:] != mode[:-1]])
-        ends = t[[*starts[1:], len(t) - 1]]
-        return list(zip(t[starts].tolist(), ends.tolist(), mode[starts].tolist(), strict=True))
+        ends = [*starts[1:], len(t) - 1]
+        return list(zip(t[starts].tolist(), t[ends].tolist(), mode[starts].tolist(), strict=True))
 
     @property
     def references(self) -> tuple[str, ...]:
         """Models with a history that others are held against here, the run's reference first."""
-        named = dict.fromkeys(
-            [
-                self.run.reference,
-                self.run.model_form,
-                *(figure.against for cell in self.cells for figure in cell.figures),
-            ]
-        )
-        return tuple(model for model in named if model in self.histories)
+        return self.references_among(self.histories)
 
     @property
     def figure_references(self) -> tuple[str | None, ...]:

@@ -72,8 +72,7 @@ def draw(spectrum: Spectrum, axes: Any) -> None:
     letters = np.array(["L", "S", "R"])[spectrum.outcomes - LEFT]
     letters[tuple(spectrum.undecided.T)] = "U"
     x, y = spectrum.frequency_ratios, spectrum.amplitude_ratios
-    law = () if spectrum.depends_on_law is None else spectrum.depends_on_law
-    _paint(axes, letters, x, y, free=not spectrum.scene.walls, law=law)
+    _paint(axes, letters, x, y, free=not spectrum.scene.walls, law=spectrum.depends_on_law)
     horizontal, vertical = axis_labels(spectrum.scene.excitation.kind == "record")
     axes.set(xlabel=horizontal, ylabel=vertical)
 
@@ -92,7 +91,7 @@ def _paint(axes: Any, letters: Any, x: Any, y: Any, *, free: bool, law: Any) -> 
         vmin=0,
         vmax=len(colours) - 1,
     )
-    if len(law):
+    if law is not None and len(law):
         i, j = np.transpose(law)
         axes.plot(np.asarray(x)[j], np.asarray(y)[i], **LAW_MARK)
     axes.grid(False)
@@ -137,7 +136,7 @@ def figure(plot: Plot) -> Figure:
             row, high, column = panel["place"]
             axes = figure.add_axes(place)
             letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
-            _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law", ()))
+            _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law"))
             axes.set_title(panel["title"], fontsize=7.0)
             axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
             # Where panels are two grid rows high, column 0 holds the panel without a wall, midway

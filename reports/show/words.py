@@ -13,7 +13,7 @@ import numpy as np
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
 from rockcheck.reports.style import SUPERSCRIPTS
-from rockcheck.scenes import Block, History, Record, Rest, Ricker, Scene, Sine, errors
+from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine, errors
 from rockcheck.validation import Discrepancy
 from rockcheck.validation.discrepancy import figures
 
@@ -61,6 +61,15 @@ def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:
     """(label, text) of a scene's block, floor, walls, excitation and duration."""
     block, tilt = scene.block, scene.initial_rotation
+    place = pivots = ""
+    if not block.homogeneous:
+        (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
+        place = (
+            f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
+            f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it; radius of gyration"
+            f" {number(math.sqrt(block.gyration_squared))} m"
+        )
+        pivots = f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"
     g = (
         ""
         if scene.gravity == figures.STANDARD_GRAVITY
@@ -89,7 +98,8 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
             f"{number(2 * block.half_width, 4)} m × {number(2 * block.half_height, 4)} m, α ="
             f" {number(block.alpha)} rad",
         ),
-        *mass_facts(block),
+        ("mass's centre", place),
+        ("pivots", pivots),
         ("p", f"{number(scene.frequency_parameter)} rad/s{g}"),
         ("floor", floor),
         ("wall" if len(scene.walls) < 2 else "walls", walls or "none"),
@@ -102,24 +112,6 @@ def scene_facts(scene: Scene) -> list[tuple[str, str]]:
         ("starts at", ", ".join(starts)),
     ]
     return [fact for fact in facts if fact[1]]
-
-
-def mass_facts(block: Block) -> list[tuple[str, str]]:
-    """Centre of mass, radius of gyration and alpha of both pivots; empty if homogeneous."""
-    if block.homogeneous:
-        return []
-    (x, z), left, right = block.offset, block.pivot("left"), block.pivot("right")
-    place = (
-        f"{number(abs(x))} m {'right' if x >= 0.0 else 'left'} of the box's,"
-        f" {number(abs(z))} m {'above' if z >= 0.0 else 'below'} it"
-    )
-    return [
-        (
-            "mass's centre",
-            f"{place}; radius of gyration {number(math.sqrt(block.gyration_squared))} m",
-        ),
-        ("pivots", f"left α = {number(left.alpha)} rad, right α = {number(right.alpha)} rad"),
-    ]
 
 
 def history_html(history: History) -> str:

@@ -306,12 +306,18 @@ def report_file(text: str) -> str:
     Returns its path, "" where it cannot be written.
     """
     try:
-        handle, path = tempfile.mkstemp(prefix="rockcheck-fault-", suffix=".txt")
-        with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as stream:
+        with tempfile.NamedTemporaryFile(
+            "w",
+            encoding="utf-8",
+            errors="backslashreplace",
+            prefix="rockcheck-fault-",
+            suffix=".txt",
+            delete=False,
+        ) as stream:
             stream.write(text)
     except OSError:
         return ""
-    return path
+    return stream.name
 
 
 def usable_folder(folder: Path, *parts: str) -> Path:

@@ -477,9 +477,8 @@ def conformance(
         )
     setup = given.pop("settings", None)
     kinds = ("best", "default") if setup == "both" else (setup,)
-    players = [named(*pair, given) for pair in itertools.product(names, kinds)]
-    players += map(written, folders)
-    studied(Conformance(tuple(players)), played)
+    players = (named(*pair, given) for pair in itertools.product(names, kinds))
+    studied(Conformance((*players, *map(written, folders))), played)
 
 
 def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool) -> None:

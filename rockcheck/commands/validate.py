@@ -250,7 +250,6 @@ def accept(
     finished = play(loaded, folder, played)
     changes, refused = acceptance.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
-    failed = finished.exit_code if finished.verdict == "error" else 0
     told(
         Finding(
             "accept",
@@ -267,7 +266,7 @@ def accept(
                 "file": finished.tolerances_file,
                 "written": not dry_run,
             },
-            exit_code=failed or int(bool(refused)),
+            exit_code=finished.exit_code if finished.verdict == "error" else int(bool(refused)),
         )
     )
 
