@@ -182,14 +182,19 @@ def measures_table(view: SceneView, against: str) -> Table:
 
     A row a measure and window, a column a model.
     """
+    shown = [
+        (cell.model, figure, check)
+        for cell in view.cells
+        for figure, check in (
+            *((check.figure, check) for check in cell.checks),
+            *((figure, None) for figure in cell.figures),
+        )
+        if figure.against == against
+    ]
     found: dict[tuple[str, str], dict[str, tuple[figures.Figure, results.Check | None]]] = {}
-    for cell in view.cells:
-        judged = [(check.figure, check) for check in cell.checks]
-        for figure, check in (*judged, *((figure, None) for figure in cell.figures)):
-            if figure.against == against:
-                row = found.setdefault((figure.measure, figure.window), {})
-                row.setdefault(cell.model, (figure, check))
-    models = [cell.model for cell in view.cells if any(cell.model in row for row in found.values())]
+    for model, figure, check in shown:
+        found.setdefault((figure.measure, figure.window), {}).setdefault(model, (figure, check))
+    models = list(dict.fromkeys(model for model, *_ in shown))
     firsts = {key: next(iter(row.values()))[0] for key, row in found.items()}
     return Table(
         "measures",
@@ -306,7 +311,6 @@ def _costs(cell: results.Cell, of: str, base: results.Cell | None) -> list[str]:
 
 #: One model in one scene, see `entry`.
 Entry = Mapping[str, Any]
-QUANTITY = "peak_rotation"
 #: What is drawn of an expected peak: the bias, and so many standard deviations below and above it.
 DEVIATIONS: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
 #: The figure of all peaks; no scene's file has such a name.
@@ -427,7 +431,7 @@ def accuracy(run: results.Run) -> list[Block]:
     trusts = {
         model: (
             across.trust_in(pairs[model]),
-            experience.trust_of(model, settings.get(model, {})).get(QUANTITY),
+            experience.trust_of(model, settings.get(model, {})).get("peak_rotation"),
         )
         for model in run.models
         if model in pairs

@@ -65,8 +65,7 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
         suite: str | Path | None = None,
         strict: bool | Literal["both"] = False,
     ) -> results.Cell:
-        from rockcheck.validation.suite import suites, tables
-        from rockcheck.validation.suite.runner import run_suite
+        from rockcheck.validation.suite import runner, suites, tables
 
         own = config.rootpath / "rockcheck.toml"
         chosen = str(
@@ -79,7 +78,9 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
                 *config.getoption("--rockcheck-allow-code"),
             ],
         )
-        run = run_suite(loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict)
+        run = runner.run_suite(
+            loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict
+        )
         cell = run.cell(scene, model)
         assert cell is not None
         if wrong := list(tables.cell_lines(cell, strict)):

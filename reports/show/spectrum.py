@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import Spectrum
-from rockcheck.ebm.spectrum import LEFT
+from rockcheck.ebm.spectrum import LEFT, Spectrum
 from rockcheck.reports.style import LOOKS, PAGE, Figure, figure_style
 from rockcheck.scenes import writing
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS

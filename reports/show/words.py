@@ -10,8 +10,7 @@ from itertools import chain, repeat, takewhile
 
 import numpy as np
 
-from rockcheck.ebm import Spectrum
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
 from rockcheck.reports.style import SUPERSCRIPTS
 from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine, errors
 from rockcheck.validation import Discrepancy

@@ -29,15 +29,13 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from rockcheck.reports.style import ENDINGS, kind_of, save_as
+from rockcheck.reports.style import ENDINGS, Figure, kind_of, save_as
 from rockcheck.scenes import InputError, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings import sets
 from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from rockcheck.validation.finding import Finding
     from rockcheck.validation.study import Study
 
@@ -49,13 +47,6 @@ OutOption = Annotated[
 ]
 JobsOption = Annotated[
     int | None, typer.Option("--jobs", min=1, help="Worker processes (default: one a core).")
-]
-SchedulerOption = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        help="Run on a Dask cluster instead: its address, or local:N for N local workers.",
-    ),
 ]
 AllowCodeOption = Annotated[
     list[str] | None,
@@ -73,7 +64,13 @@ class Played:
 
     out: OutOption = OUT
     jobs: JobsOption = None
-    scheduler: SchedulerOption = None
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            help="Run on a Dask cluster instead: its address, or local:N for N local workers.",
+        ),
+    ] = None
 
 
 PlotOption = Annotated[

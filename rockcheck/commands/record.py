@@ -32,13 +32,6 @@ ReadOption = Annotated[
         " from 1, or its name.",
     ),
 ]
-RecordsArgument = Annotated[
-    list[str] | None,
-    typer.Argument(
-        metavar="[RECORDS]...",
-        help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
-    ),
-]
 
 #: Parts of the line that pictures a motion, and its marks from the smallest acceleration to the
 #: largest.

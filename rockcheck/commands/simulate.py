@@ -34,9 +34,7 @@ from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import LISTENER, ONE_RUN, announcing, within
 from rockcheck.validation.discrepancy.compare import motion_of
-from rockcheck.validation.execute import models
-from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
-from rockcheck.validation.execute.store import TABLE, name_of
+from rockcheck.validation.execute import models, pool, store
 from rockcheck.validation.finding import Column, Finding, Table, text
 
 
@@ -131,7 +129,7 @@ def run(
         else models.build(model, given).simulate
     )
     what = files.load_scene(scene)
-    outputs = output or [Path(f"{name_of(what.name, model)}.csv")]
+    outputs = output or [Path(f"{store.name_of(what.name, model)}.csv")]
     figures = [path for path in outputs if path.suffix.lower()[1:] in FORMATS]
     histories = [path for path in outputs if path not in figures]
     checks = dict.fromkeys(histories, partial(check_format, more=f"; its figure as {ENDINGS}"))
@@ -182,10 +180,10 @@ def run(
 def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
     work = models.Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
-    with Pool(1) as pool:
-        (ended,) = pool.run(deque([Call(guarded, (models.play, work, scene))]))
+    with pool.Pool(1) as apart:
+        (ended,) = apart.run(deque([pool.Call(pool.guarded, (models.play, work, scene))]))
     result = ended.outcome
-    if isinstance(result, Failure):
+    if isinstance(result, pool.Failure):
         if result.refused:
             raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
@@ -193,7 +191,7 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
     with tempfile.TemporaryDirectory() as folder:
         for suffix, content in result.files.items():
             (Path(folder) / f"history{suffix}").write_bytes(content)
-        return History.load(Path(folder) / f"history{TABLE}")
+        return History.load(Path(folder) / f"history{store.TABLE}")
 
 
 def _begin(*names: str) -> None:
@@ -237,7 +235,7 @@ def warm(jobs: JobsOption = None) -> None:
 
     console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
     taken: dict[str, float] = {}
-    calls = [Call(compile_part, (name,)) for name in PARTS]
+    calls = [pool.Call(compile_part, (name,)) for name in PARTS]
     with progress("compiling") as on_progress, announcing(None):
         on_progress(0, len(PARTS), "")
         for name, took in side_by_side(calls, jobs, least=1):

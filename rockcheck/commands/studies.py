@@ -32,15 +32,12 @@ from rockcheck.commands import (
     tell_missing,
     usable_folder,
 )
-from rockcheck.commands.record import ReadOption, RecordsArgument, record_sets
+from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import Scene, errors, files, printable
 from rockcheck.validation.criteria import sampled
-from rockcheck.validation.execute import models
-from rockcheck.validation.execute.store import name_of
+from rockcheck.validation.execute import models, store
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
-from rockcheck.validation.studies.population.answers import Assessment
-from rockcheck.validation.studies.population.runs import gaps_of
-from rockcheck.validation.studies.population.study import CAPACITIES, Population, fragility, ida
+from rockcheck.validation.studies.population import answers, runs, study
 from rockcheck.validation.suite import motions
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
@@ -96,7 +93,13 @@ def assess(
     scene: Annotated[
         str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)
     ],
-    records: RecordsArgument = None,
+    records: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[RECORDS]...",
+            help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
+        ),
+    ] = None,
     models: Annotated[
         str,
         typer.Option(
@@ -138,14 +141,14 @@ def assess(
     clear: tuple[float, ...] = ()
     sides = tuple(wall.side for wall in given.scene.walls)
     if tried.gaps is not None:
-        clear, sides, changed = gaps_of(tried.gaps, given.scene)
+        clear, sides, changed = runs.gaps_of(tried.gaps, given.scene)
         given = files.UncertainScene(changed, given.spreads, given.correlation)
     sets = record_sets(records or (), read or ())
     cases, left_out = motions.under_records({given.scene.name: given}, sets, Path())
     check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
-    study = Assessment(
+    assessment = answers.Assessment(
         own=given,
         cases=named if records else cases,
         models=tuple(chosen),
@@ -160,7 +163,7 @@ def assess(
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
-    studied(study, played)
+    studied(assessment, played)
 
 
 def check_tried(
@@ -196,7 +199,9 @@ def check_tried(
             raise errors.InputError(said, option)
 
 
-def population_of(tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]) -> Population:
+def population_of(
+    tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]
+) -> study.Population:
     """What --levels asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
 
     An incremental dynamic analysis of the `cases` under records; without any, the fragility under
@@ -224,13 +229,13 @@ def population_of(tried: Tried, scene: Scene, cases: dict[str, files.UncertainSc
             raise errors.InputError(
                 f"{measure} needs records; of pulses it is pga-ratio", "--levels"
             )
-        return fragility(scene, values, PULSES)
-    return ida(
+        return study.fragility(scene, values, PULSES)
+    return study.ida(
         scene,
         [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],
         values,
         measure=measure or "pga",
-        capacities=tried.capacity or CAPACITIES,
+        capacities=tried.capacity or study.CAPACITIES,
         upward={
             name: one.scene.vertical
             for name, one in cases.items()
@@ -315,7 +320,7 @@ def spectrum(
         panels = paper_panels(*PAPER[what])
     else:
         scene = files.load_scene(what)
-        panels = (Panel(name_of(scene.name.replace(" ", "-")), scene.name, scene),)
+        panels = (Panel(store.name_of(scene.name.replace(" ", "-")), scene.name, scene),)
     # Beside a wall a block hops, which the pivot of the paper's figures forbids.
     hops = what not in PAPER and panels[0].wall is not None
     given = dict(setting_of(one) for one in settings or [])

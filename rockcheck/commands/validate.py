@@ -34,11 +34,8 @@ from rockcheck.commands import (
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, printable
 from rockcheck.validation.finding import Finding, Text
-from rockcheck.validation.suite import acceptance, across, results, suites, tables
-from rockcheck.validation.suite.runner import run_suite
+from rockcheck.validation.suite import acceptance, across, results, runner, suites, tables
 
-#: The folder of the trend's page.
-TREND = "trend"
 Strictness = Literal["worse", "both"]
 
 
@@ -141,7 +138,7 @@ def run(
         trend = across.trend_of(across.remember(history, moment))
         document.show(trend, console())
         if report:
-            where = document.publish(trend, usable_folder(folder, TREND))
+            where = document.publish(trend, usable_folder(folder, "trend"))
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
@@ -200,7 +197,7 @@ def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> resul
     """Run a suite with a progress bar on stderr."""
     models = ((one.family, one.settings) for one in suite.models.values())
     with playing(suite.name, models) as on_progress:
-        return run_suite(
+        return runner.run_suite(
             suite,
             folder,
             jobs=played.jobs,
