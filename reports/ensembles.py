@@ -131,8 +131,8 @@ class EnsembleView(View):
         if "excitation" in drawn.scene:
             return known
         instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
-        base = scene_facts(Scene(**{"name": self.name, **drawn.scene}))
-        return known + [fact for fact in base if not instead.get(fact[0])]
+        base = Scene(**{"name": self.name, **drawn.scene})
+        return known + [fact for fact in scene_facts(base) if not instead.get(fact[0])]
 
     def distributions(self) -> Plot:
         """Share of scenes with a peak below each value, by model; difference from the reference.

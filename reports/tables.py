@@ -11,7 +11,7 @@ from statistics import geometric_mean
 from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
-from rockcheck.reports.style import label_of, looks
+from rockcheck.reports.style import Look, label_of, looks
 from rockcheck.reports.view import FALL, SceneView, all_figures
 from rockcheck.scenes import experience
 from rockcheck.scenes.history import events_path
@@ -443,17 +443,15 @@ def accuracy(run: results.Run) -> list[Block]:
         10.0 ** math.floor(math.log10(0.8 * min(values))),
         10.0 ** math.ceil(math.log10(1.25 * max(values))),
     )
-    panels, rows = [], []
-    for model, (here, in_all) in trusts.items():
-        trust, (x, y) = in_all or here, zip(*pairs[model], strict=True)
-        lines = [
-            Series("", ends, ends, style="thin"),
-            *(_expected(trust, ends, styles[model].key) if trust else ()),
-            Series("", x, y, look=styles[model].key, style="points"),
-        ]
-        panels.append(Panel(styles[model].label, lines))
-        shown = [getattr(one, name, None) for one in (here, in_all) for name in ("bias", "scatter")]
-        rows.append([model, len(x), *shown])
+    panels = [
+        _predicted(styles[model], pairs[model], in_all or here, ends)
+        for model, (here, in_all) in trusts.items()
+    ]
+    rows = [
+        [model, len(pairs[model])]
+        + [getattr(one, name, None) for one in trust for name in ("bias", "scatter")]
+        for model, trust in trusts.items()
+    ]
     columns = [
         Column("model", kind="model"),
         Column("scenes_here"),
@@ -486,9 +484,29 @@ def accuracy(run: results.Run) -> list[Block]:
     ]
 
 
-def _expected(trust: experience.Trust, ends: tuple[float, float], look: str) -> list[Series]:
-    return [
-        Series("", ends, [trust.bias * factor * end for end in ends], look=look, style=style)
+def _predicted(
+    look: Look,
+    pairs: Sequence[tuple[float, float]],
+    trust: experience.Trust | None,
+    ends: tuple[float, float],
+) -> Panel:
+    """A point a pair of peaks, and the lines on which they are expected."""
+    expected = trust and [
+        Series(
+            "",
+            ends,
+            [trust.bias * math.exp(sigma * trust.scatter) * end for end in ends],
+            look=look.key,
+            style=style,
+        )
         for sigma, style in DEVIATIONS.items()
-        for factor in (math.exp(sigma * trust.scatter),)
     ]
+    x, y = zip(*pairs, strict=True)
+    return Panel(
+        look.label,
+        [
+            Series("", ends, ends, style="thin"),
+            *(expected or ()),
+            Series("", x, y, look=look.key, style="points"),
+        ],
+    )

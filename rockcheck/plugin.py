@@ -78,10 +78,9 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
                 *config.getoption("--rockcheck-allow-code"),
             ],
         )
-        run = runner.run_suite(
+        cell = runner.run_suite(
             loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict
-        )
-        cell = run.cell(scene, model)
+        ).cell(scene, model)
         assert cell is not None
         if wrong := list(tables.cell_lines(cell, strict)):
             pytest.fail("\n".join(wrong), pytrace=False)

@@ -263,8 +263,10 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         except MemoryError:
             return _told("out of memory; what was finished is kept", 3)
         except Exception as error:
-            program = f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
-            where = report_file("".join([program, *traceback.format_exception(error)]))
+            where = report_file(
+                f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
+                + "".join(traceback.format_exception(error))
+            )
             return _told(
                 f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
                 f" {where or f'this: {error}'}",

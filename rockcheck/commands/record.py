@@ -118,8 +118,15 @@ def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> No
         *(("note", printable(note, 200)) for note in record.notes),
     ]
     title = f"{path}, {record.component}" if record.component else str(path)
-    table = Table("record", [text("record"), text("value", " ")], rows)
-    show(Finding("record", title, "", [Text(title), table]), console())
+    show(
+        Finding(
+            "record",
+            title,
+            "",
+            [Text(title), Table("record", [text("record"), text("value", " ")], rows)],
+        ),
+        console(),
+    )
 
 
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:

@@ -143,8 +143,9 @@ def assess(
     if tried.gaps is not None:
         clear, sides, changed = runs.gaps_of(tried.gaps, given.scene)
         given = files.UncertainScene(changed, given.spreads, given.correlation)
-    sets = record_sets(records or (), read or ())
-    cases, left_out = motions.under_records({given.scene.name: given}, sets, Path())
+    cases, left_out = motions.under_records(
+        {given.scene.name: given}, record_sets(records or (), read or ()), Path()
+    )
     check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
     draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
     named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}

@@ -172,8 +172,12 @@ def _scene(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[suites.Suite, Path]:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
-    chosen = chosen_models(of_scene.models, of_scene.set or ())
-    suite = suites.scene_suite(name, chosen, records=sets, allow_code=allow_code)
+    suite = suites.scene_suite(
+        name,
+        chosen_models(of_scene.models, of_scene.set or ()),
+        records=sets,
+        allow_code=allow_code,
+    )
     folder = usable_folder(out)
     if of_scene.models == ALL:
         tell_missing()
