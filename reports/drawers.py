@@ -159,10 +159,11 @@ def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
 
     if axis.log:
         ax.set(**{f"{of}scale": "log"})
-        drawn = getattr(ax, f"{of}axis")
-        drawn.set_major_locator(LogLocator(numticks=7))
-        drawn.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
-        drawn.set_minor_locator(NullLocator())
+        getattr(ax, f"{of}axis").set(
+            major_locator=LogLocator(numticks=7),
+            major_formatter=FuncFormatter(lambda value, _: power_of_ten(value)),
+            minor_locator=NullLocator(),
+        )
     if axis.limits is not None:
         ax.set(**{f"{of}lim": axis.limits})
     if axis.ticks:

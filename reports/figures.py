@@ -341,9 +341,12 @@ def _differences(ax: Any, view: SceneView, channel: Channel, against: str) -> No
     for power in {min(low, top), top}:
         words = f"10{str(power).translate(SUPERSCRIPTS)}"
         ticks |= {10.0**power: words, -(10.0**power): f"−{words}"}
-    ax.set_yticks(list(ticks), list(ticks.values()))
+    ax.set(
+        yticks=list(ticks),
+        yticklabels=list(ticks.values()),
+        ylim=(-1.3 * largest, 1.3 * largest),
+    )
     ax.minorticks_off()
-    ax.set_ylim(-1.3 * largest, 1.3 * largest)
     ax.set_ylabel("difference", color="#555555", fontsize=6.5)
     ax.tick_params(axis="y", labelsize=5.5, colors="#555555")
 

@@ -380,15 +380,15 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
         excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
             tables[key] = {"kind": "record", "file": name, "scale": excitation.scale}
-            lines = (
-                f"# {re.sub(r'[^ -~]', '?', excitation.source)}",
-                "time_s,acceleration_m_s2",
-                *(
-                    f"{excitation.time_step * n:.12g},{value!r}"
-                    for n, value in enumerate(excitation.unscaled)
-                ),
+            rows = (
+                (f"{excitation.time_step * n:.12g}", value)
+                for n, value in enumerate(excitation.unscaled)
             )
-            writing.write_whole(folder / name, "\n".join([*lines, ""]))
+            writing.write_whole(
+                folder / name,
+                f"# {re.sub(r'[^ -~]', '?', excitation.source)}\n"
+                + writing.table_text(("time_s", "acceleration_m_s2"), rows),
+            )
             records[name] = ""
     text = files.scene_text(tables)
     writing.write_whole(folder / f"{slug}.toml", text)

@@ -301,18 +301,17 @@ def report(
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
         check_file(output, "--output")
-        written = part.write_figure(folder, scene[0], output)
-        console().print(f"figure: {written}", soft_wrap=True)
-        answer({"figure": written})
-        return
-    results.Run.load(folder)
-    with progress("pages") as on_progress:
-        index = site.write_site(
-            folder,
-            jobs=os.cpu_count() or 1,
-            afresh=not scene,
-            wanted=scene or (),
-            on_progress=on_progress,
-        )
-    console().print(f"report: {index}", soft_wrap=True)
-    answer({"report": index})
+        path = part.write_figure(folder, scene[0], output)
+    else:
+        results.Run.load(folder)
+        with progress("pages") as on_progress:
+            path = site.write_site(
+                folder,
+                jobs=os.cpu_count() or 1,
+                afresh=not scene,
+                wanted=scene or (),
+                on_progress=on_progress,
+            )
+    what = "report" if output is None else "figure"
+    console().print(f"{what}: {path}", soft_wrap=True)
+    answer({what: path})
