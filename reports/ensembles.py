@@ -52,7 +52,14 @@ class EnsembleView(View):
     @cached_property
     def references(self) -> tuple[str, ...]:
         """Models that others are held against here; the run's own reference first."""
-        return self.references_among(self.record.samples)
+        named = dict.fromkeys(
+            [
+                self.run.reference,
+                self.run.model_form,
+                *(figure.against for cell in self.cells for figure in cell.figures),
+            ]
+        )
+        return tuple(model for model in named if model in self.record.samples)
 
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:

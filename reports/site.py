@@ -296,9 +296,8 @@ class _Pages:
         figures = writing.made(self.folder, PAGES, FIGURES)
         blocks = tables.accuracy(self.run)
         (figures / f"{tables.PEAKS}.svg").unlink(missing_ok=True)
-        for block in blocks:
-            if isinstance(block, Plot):
-                save(figure_of(block), figures / block.name)
+        for plot in (block for block in blocks if isinstance(block, Plot)):
+            save(figure_of(plot), figures / plot.name)
         matrix = tables.matrix(self.run)
         write_page(
             self.folder,

@@ -399,18 +399,19 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
 
 def why_apart(cell: results.Cell) -> str:
     """Why an outcome other than the reference's is within tolerance; "" where it is not."""
-    if not cell.checks or cell.verdict != "pass":
-        return ""
     judged = any(check.figure.measure == "outcome_agrees" for check in cell.checks)
-    return f"not as the reference; {'accepted' if judged else 'not judged'}"
+    said = f"not as the reference; {'accepted' if judged else 'not judged'}"
+    return said if cell.checks and cell.verdict == "pass" else ""
 
 
 def outcome_of(cell: results.Cell) -> str:
     """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall."""
     last = results.value_of((f for f in all_figures(cell) if f.unit == "alpha"), "last_rotation")
-    if cell.outcome == "moving" and last is not None and abs(last) > FALL:
-        return f"falling {'left' if last > 0.0 else 'right'}"
-    return cell.fate
+    return (
+        f"falling {'left' if last > 0.0 else 'right'}"
+        if cell.outcome == "moving" and last is not None and abs(last) > FALL
+        else cell.fate
+    )
 
 
 def _side(outcome: str) -> str:

@@ -88,15 +88,6 @@ class View:
         """How each model of the run looks."""
         return looks(self.run.models)
 
-    def references_among(self, known: Container[str]) -> tuple[str, ...]:
-        """The `known` models that others are held against here, the run's reference first."""
-        named = (
-            self.run.reference,
-            self.run.model_form,
-            *(figure.against for cell in self.cells for figure in cell.figures),
-        )
-        return tuple(model for model in dict.fromkeys(named) if model in known)
-
 
 @dataclass(frozen=True)
 class SceneView(View):
@@ -269,7 +260,14 @@ class SceneView(View):
     @property
     def references(self) -> tuple[str, ...]:
         """Models with a history that others are held against here, the run's reference first."""
-        return self.references_among(self.histories)
+        named = dict.fromkeys(
+            [
+                self.run.reference,
+                self.run.model_form,
+                *(figure.against for cell in self.cells for figure in cell.figures),
+            ]
+        )
+        return tuple(model for model in named if model in self.histories)
 
     @property
     def figure_references(self) -> tuple[str | None, ...]:
@@ -368,7 +366,7 @@ class SceneView(View):
         return bool(self.scene.walls) and bool(self.with_pivot("bilateral"))
 
     @cached_property
-    def extent(self) -> tuple[float, float, float, float]:
+    def extent(self) -> tuple[float, ...]:
         """Left, right, bottom and top of everything that the block and the walls reach, m."""
         block = self.scene.block
         faces = (
@@ -383,12 +381,11 @@ class SceneView(View):
             up = block.half_diagonal * np.cos(block.box_angle - tilt)
             wide += [x - across, x + across]
             tall += [y - up, y + up]
-        left, right, bottom, top = (
+        return tuple(
             float(edge(np.concatenate(places)))
             for places in (wide, tall)
             for edge in (np.nanmin, np.nanmax)
         )
-        return left, right, bottom, top
 
 
 def scene_views(

@@ -47,14 +47,15 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
 
 def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
     """An excitation in a few words."""
-    if isinstance(excitation, Record):
-        return f"{excitation.source} × {number(excitation.scale)}, peak {number(excitation.peak)} g"
-    if isinstance(excitation, Rest):
-        return "at rest"
-    size = f"{number(excitation.amplitude)} m/s², period {number(excitation.period)} s"
-    if isinstance(excitation, Sine):
-        return f"sine, {size}, {excitation.cycles} cycles"
-    return f"{'symmetric' if excitation.symmetric else 'antisymmetric'} Ricker pulse, {size}"
+    match excitation:
+        case Record(source=source, scale=scale, peak=peak):
+            return f"{source} × {number(scale)}, peak {number(peak)} g"
+        case Sine(amplitude=amplitude, period=period, cycles=cycles):
+            return f"sine, {number(amplitude)} m/s², period {number(period)} s, {cycles} cycles"
+        case Ricker(amplitude=amplitude, period=period, symmetric=symmetric):
+            kind = "symmetric" if symmetric else "antisymmetric"
+            return f"{kind} Ricker pulse, {number(amplitude)} m/s², period {number(period)} s"
+    return "at rest"
 
 
 def scene_facts(scene: Scene) -> list[tuple[str, str]]:

@@ -11,7 +11,7 @@ import tempfile
 import threading
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
@@ -152,11 +152,15 @@ EVERY, EARLY = 10.0, 2.0
 
 
 @contextmanager
-def progress(title: str) -> Iterator[OnProgress]:
+def progress(
+    title: str, models: Iterable[tuple[str, Mapping[str, Any]]] = ()
+) -> Iterator[OnProgress]:
     """Show progress and the time left on stderr: a bar on a terminal, elsewhere lines.
 
-    Nothing is shown where a command is quiet.
+    It says if one of the `models` (family, settings) that play may compile first. Nothing is shown
+    where a command is quiet.
     """
+    title += ", may compile first" * any(compiles(*one) for one in models)
     screen = Console(stderr=True)
     bar = Progress(
         TextColumn("{task.description}"),
@@ -190,13 +194,6 @@ def progress(title: str) -> Iterator[OnProgress]:
             yield on_progress
         finally:
             over.set()
-
-
-def playing(
-    title: str, models: Iterable[tuple[str, Mapping[str, Any]]]
-) -> AbstractContextManager[OnProgress]:
-    """Progress of `models` (family, settings) that play; it says if one may compile first."""
-    return progress(title + ", may compile first" * any(compiles(*one) for one in models))
 
 
 def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:

@@ -13,7 +13,7 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -278,14 +278,14 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         return code if isinstance(code, int) else 0
 
 
+@dataclass(eq=False)
 class _Pipe:
     """A text stream whose reader may close it, as in `rockcheck scenes | head -1`.
 
     The rest of the text is dropped.
     """
 
-    def __init__(self, stream: Any) -> None:
-        self._stream = stream
+    _stream: Any
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)

@@ -22,7 +22,6 @@ from rockcheck.commands import (
     check_file,
     console,
     model_names,
-    playing,
     progress,
     report_file,
     save_figure,
@@ -137,7 +136,7 @@ def run(
         check_file(path, "--output", checks.get(path, kind_of))
     title = f"{what.name}, {model}"
     with (
-        playing(title, [(model, given)]) as on_progress,
+        progress(title, [(model, given)]) as on_progress,
         within(LISTENER, on_progress),
         within(ONE_RUN, True),
     ):

@@ -24,7 +24,6 @@ from rockcheck.commands import (
     completing,
     console,
     model_names,
-    playing,
     progress,
     tell_left_out,
     tell_missing,
@@ -35,8 +34,6 @@ from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, printable
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import acceptance, across, results, runner, suites, tables
-
-Strictness = Literal["worse", "both"]
 
 
 @dataclass(frozen=True)
@@ -87,7 +84,7 @@ def run(
         typer.Option("--force", help="Run every cell, also those whose results are up to date."),
     ] = False,
     strict: Annotated[
-        Strictness | None,
+        Literal["worse", "both"] | None,
         typer.Option(
             "--strict",
             help="Figures that left their drift band for the worse fail; with `--strict both`"
@@ -126,10 +123,15 @@ def run(
                 f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
             )
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
-    how: results.Strict = "both" if strict == "both" else strict is not None
     from rockcheck.reports import document, site
 
-    finished = play(suite, folder, played, force=force, strict=how)
+    finished = play(
+        suite,
+        folder,
+        played,
+        force=force,
+        strict="both" if strict == "both" else strict is not None,
+    )
     page = site.keep(finished, folder)
     document.show(tables.finding_of(finished), console())
     tell_faults(finished, folder)
@@ -200,7 +202,7 @@ def _scene(
 def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> results.Run:
     """Run a suite with a progress bar on stderr."""
     models = ((one.family, one.settings) for one in suite.models.values())
-    with playing(suite.name, models) as on_progress:
+    with progress(suite.name, models) as on_progress:
         return runner.run_suite(
             suite,
             folder,
