@@ -32,7 +32,6 @@ from rockcheck.reports.show.words import (
 from rockcheck.reports.style import (
     BY_KEY,
     LOOKS,
-    kind_of,
     label_of,
     looks,
     save,
@@ -185,7 +184,6 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     Returns the path; its ending is one of `style.FORMATS`. Raises `InputError` where the study has
     no such figure, or its data cannot be drawn within `DRAWING` s.
     """
-    kind_of(path)
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
     data = known[errors.one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:

@@ -3,8 +3,6 @@
 Tables or JSON go to stdout, progress to stderr.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile
@@ -15,7 +13,7 @@ from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import typer
 from rich.console import Console
@@ -34,10 +32,8 @@ from rockcheck.scenes import InputError, errors, named_scenes, printable, writin
 from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings import sets
 from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
-
-if TYPE_CHECKING:
-    from rockcheck.validation.finding import Finding
-    from rockcheck.validation.study import Study
+from rockcheck.validation.finding import Finding
+from rockcheck.validation.study import Study, run
 
 OUT = Path("rockcheck-report")
 
@@ -215,8 +211,6 @@ def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
 
 def studied(study: Study, options: Played, **how: Any) -> NoReturn:
     """Run a study with progress, write its page, print its finding; ends with its exit code."""
-    from rockcheck.validation.study import run
-
     folder = usable_folder(options.out)
     with progress(study.name) as on_progress:
         found = run(
@@ -247,8 +241,11 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
 
     Raises `InputError` for an unknown one.
     """
-    every = (name for name in FAMILIES if name != "measured" and not not_installed(name))
-    given = every if names == ALL else filter(None, map(str.strip, names.split(",")))
+    given = (
+        (name for name in FAMILIES if name != "measured" and not not_installed(name))
+        if names == ALL
+        else filter(None, map(str.strip, names.split(",")))
+    )
     found: dict[str, dict[str, Any]] = {name: {} for name in given}
     for name in found:
         family(name)

@@ -192,10 +192,11 @@ def test_a_fault_of_a_model_leaves_its_traceback(but_progress, folder, broken, c
 #: environment says so.
 _BROKEN = """
 import os, sys
-from rockcheck.commands import cli, validate
+from rockcheck.commands import cli
 from rockcheck.cm import ContinuousModel
-play = validate.run_suite
-validate.run_suite = lambda *given, **how: play(*given, **{**how, "jobs": 0})
+from rockcheck.validation.suite import runner
+play = runner.run_suite
+runner.run_suite = lambda *given, **how: play(*given, **{**how, "jobs": 0})
 if os.environ["BROKEN"]:
     def simulate(self, scene):
         raise AttributeError("broken")
