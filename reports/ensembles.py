@@ -236,11 +236,16 @@ class EnsembleView(View):
                     self.record.samples[cell.model].fallen,
                 )
                 counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
-                shown = (
-                    Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
-                    for name in STATISTICS_SHOWN
+                rows.append(
+                    [
+                        cell.model,
+                        *(int(np.sum(count)) for count in counts),
+                        *(
+                            Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
+                            for name in STATISTICS_SHOWN
+                        ),
+                    ]
                 )
-                rows.append([cell.model, *(int(np.sum(count)) for count in counts), *shown])
         return Table(
             f"against-{slugs_of([against])[against]}",
             [

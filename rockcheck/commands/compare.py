@@ -94,6 +94,14 @@ def run(
 def _finding(
     found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
 ) -> Finding:
+    # Whether outcomes agree, and how far rotations differ.
+    reference, candidate = (history.fate for history in found.histories)
+    rms = found.figure("theta_rms")
+    headline = (
+        f"same outcome, {candidate}"
+        if found["outcome_agrees"] == 1.0
+        else f"outcomes differ, {candidate} against {reference}"
+    ) + ("" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)")
     motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [
@@ -106,7 +114,7 @@ def _finding(
     ]
     models = f"{found.candidate} against {found.reference}"
     blocks: list[Block] = [
-        Text(headline(found)),
+        Text(headline),
         Text(
             facts=[(role, ", ".join(one.words())) for role, one in motions.items() if one.words()]
         ),
@@ -139,7 +147,7 @@ def _finding(
             "end": found.end,
             "shift": shift,
             "gap": found.gap,
-            "headline": headline(found),
+            "headline": headline,
             "motion": {role: motion.model_dump() for role, motion in motions.items()},
             "notes": {role: history.notes for role, history in histories.items()},
             "figures": [
@@ -148,19 +156,3 @@ def _finding(
             ],
         },
     )
-
-
-def headline(found: Discrepancy) -> str:
-    """The comparison in one sentence: whether outcomes agree, and how far rotations differ.
-
-    The difference is an RMS value.
-    """
-    reference, candidate = (history.fate for history in found.histories)
-    fate = (
-        f"same outcome, {candidate}"
-        if found["outcome_agrees"] == 1.0
-        else f"outcomes differ, {candidate} against {reference}"
-    )
-    rms = found.figure("theta_rms")
-    apart = "" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)"
-    return f"{fate}{apart}"
