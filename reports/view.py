@@ -244,8 +244,14 @@ class SceneView(View):
         model, height = next((one for one in heights if one[1] is not None), ("", None))
         if not height:
             return None
-        flights = (end - start for start, end, mode in self.spells(model) if mode == "flight")
-        return {"height": height, "model": model, "longest": max(flights, default=0.0)}
+        return {
+            "height": height,
+            "model": model,
+            "longest": max(
+                (end - start for start, end, mode in self.spells(model) if mode == "flight"),
+                default=0.0,
+            ),
+        }
 
     def spells(self, model: str) -> list[tuple[float, float, str]]:
         """The modes of motion of a model as (start in s, end in s, mode), one for each change."""

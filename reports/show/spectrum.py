@@ -252,8 +252,10 @@ def write_scripts(plot: Plot, folder: Path) -> list[str]:
         "panels": panels,
     }
     for what, content in (("Nodes", data), ("Histories", plot.played)):
-        place = f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]"
         writing.write_whole(
-            folder / f"{plot.name}.{what.lower()}.js", writing.script_text(place, content)
+            folder / f"{plot.name}.{what.lower()}.js",
+            writing.script_text(
+                f"(window.rockcheck{what} ??= {{}})[{json.dumps(plot.name)}]", content
+            ),
         )
     return ["pages/assets/animation.js", f"figures/{plot.name}.nodes.js", "pages/assets/nodes.js"]
