@@ -84,14 +84,10 @@ _voice: ContextVar[Voice] = ContextVar("voice", default="tables")
 @contextmanager
 def speaking(voice: Voice) -> Iterator[None]:
     """Within this block commands print in this voice."""
-    with (
-        within(_voice, voice),
-        announcing(
-            (lambda words: print(f"rockcheck: {words}", file=sys.stderr))
-            if voice == "tables"
-            else None
-        ),
-    ):
+    say = (
+        (lambda words: print(f"rockcheck: {words}", file=sys.stderr)) if voice == "tables" else None
+    )
+    with within(_voice, voice), announcing(say):
         yield
 
 
