@@ -18,7 +18,7 @@ import hashlib
 import json
 import re
 import time
-from collections import OrderedDict
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,8 +49,9 @@ class Store:
 
     folder: Path
     kinds: tuple[str, ...] = (HISTORIES, COMPARISONS)
-    _recent: OrderedDict[str, History] = field(
-        default_factory=OrderedDict, init=False, repr=False, compare=False
+    #: Those put or read last, with their names.
+    _recent: deque[tuple[str, History]] = field(
+        default_factory=lambda: deque(maxlen=RECENT), init=False, repr=False, compare=False
     )
 
     def __post_init__(self) -> None:
@@ -81,26 +82,20 @@ class Store:
             {**record, "files": {suffix: _hash(content) for suffix, content in files.items()}},
         )
         if history is not None:
-            self._remember(name, history)
+            self._recent.append((name, history))
 
     def load(self, name: str) -> History:
         """The history of that name, from memory if put or loaded lately, else from its file.
 
         Raises `InputError`.
         """
-        found = self._recent.get(name)
+        found = dict(self._recent).get(name)
         if found is None:
             for suffix in SUFFIXES:
                 reading.within(self.folder, HISTORIES, f"{name}{suffix}")
             found = History.load(self.folder / HISTORIES / f"{name}{TABLE}")
-        return self._remember(name, found)
-
-    def _remember(self, name: str, history: History) -> History:
-        self._recent[name] = history
-        self._recent.move_to_end(name)
-        if len(self._recent) > RECENT:
-            self._recent.popitem(last=False)
-        return history
+            self._recent.append((name, found))
+        return found
 
     def get(self, name: str) -> dict[str, Any] | None:
         """The record of a history whose files are whole, else None."""
