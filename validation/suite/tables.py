@@ -25,20 +25,16 @@ def shown(run: results.Run) -> tuple[str, ...]:
 
     Those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
     """
-    cells = run.by_scene()
-    if len(cells) <= MOST_SHOWN:
-        return tuple(cells)
-    ensembles = {ensemble.name for ensemble in run.ensembles}
-
-    def badness(place: str) -> tuple[int, float]:
-        of_place = cells[place].values()
-        shares = (used(check) for cell in of_place for check in cell.checks)
-        return results.SEVERITY.index(results.worst([cell.verdict for cell in of_place])), max(
-            shares, default=0.0
+    cells, ensembles = run.by_scene(), {ensemble.name for ensemble in run.ensembles}
+    badness = {
+        place: (
+            max(results.SEVERITY.index(cell.verdict) for cell in models.values()),
+            max((used(check) for cell in models.values() for check in cell.checks), default=0.0),
         )
-
-    scenes = [place for place in cells if place not in ensembles]
-    chosen = ensembles | set(sorted(scenes, key=badness, reverse=True)[:MOST_SHOWN])
+        for place, models in cells.items()
+        if place not in ensembles
+    }
+    chosen = ensembles.union(sorted(badness, key=badness.__getitem__, reverse=True)[:MOST_SHOWN])
     return tuple(place for place in cells if place in chosen)
 
 
