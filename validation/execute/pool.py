@@ -394,23 +394,16 @@ def connected(address: str) -> Iterator[Any]:
     count = local_workers(address)
     from distributed import Client, LocalCluster
 
-    if count:
-        with (
-            LocalCluster(
-                n_workers=count, threads_per_worker=1, dashboard_address="127.0.0.1:0"
-            ) as cluster,
-            Client(cluster) as client,
-        ):
-            yield client
-        return
-    try:
-        client = Client(address, timeout=10)
-    except (OSError, ValueError, TimeoutError) as error:
-        raise InputError(
-            f"{printable(address)!r}: no scheduler answers there: {printable(error)}",
-            "--scheduler",
-        ) from None
-    with client:
+    with ExitStack() as stack:
+        local = {"n_workers": count, "threads_per_worker": 1, "dashboard_address": "127.0.0.1:0"}
+        where = stack.enter_context(LocalCluster(**local)) if count else address
+        try:
+            client = stack.enter_context(Client(where, timeout=10))
+        except (OSError, ValueError, TimeoutError) as error:
+            raise InputError(
+                f"{printable(address)!r}: no scheduler answers there: {printable(error)}",
+                "--scheduler",
+            ) from None
         yield client
 
 

@@ -289,15 +289,17 @@ def _compute(
 
 def _windows(
     known: Mapping[str, Measure], extra: Iterable[str], horizon: float | None
-) -> Iterator[tuple[str, float | None, list[str]]]:
+) -> list[tuple[str, float | None, list[str]]]:
     """The whole time with all measures but those on request, and the windows of `extra`."""
     found = {"": [name for name, measure in known.items() if not measure.on_request]}
     for what in extra:
         name, _, window = what.partition("@")
         found.setdefault(window, []).append(name)
     ends = {"": None, tolerances.HORIZON: horizon}
-    for window, measures in found.items():
-        yield window, ends[window] if window in ends else float(window[:-1]), measures
+    return [
+        (window, ends[window] if window in ends else float(window[:-1]), measures)
+        for window, measures in found.items()
+    ]
 
 
 #: Quantities whose differences are explained, with their units.

@@ -461,14 +461,15 @@ def _variant(
             else str(folder / str(files))
             for scene, files in settings["files"].items()
         }
-    if not is_own(name):
-        build(name, settings)
-        return Work(label=label, family=name, settings=settings)
+    own = is_own(name)
     try:
         check_allowed(name, allow_code)
     except errors.InputError as error:
         raise errors.InputError(error.reason, f"models.{printable(label)}") from None
-    return Work(label=label, family=name, settings=settings, search_path=(str(folder.absolute()),))
+    if not own:
+        build(name, settings)
+    path = (str(folder.absolute()),) if own else ()
+    return Work(label=label, family=name, settings=settings, search_path=path)
 
 
 def _scenes(given: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
