@@ -248,13 +248,11 @@ class _Run:
 
     def _end(self, task: Task, result: Any) -> None:
         self.done[task] = result
-        if isinstance(result, pool.Failure):
-            if result.traceback:
-                writing.write_whole(
-                    writing.made(self.folder, FAULTS) / f"{self.study.file(task)}.txt",
-                    result.traceback,
-                )
-        else:
+        if traceback := getattr(result, "traceback", ""):  # a result may have one, too
+            writing.write_whole(
+                writing.made(self.folder, FAULTS) / f"{self.study.file(task)}.txt", traceback
+            )
+        if not isinstance(result, pool.Failure):
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import Scene, progress, writing
+from rockcheck.scenes import Scene, progress
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
@@ -176,9 +176,6 @@ class SuiteStudy(Study):
         self.ended[task] = kind.model_validate(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
-            writing.write_whole(
-                writing.made(self.store.folder, FAULTS) / f"{task.name}.txt", record.traceback
-            )
         elif task.ensemble is None:
             self.store.put(task.name, record.files, record.record, record.history)
             self._compare(task.place)
