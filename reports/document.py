@@ -5,7 +5,6 @@ Each block is rendered from one description. All pages have one look, made of th
 """
 
 import math
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -187,7 +186,7 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
     data = known[errors.one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:
-        (ended,) = pool.run(deque([Call(_draw_again, (data, path), DRAWING)]))
+        (ended,) = pool.run([Call(_draw_again, (data, path), DRAWING)])
     if ended.error is not None:
         raise InputError(f"{printable(data)}: no data of a figure: {ended.outcome.reason}")
     return path

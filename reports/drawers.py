@@ -4,7 +4,6 @@ Lines over axes, and what needs a drawer of its own.
 """
 
 import math
-from collections import deque
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal
 
@@ -250,7 +249,7 @@ def side_by_side(calls: Iterable[Call], jobs: int | None = None, least: int = 4)
 
     Yields their results as they end. A process takes a second to import what draws.
     """
-    waiting = deque(calls)
+    waiting = list(calls)
     jobs = min(jobs or cores(), len(waiting))
     if jobs < 2 or len(waiting) < least:
         yield from (call.function(*call.arguments) for call in waiting)

@@ -10,7 +10,6 @@ import math
 import os
 import time
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, fields, replace
@@ -217,7 +216,7 @@ class _Run:
         """Waves of tasks, until the study has no more."""
         while waiting := self._next():
             self._estimate(waiting)
-            calls = deque[pool.Call]()
+            calls: list[pool.Call] = []
             for task in waiting:
                 if task.where in self.elsewhere:
                     calls.append(

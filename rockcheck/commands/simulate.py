@@ -6,7 +6,6 @@ for no compiler.
 
 import tempfile
 import time
-from collections import deque
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import resources
@@ -180,7 +179,7 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
     """The history by a user-defined model, whose code is imported in a separate process."""
     work = models.Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
     with pool.Pool(1) as apart:
-        (ended,) = apart.run(deque([pool.Call(pool.guarded, (models.play, work, scene))]))
+        (ended,) = apart.run([pool.Call(pool.guarded, (models.play, work, scene))])
     result = ended.outcome
     if isinstance(result, pool.Failure):
         if result.refused:

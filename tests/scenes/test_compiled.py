@@ -12,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections import deque
 from pathlib import Path
 
 import numba
@@ -328,5 +327,5 @@ def test_a_worker_announces_on_the_runs_own_stderr(capfd):
         (contextlib.nullcontext(), ""),
     ):
         with hears, Pool(1) as pool:
-            assert [ended.error for ended in pool.run(deque(calls))] == [None, None]
+            assert [ended.error for ended in pool.run(calls)] == [None, None]
         assert capfd.readouterr() == ("", said)

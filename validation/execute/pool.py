@@ -18,7 +18,7 @@ import time
 import traceback
 import uuid
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
@@ -168,12 +168,12 @@ class Pool:
             for key, value in self._environment.items():
                 os.environ.pop(key, None) if value is None else os.environ.update({key: value})
 
-    def run(self, waiting: deque[Call], *, until: float = math.inf) -> Iterator[Ended]:
+    def run(self, calls: Iterable[Call], *, until: float = math.inf) -> Iterator[Ended]:
         """Run the calls, and yield each as it ends.
 
-        The caller may put calls into `waiting`, or take them out, meanwhile. Calls that have not
-        ended at `until` (of `time.monotonic`) are ended and not yielded.
+        Calls that have not ended at `until` (of `time.monotonic`) are ended and not yielded.
         """
+        waiting = deque(calls)
         running: dict[Future[Any], tuple[Call, float]] = {}
         told: set[Call] = set()
         try:
@@ -380,7 +380,7 @@ def alone(
         multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
         _mine.run, _mine.pool = run, Pool(1, memory_mb).__enter__()
         Finalize(None, _mine.pool.__exit__, (InterruptedError,), exitpriority=100)
-    (ended,) = _mine.pool.run(deque([Call(function, arguments, seconds)]))
+    (ended,) = _mine.pool.run([Call(function, arguments, seconds)])
     return ended.outcome
 
 

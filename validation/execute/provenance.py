@@ -101,10 +101,10 @@ def _kept(module: str) -> Path:
     """The cache file for the digest of one of our modules, named by a hash of all our sources."""
     spec = find_spec(OWN_PACKAGE)
     content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
-    for root in (Path(root) for root in (spec and spec.submodule_search_locations) or ()):
-        for folder in (root, *sorted(path for path in root.iterdir() if path.is_dir())):
-            for source in sorted(folder.rglob("*.py")):
-                content.update(source.name.encode() + b"\0" + source.read_bytes())
+    for root in map(Path, (spec and spec.submodule_search_locations) or ()):
+        # a folder below the root may be a link to the folder of the sources
+        for source in sorted((*root.glob("*.py"), *root.glob("*/**/*.py"))):
+            content.update(source.name.encode() + b"\0" + source.read_bytes())
     return (
         Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
         / "rockcheck"

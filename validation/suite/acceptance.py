@@ -118,9 +118,11 @@ def _bounds(check: results.Check, value: float) -> tuple[float, float]:
     measure = tolerances.MEASURES[check.figure.measure]
     size, at_least = abs(value - (measure.ideal or 0.0)), measure.sense == "at least"
     room, band = (OWN_ROOM, OWN_DRIFT) if measure.ideal is None else (ROOM, DRIFT)
-    limit = _round(max(room * size, LEAST_LIMIT * measure.resolution))
-    if at_least:
-        limit = _round(0.9 * value, down=True)
+    limit = (
+        _round(0.9 * value, down=True)
+        if at_least
+        else _round(max(room * size, LEAST_LIMIT * measure.resolution))
+    )
     drift = _round(max(band * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
     if measure.yes_no:
         limit, drift = size, 0.0  # 0: must be yes; 1: need not be

@@ -253,9 +253,9 @@ class Run(Stored):
         At least "fail" where there are faults, or where checks were asked for and none was made.
         """
         weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
-        found = worst(weighed + (["fail"] if self.faults else []))
         judged = any(check.verdict != "not defined" for _, check in self.checks())
-        return found if judged or not self.judged else worst([found, "fail"])
+        wrong = bool(self.faults) or (self.judged and not judged)
+        return worst(weighed + (["fail"] if wrong else []))
 
     @property
     def words(self) -> str:

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections import deque
 from concurrent.futures.process import BrokenProcessPool
 from xml.etree import ElementTree
 
@@ -265,7 +264,7 @@ def test_only_calls_that_compile_wait_for_each_other(tmp_path):
         *(Call(subprocess.run, (command,)) for command in plain),
     ]
     with Pool(2) as pool:
-        found = [ended.result for ended in pool.run(deque(calls))]
+        found = [ended.result for ended in pool.run(calls)]
     assert [one.returncode for one in found if one != 2.0] == [0, 0]
 
 
@@ -275,7 +274,7 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
         os.kill(min(pool._pool._pool_manager.worker_manager.workers), signal.SIGKILL)
         while pool._pool.active:
             time.sleep(0.01)
-        ended = pool.run(deque(Call(math.sqrt, (n * n,)) for n in range(20)))
+        ended = pool.run(Call(math.sqrt, (n * n,)) for n in range(20))
         first = next(ended).outcome
         pool._pool._pool_manager.handle_broken_pool(BrokenProcessPool("made up"))
         assert {first, *(one.outcome for one in ended)} == set(range(20))
