@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import scipy  # it loads its parts as they are used
 
 from rockcheck.scenes import Finite, Frozen, History, InputError, Scene, printable, reading
 from rockcheck.scenes.history import check_readable, outcome_of
@@ -152,8 +153,6 @@ def time_shift(reference: History, candidate: History) -> float:
     Both are resampled at the finer of their mean steps; the peak is a parabola's through three
     lags. Raises `InputError` where one does not rotate, so that nothing can be aligned.
     """
-    from scipy.signal import correlate, correlation_lags
-
     both = [history.channels for history in (reference, candidate)]
     for history in (reference, candidate):
         if len(history.channels["t"]) < 3 or not np.any(history.channels["theta"]):
@@ -163,8 +162,8 @@ def time_shift(reference: History, candidate: History) -> float:
     rotations = [
         np.interp(grid, one["t"], one["theta"]) for grid, one in zip(grids, both, strict=True)
     ]
-    product = correlate(rotations[0], rotations[1])
-    lags = correlation_lags(len(rotations[0]), len(rotations[1]))
+    product = scipy.signal.correlate(rotations[0], rotations[1])
+    lags = scipy.signal.correlation_lags(len(rotations[0]), len(rotations[1]))
     top, between = int(np.argmax(product)), 0.0
     if 0 < top < len(product) - 1:
         left, middle, right = product[top - 1 : top + 2]
@@ -191,8 +190,6 @@ def mean_history(tests: Sequence[History]) -> History:
     Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
     `InputError` where the tests have no time in common, or only some of them overturn.
     """
-    from scipy.stats import t as student
-
     first, *others = tests
     if not others:
         return first
@@ -223,7 +220,7 @@ def mean_history(tests: Sequence[History]) -> History:
     }
     if "slip" in stacked:
         scatter["last_slip"] = float(np.std(stacked["slip"][:, -1], ddof=1))
-    factor = student.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1) / np.sqrt(len(tests))
+    factor = scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(tests) - 1) / np.sqrt(len(tests))
     return dataclasses.replace(
         first,
         channels=channels,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+import scipy  # it loads its parts as they are used
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Floats, Pivot, Scene, kinematics
@@ -47,11 +48,9 @@ def _farthest(points: Floats, line: Floats) -> float:
 
     The nearest vertex is looked up in a tree, then the two segments that meet there are measured.
     """
-    from scipy.spatial import cKDTree
-
     if len(line) == 1:
         return float(np.max(np.linalg.norm(points - line[0], axis=1)))
-    nearest = cKDTree(line).query(points)[1]
+    nearest = scipy.spatial.cKDTree(line).query(points)[1]
     best = np.full(len(points), math.inf)
     for shift in (-1, 0):
         start = np.clip(nearest + shift, 0, len(line) - 2)
@@ -592,50 +591,40 @@ def _distributions(samples: Samples, fallen: float) -> tuple[Floats, Floats]:
 
 
 def _ks_distance(samples: Samples) -> tuple[float, str]:
-    from scipy.stats import ks_2samp
-
     r, c = (
         np.where(peaks < SMALLEST_PEAK, 0.0, peaks) for peaks in _distributions(samples, math.inf)
     )
     # The test takes no infinities, but only order counts.
     ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[1]
-    found = ks_2samp(ranks[: len(r)], ranks[len(r) :])
+    found = scipy.stats.ks_2samp(ranks[: len(r)], ranks[len(r) :])
     return float(found.statistic), f"p = {found.pvalue:.2g}"
 
 
 def _area_metric(samples: Samples) -> tuple[float, str]:
-    from scipy.stats import wasserstein_distance
-
-    return float(wasserstein_distance(*_distributions(samples, 1.0))), ""
+    return float(scipy.stats.wasserstein_distance(*_distributions(samples, 1.0))), ""
 
 
 def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
-    from scipy.stats import binomtest
-
     if of == 0:
         return 1.0, "none fall"
     count = int(np.sum(hits))
-    interval = binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
+    interval = scipy.stats.binomtest(count, of).proportion_ci(CONFIDENCE, method="wilson")
     return count / of, f"[{interval.low:.3f}, {interval.high:.3f}], {count} of {of}"
 
 
 def _peak_bias(samples: Samples) -> tuple[float, str]:
-    from scipy.stats import t
-
     ratios = samples.log_ratios()
-    most = t.ppf(0.5 + 0.5 * CONFIDENCE, len(ratios) - 1)
+    most = scipy.stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(ratios) - 1)
     half = float(most * np.std(ratios, ddof=1) / math.sqrt(len(ratios)))
     mean = float(np.mean(ratios))
     return mean, f"[{mean - half:.2g}, {mean + half:.2g}], {len(ratios)} scenes"
 
 
 def _peak_scatter(samples: Samples) -> tuple[float, str]:
-    from scipy.stats import chi2
-
     ratios = samples.log_ratios()
     scatter, free = float(np.std(ratios, ddof=1)), len(ratios) - 1
     low, high = (
-        scatter * math.sqrt(free / chi2.ppf(0.5 + sign * 0.5 * CONFIDENCE, free))
+        scatter * math.sqrt(free / scipy.stats.chi2.ppf(0.5 + sign * 0.5 * CONFIDENCE, free))
         for sign in (1.0, -1.0)
     )
     return scatter, f"[{low:.2g}, {high:.2g}]"
