@@ -51,6 +51,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import os
 from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -282,7 +283,8 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except errors.InputError as error:
-        told = str(error).startswith((printable(path.parent), f"{printable(path)}: "))
+        beside = f"{printable(path.parent)}{os.sep}"
+        told = str(error).startswith((beside, f"{printable(path)}: "))
         raise errors.InputError(str(error) if told else f"{printable(path)}: {error}") from None
 
 

@@ -97,5 +97,14 @@ walls = [{ restitution = 0.5 }]
 )
 def test_faults_are_one_line_with_the_file(suite, fault_of, text, fault):
     message = str(fault_of(suite, text))
-    assert fault in message
-    assert message.count("mine.toml") == 1 or "gone.toml" in message
+    assert (fault in message, message.count("mine.toml")) == (True, "gone.toml" not in message)
+
+
+def test_a_fault_names_a_file_in_a_folder_called_like_a_key(
+    written, tmp_path, monkeypatch, fault_of
+):
+    (tmp_path / "scenes").mkdir()
+    monkeypatch.chdir(written("scenes/mine.toml", MODELS).parents[1])
+    assert str(fault_of(suites.load_suite, "scenes/mine.toml")).startswith(
+        "scenes/mine.toml: scenes: no scene"
+    )
