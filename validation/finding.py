@@ -194,7 +194,6 @@ class Text:
     facts: Sequence[tuple[str, str]] = ()
     verdict: Verdict = ""
     on: Literal["all", "page"] = "all"
-    folded: bool = False
     block: ClassVar[str] = "text"
 
 

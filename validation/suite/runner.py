@@ -22,8 +22,6 @@ from rockcheck.validation.study import FAULTS, Study, run
 from rockcheck.validation.suite import comparing, motions, results, suites, tolerances
 from rockcheck.validation.uncertainty import numerical, population
 
-#: Parts of the cost that add up over the batches of an ensemble.
-ADDED = (*models.SUMMED, "worker_seconds")
 #: Remark on a gap in a measured history.
 SHIFTS = (
     "; `offset` of the measured model shifts its times, a window such as theta_rms@8s ends sooner"
@@ -392,7 +390,10 @@ class SuiteStudy(Study):
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
         about = self._about(batches, reason) | {
             "cost": results.CostRecord(
-                **{key: sum(getattr(one, key) for one in costs) for key in ADDED}
+                **{
+                    key: sum(getattr(one, key) for one in costs)
+                    for key in (*models.SUMMED, "worker_seconds")
+                }
             )
         }
         if about["status"] != "done":
