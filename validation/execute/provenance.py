@@ -121,21 +121,15 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
     found: dict[str, Path] = {}
     packages = {OWN_PACKAGE, module.split(".")[0]}
     waiting = [module]
-    followed: set[str] = set()
     while waiting:
         name = waiting.pop()
         path = _source(name, search_path) if name.split(".")[0] in packages else None
-        if path is None or name in followed:
-            continue
-        followed.add(name)
-        found[name] = path
-        parents = name.split(".")[:-1]
-        for parent in accumulate(parents, "{}.{}".format):
-            found.setdefault(parent, _source(parent, search_path) or path)
-        waiting += _imports(
-            path, name if path.name == "__init__.py" else ".".join(parents), packages, search_path
-        )
-    return found
+        if path and name not in found:
+            found[name] = path
+            package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+            waiting += _imports(path, package, packages, search_path)
+    above = {one for name in found for one in accumulate(name.split(".")[:-1], "{}.{}".format)}
+    return {one: path for one in above if (path := _source(one, search_path))} | found
 
 
 @cache
@@ -144,21 +138,16 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
 
     No code of `search_path` is run.
     """
-    parts = name.split(".")
-    # rockcheck's folders do not lie in each other
-    for depth in range(min(2, len(parts)) if parts[0] == OWN_PACKAGE else 1, 0, -1):
-        try:
-            spec = find_spec(".".join(parts[:depth]))
-        except (ModuleNotFoundError, ValueError):
-            continue
-        if spec is None and depth == 1:
-            spec = PathFinder.find_spec(parts[0], list(search_path))
-        if spec and spec.origin:
-            if depth == len(parts):
-                return Path(spec.origin)
-            base = Path(spec.origin).parent.joinpath(*parts[depth:])
-            return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
-    return None
+    top, *inner = name.split(".")
+    try:
+        spec = find_spec(top) or PathFinder.find_spec(top, list(search_path))
+    except ValueError:  # it is loaded, and does not say from where
+        return None
+    path = Path(spec.origin) if spec and spec.origin else None
+    if path and inner:
+        base = path.parent.joinpath(*inner)
+        return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
+    return path
 
 
 def _imports(
