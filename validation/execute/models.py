@@ -227,10 +227,6 @@ def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
         raise InputError(
             f"{printable(name)!r} is no model: it must be a class with a method `simulate`"
         )
-    if model_class.__module__.partition(".")[0] in sys.stdlib_module_names:
-        raise InputError(
-            f"{printable(name)!r} is no model: it is part of Python's standard library"
-        )
     for key in kind.fixed.keys() & settings.keys():
         raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
     try:
