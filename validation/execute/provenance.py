@@ -40,7 +40,7 @@ def cell_key(
     versions of its libraries and of Python, and the machine type. `search_path` holds folders in
     which a user-defined model may lie. Its source is read, not run.
     """
-    given = settings.get("files", {}).get(scene.name, [])
+    given = settings["files"].get(scene.name, []) if name == "measured" else []
     tables = map(Path, [given] if isinstance(given, str) else given)
     # of a measured history, and of its events
     files = [file for table in tables for file in (table, events_path(table)) if file.is_file()]

@@ -411,7 +411,7 @@ def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple
         (scene, label)
         for scene in scenes
         for label, model in models.items()
-        if scene in model.settings.get("files", {scene: ""})
+        if model.family != "measured" or scene in model.settings["files"]
     )
 
 

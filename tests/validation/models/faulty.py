@@ -14,6 +14,7 @@ class Still(Frozen):
     """A block that stands; `offset` shifts its theta (rad)."""
 
     offset: float = 0.0
+    files: tuple[str, ...] = ()
 
     def simulate(self, scene: Scene) -> History:
         state = np.zeros((len(scene.output_times), 6))

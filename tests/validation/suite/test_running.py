@@ -124,8 +124,11 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
 
 
 def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run):
-    models = STILL | {"b": 'model = "faulty:Still"\noffset = 1e-12'}
-    path = write_suite(tmp_path, models, FINE.format(model="a"))
+    path = write_suite(
+        tmp_path,
+        STILL | {"b": 'model = "faulty:Still"\noffset = 1e-12\nfiles = ["other"]'},
+        FINE.format(model="a"),
+    )
     code = tmp_path / "faulty.py"
     for file, old, new, played in (
         (path, "1e-12", "1e-12", ["still", "a", "b"]),
