@@ -12,7 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeVar
 
-from pydantic import TypeAdapter, field_validator
+from pydantic import TypeAdapter
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.horizon import may_fly, other_laws
@@ -113,13 +113,6 @@ class ComparisonRecord(Stored):
     figures: tuple[Compared, ...]
     impact_law: impact_laws.LawFollowed | None = None
     overturned_at: float | None = None
-
-    @field_validator("figures")
-    @classmethod
-    def _known(cls, figures: tuple[Compared, ...]) -> tuple[Compared, ...]:
-        if unknown := {one.figure.measure for one in figures} - tolerances.MEASURES.keys():
-            raise ValueError(f"unknown measures: {', '.join(sorted(unknown))}")
-        return figures
 
 
 def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
