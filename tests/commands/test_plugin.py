@@ -20,6 +20,16 @@ name = "my-scene"
 duration = 0.5
 block = { half_width = 0.4, half_height = 1.5 }
 floor = { friction = 0.5 }
+[[scene]]
+name = "odd"
+duration = 0.5
+block = { half_width = 0.4, half_height = 1.5 }
+floor = { friction = 0.5 }
+# what comes nearer to a reference is not better where that is itself not as expected
+[tolerances.odd.still.figures]
+last_rotation = { expected = 0.4, limit = 0.01, drift = 0.001, why = "a test" }
+[tolerances.odd.near.figures]
+last_rotation = { expected = 0.5, limit = 0.01, drift = 0.001, why = "a test" }
 [tolerances.my-scene.near.still]
 theta_peak = { expected = 0.0038, limit = 0.01, drift = 0.001, why = "a test" }
 theta_rms = { expected = 0.001, limit = 0.01, drift = 0.001, why = "a test" }
@@ -37,6 +47,8 @@ def test_reference(rockcheck_check):
     rockcheck_check("my-scene", model="still")
 def test_unknown(rockcheck_check):
     rockcheck_check("my-scene", model="nera")
+def test_odd(rockcheck_check):
+    rockcheck_check("odd", model="near")
 """
 
 
@@ -51,7 +63,7 @@ def pytester(pytester):
 def test_check_holds_a_cell_against_its_suite(pytester):
     pytester.makepyfile(TESTS)
     result = pytester.runpytest_subprocess("-p", "no:randomly", "-rf")
-    result.assert_outcomes(failed=5)
+    result.assert_outcomes(failed=6)
     result.stdout.fnmatch_lines(
         ["*models.still: 'faulty:Still' is code of your own; it runs only if*"]
     )
@@ -59,13 +71,14 @@ def test_check_holds_a_cell_against_its_suite(pytester):
     result = pytester.runpytest_subprocess(
         "-p", "no:randomly", "-rf", "--rockcheck-allow-code", "faulty:Fails"
     )
-    result.assert_outcomes(passed=1, failed=4)
+    result.assert_outcomes(passed=1, failed=5)
     result.stdout.fnmatch_lines(
         [
             "*my-scene, near: theta_rms against still: 0.003* was 0.001 (drift allowed 0.001)*",
             "*my-scene, broken: more than 10 events*",
             "*nothing is judged*",
             "*did you mean 'near'*",
+            "*odd, near: last_rotation: 0.003* is more than 0.01 from 0.5*",
         ]
     )
 
