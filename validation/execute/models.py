@@ -1,11 +1,10 @@
 """The models by the names that suites and the command line use, and how a worker plays them."""
 
-import dataclasses
 import importlib
 import sys
 import time
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -338,4 +337,4 @@ def _simulate(work: Work, scene: Scene) -> History:
             raise ModelFailure(f"{name} is {column[row]} at t = {returned.channels['t'][row]:g} s")
     if not len(returned.channels["t"]):
         raise ModelFailure("the history is empty")
-    return dataclasses.replace(returned, model=work.label)
+    return replace(returned, model=work.label)

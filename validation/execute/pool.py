@@ -24,8 +24,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from multiprocessing import resource_tracker
-from multiprocessing.util import Finalize
+from multiprocessing import resource_tracker, util
 from typing import Any, Self
 
 from rockcheck.scenes import InputError, ModelFailure, printable, progress
@@ -379,7 +378,7 @@ def alone(
         # this one ends with its worker (`pool.prepare`).
         multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
         _mine.run, _mine.pool = run, Pool(1, memory_mb).__enter__()
-        Finalize(None, _mine.pool.__exit__, (InterruptedError,), exitpriority=100)
+        util.Finalize(None, _mine.pool.__exit__, (InterruptedError,), exitpriority=100)
     (ended,) = _mine.pool.run([Call(function, arguments, seconds)])
     return ended.outcome
 

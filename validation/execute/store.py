@@ -74,8 +74,12 @@ class Store:
 
         `history` is the content of the files; if given, it stays in memory.
         """
-        for suffix, content in files.items():
-            writing.write_whole(self.folder / HISTORIES / f"{name}{suffix}", content)
+        writing.write_together(
+            {
+                self.folder / HISTORIES / f"{name}{suffix}": content
+                for suffix, content in files.items()
+            }
+        )
         self.put_record(
             HISTORIES,
             name,

@@ -2,7 +2,6 @@
 
 import itertools
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Literal
 
@@ -17,7 +16,7 @@ FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
 GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
 FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
 #: Results of long runs, as they come with the package.
-KEPT = Path(str(resources.files("rockcheck.validation"))) / "data" / "spectra"
+KEPT = Path(__file__).parents[1] / "data" / "spectra"
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,7 @@ from rockcheck.validation.finding import (
     Verdict,
     text,
 )
-from rockcheck.validation.paper import AMPLITUDES, FIGURES, GAPS, RESTITUTIONS
+from rockcheck.validation.paper import AMPLITUDES, FIGURES, GAPS, KEPT, RESTITUTIONS
 
 Mask = NDArray[np.bool_]
 Place = tuple[int, ...]
@@ -511,9 +510,7 @@ def stronger_is_safe(paper: Paper, sentence: Mapping[str, Any]) -> Beyond:
     )
 
 
-SENTENCES = tomllib.loads(
-    (Path(__file__).parents[1] / "data" / "paper" / "sentences.toml").read_text(encoding="utf-8")
-)
+SENTENCES = tomllib.loads((KEPT.parent / "paper" / "sentences.toml").read_text(encoding="utf-8"))
 #: "Generally": in more than this share of the cases.
 GENERALLY = 0.75
 #: Most exceptions from a sentence that are named beside its verdict.

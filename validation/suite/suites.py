@@ -49,14 +49,12 @@ table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. 
 
 from __future__ import annotations
 
-import functools
 import itertools
 import os
 from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
-from importlib import resources
+from functools import cached_property, reduce
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -85,7 +83,7 @@ from rockcheck.validation.suite.tolerances import (
 
 #: Time limit (s) of a simulation without a suite.
 UNJUDGED_SECONDS = 900.0
-DATA = Path(str(resources.files("rockcheck.validation"))) / "data"
+DATA = Path(__file__).parents[1] / "data"
 
 
 class Limits(Frozen):
@@ -507,7 +505,7 @@ def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]], folder: Pa
     if not all(isinstance(alternative.get("name"), str) for alternative in choice):
         raise errors.InputError("each alternative needs a name", "grid.axes")
     names = [str(part["name"]) for part in (base, *choice) if "name" in part]
-    table = {**functools.reduce(_merged, choice, base), "name": "-".join(names)}
+    table = {**reduce(_merged, choice, base), "name": "-".join(names)}
     return files.scene_from(table, folder=folder, default_name="scene")
 
 
