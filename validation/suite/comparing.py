@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.horizon import may_fly, other_laws
-from rockcheck.scenes import History, InputError, ModelFailure, Scene, files
+from rockcheck.scenes import History, InputError, ModelFailure, NonNegative, Scene, files
 from rockcheck.validation.discrepancy import impact_laws
 from rockcheck.validation.discrepancy.compare import compare, describe, too_short
 from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
@@ -65,11 +65,13 @@ class Planned(Task):
 
     def play(self) -> models.Played:
         """The history, or the peaks of a batch."""
-        if self.ensemble is None:
-            return models.play(self.variant, self.scene, uncertainty=self.uncertainty)
-        return models.play_batch(
-            self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
-        )
+        if self.ensemble is not None:
+            return models.play_batch(
+                self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
+            )
+        played = models.play(self.variant, self.scene, uncertainty=self.uncertainty)
+        CellRecord(**played.record)  # raises where a user-defined model's history says nonsense
+        return played
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on
@@ -83,7 +85,7 @@ class CellRecord(Stored):
     outcome: str
     notes: tuple[str, ...]
     settings: dict[str, Any]
-    uncertainty: dict[str, float]
+    uncertainty: dict[str, NonNegative]
     numerical: Numerical | None
     cost: results.CostRecord
 

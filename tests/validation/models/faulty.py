@@ -4,6 +4,7 @@ beside a test's suite."""
 import os
 import signal
 import time
+from typing import Any
 
 import numpy as np
 
@@ -11,16 +12,16 @@ from rockcheck.scenes import Event, Frozen, History, ModelFailure, Scene, observ
 
 
 class Still(Frozen):
-    """A block that stands; `offset` shifts its theta (rad)."""
+    """A block that stands; `offset` shifts its theta (rad), `files` are its notes."""
 
     offset: float = 0.0
-    files: tuple[str, ...] = ()
+    files: tuple[Any, ...] = ()
 
     def simulate(self, scene: Scene) -> History:
         state = np.zeros((len(scene.output_times), 6))
         state[:, 1] = scene.block.half_height
         state[:, 2] = self.offset
-        return observation.observe(scene, "still", state)
+        return observation.observe(scene, "still", state, notes=self.files)
 
 
 class NotFinite(Frozen):
@@ -53,9 +54,8 @@ class Hang(Frozen):
 
 
 class Hog(Frozen):
-    """Asks for 100 MB after 100 MB, at most 8 GB. It writes to none of it: a first write takes a
-    loaded machine seconds."""
-
+    # Asks for 100 MB after 100 MB, at most 8 GB. It writes to none of it: a first write takes a
+    # loaded machine seconds.
     def simulate(self, scene: Scene) -> History:
         taken = [np.zeros(100 * 2**17) for _ in range(80)]
         return Still(offset=float(taken[0][0])).simulate(scene)

@@ -80,7 +80,9 @@ def test_figures_are_the_same_from_memory_and_from_files(tmp_path):
 @pytest.mark.filterwarnings("default")
 @pytest.mark.parametrize("where", [{"jobs": 2}, {"scheduler": "local:2"}], ids=["here", "cluster"])
 def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run, where):
-    models = {name: f'model = "faulty:{name}"' for name in OWN_NAMES}
+    models = {name: f'model = "faulty:{name}"' for name in OWN_NAMES} | {
+        "Odd": 'model = "faulty:Still"\nfiles = [1]'
+    }
     done = run(write_suite(tmp_path, models, FINE.format(model="Still"), seconds=15.0), **where)
     reasons = {cell.model: cell.reason for cell in done.cells}
     assert "memory" in reasons.pop("Hog").lower()
@@ -92,6 +94,7 @@ def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run, where):
         "Fails": "more than 10 events",
         "Bug": "ZeroDivisionError: a bug?of two lines",
         "NotFinite": "theta is nan at t = 0.5 s",
+        "Odd": "notes.0: 1 is not allowed: input should be a valid string",
     }
     assert (done.cell("short", "Still").verdict, done.exit_code) == ("pass", 3)
 
