@@ -65,13 +65,18 @@ class Planned(Task):
 
     def play(self) -> models.Played:
         """The history, or the peaks of a batch."""
-        if self.ensemble is not None:
-            return models.play_batch(
+        if self.ensemble is None:
+            played = models.play(self.variant, self.scene, uncertainty=self.uncertainty)
+        else:
+            played = models.play_batch(
                 self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
             )
-        played = models.play(self.variant, self.scene, uncertainty=self.uncertainty)
-        CellRecord(**played.record)  # raises where a user-defined model's history says nonsense
+        self.record(played.record)  # a user-defined model's history may say nonsense
         return played
+
+    def record(self, given: Mapping[str, Any]) -> "CellRecord | BatchRecord":
+        """The record of what was played or kept; raises `InputError` where it is none."""
+        return BatchRecord(**given) if self.ensemble else CellRecord(**given)
 
 
 #: Reference cell, or None for a cell's own measures; and extra measures, over a window or on

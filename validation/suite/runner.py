@@ -160,8 +160,7 @@ class SuiteStudy(Study):
         found = store.get_record(COMPARISONS, task.name) if task.ensemble else store.get(task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
-            kind = comparing.BatchRecord if task.ensemble else comparing.CellRecord
-            self.ended[task] = kind.model_validate(found)
+            self.ended[task] = task.record(found or {})
             self.read_back.add(task)
         return self.ended.get(task)
 
@@ -170,8 +169,7 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        kind = comparing.BatchRecord if task.ensemble else comparing.CellRecord
-        self.ended[task] = kind.model_validate(record.record)
+        self.ended[task] = task.record(record.record)
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
         elif task.ensemble is None:
