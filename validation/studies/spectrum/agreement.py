@@ -18,7 +18,13 @@ from rockcheck.engines.engine import Engine
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
 from rockcheck.validation.paper import Panel
-from rockcheck.validation.studies.spectrum.tiles import SETTLE, Book, Request, letters_of
+from rockcheck.validation.studies.spectrum.tiles import (
+    SETTLE,
+    UNDECIDED,
+    Book,
+    Request,
+    letters_of,
+)
 
 CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
 #: The share of the nodes that a model plays, where it is not all. These engines draw no map: fewer
@@ -50,8 +56,7 @@ def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.i
     )
     near: NDArray[np.bool_] = most != least
     random = np.random.default_rng(zlib.crc32(name.encode()))
-    decided = np.ones(near.shape, dtype=bool)
-    decided[tuple(spectrum.undecided.T)] = False
+    decided = letters_of(spectrum.outcomes, spectrum.undecided) != UNDECIDED
     inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
     wanted = max(min(count // 2, len(inside)), min(count - len(outside), len(inside)))
     return [
@@ -134,10 +139,11 @@ def _shares(
         )
         i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
         how = panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
-        if not plays(one, panel) or (found := book.outcomes(*how)) is None:
+        if not plays(one, panel):
             continue
+        outcomes, failed = book.outcomes(*how)
         ends = [len(chosen[0][: halves[0]])]
-        mine, fine = np.split(found[0], ends), np.split(~found[1], ends)
+        mine, fine = np.split(outcomes, ends), np.split(~failed, ends)
         sides.setdefault(one.model, mine)
         for part in (0, 1):
             yield {

@@ -137,21 +137,20 @@ class Spectra(Study):
 
     def _stem(self, panel: Panel) -> str:
         """The name of a spectrum's files: the panel's, and the model's unless it is the paper's."""
-        model = self.request.model
-        return panel.name if model == "ebm" else f"{panel.name}--{model}"
+        return panel.name + ("" if self.request.model == "ebm" else f"--{self.request.model}")
 
     def _found(self, book: tiles.Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
-        spectra: dict[Panel, Spectrum] = {}
-        motions: dict[Panel, tiles.Played] = {}
+        found = {panel: self._spectrum(book, panel) for panel in self.panels}
+        spectra = {panel: one for panel, one in found.items() if one is not None}
         fast = tiles.compiled(models.build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
-        for panel in self.panels:
-            one = self._spectrum(book, panel)
-            nodes = self._nodes(panel.scene, i.ravel(), j.ravel(), "motions") if fast else []
-            (motions[panel],) = book.ask(nodes) or [tiles.Played()]
-            if one is not None:
-                spectra[panel] = one
+        motions = {
+            panel: book.ask(self._nodes(panel.scene, i.ravel(), j.ravel(), "motions"))[0]
+            if fast
+            else tiles.Played()
+            for panel in self.panels
+        }
         whole = len(spectra) == len(self.panels)
         return (
             spectra,
@@ -176,13 +175,13 @@ class Spectra(Study):
             else ()
         )
         one = book.spectrum(panel, request)
-        laws = [
+        played = (
             book.spectrum(panel, request, {**request.settings, "impacts": law}) for law in others
-        ]
-        known = [law for law in laws if law is not None]
-        if one is None or not laws or len(known) < len(laws):
+        )
+        laws = [law for law in played if law is not None]
+        if one is None or not laws or len(laws) < len(others):
             return one
-        return replace(one, depends_on_law=tiles.differing(one, known))
+        return replace(one, depends_on_law=tiles.differing(one, laws))
 
     def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
         one = self.request
@@ -191,7 +190,7 @@ class Spectra(Study):
         )
 
     def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
-        scanned: dict[Any, Any] = {
+        scanned = {
             measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
                 one.scene,
                 measures.SCANNED,
@@ -203,9 +202,7 @@ class Spectra(Study):
             if one.scene.name in measures.SCANNED_WALLS
         }
         struck = [(one, *measures.near_one_impact(one)) for one in spectra if not one.scene.walls]
-        records: list[Any] = [
-            book.ask(self._nodes(one.scene, i, j, "one impact")) for one, i, j in struck
-        ]
+        records = [book.ask(self._nodes(one.scene, i, j, "one impact")) for one, i, j in struck]
         if book.wanted:
             return None
         tongues = {}

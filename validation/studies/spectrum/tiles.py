@@ -265,11 +265,10 @@ class Request:
             ("frequencies", self.frequency_range),
             ("amplitudes", self.amplitude_range),
         ):
-            said = f"{low:g} to {high:g} is not allowed"
-            if not (0.0 < low < math.inf and math.isfinite(high)):
-                raise InputError(f"{said}: give positive finite numbers", f"--{name}")
-            if low >= high:
-                raise InputError(f"{said}: the lower end comes first", f"--{name}")
+            usable = 0.0 < low < math.inf and math.isfinite(high)
+            if not usable or low >= high:
+                what = "the lower end comes first" if usable else "give positive finite numbers"
+                raise InputError(f"{low:g} to {high:g} is not allowed: {what}", f"--{name}")
             object.__setattr__(self, name, np.linspace(low, high, self.size))
 
 
@@ -284,26 +283,19 @@ class Book:
     done: Mapping[Any, Any]
     wanted: list[Nodes] = field(default_factory=list)
 
-    def ask(self, tasks: Sequence[Nodes]) -> list[Played] | None:
-        """Their records, None where some are still to be played.
-
-        All nodes of a task that failed are undecided.
-        """
-        missing = [task for task in tasks if task not in self.done]
-        self.wanted += missing
-        if missing:
-            return None
+    def ask(self, tasks: Sequence[Nodes]) -> list[Played]:
+        """Their records; nodes of a task that failed, or is still to be played, are undecided."""
+        self.wanted += [task for task in tasks if task not in self.done]
         return [
-            Played(UNDECIDED * len(task.amplitudes)) if isinstance(one, pool.Failure) else one
-            for task, one in ((task, self.done[task]) for task in tasks)
+            one
+            if isinstance(one := self.done.get(task), Played)
+            else Played(UNDECIDED * len(task.amplitudes))
+            for task in tasks
         ]
 
-    def outcomes(self, *nodes: Any) -> Outcomes | None:
+    def outcomes(self, *nodes: Any) -> Outcomes:
         """Sides (-1, 0, +1) and failures of the nodes of `nodes_of`."""
-        found = self.ask(nodes_of(*nodes))
-        if found is None:
-            return None
-        letters = np.array([*"".join(one.letters for one in found)])
+        letters = np.array([*"".join(one.letters for one in self.ask(nodes_of(*nodes)))])
         return np.select(
             [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)], [LEFT, RIGHT], SAFE
         ).astype(np.int8), letters == UNDECIDED
@@ -313,10 +305,11 @@ class Book:
 
         Refinement then begins again with all that is known.
         """
+        before = len(self.wanted)
 
         def known(scene: Scene, a: Floats, f: Floats) -> Outcomes:
             found = self.outcomes(scene, a, f, request.model, settings or request.settings)
-            if found is None:
+            if len(self.wanted) > before:
                 raise _Waiting
             return found
 
@@ -334,10 +327,8 @@ class Book:
 
 def differing(spectrum: Spectrum, others: Sequence[Spectrum]) -> NDArray[np.int64]:
     """The decided nodes (i, j), a row each, that differ from a decided one of another spectrum."""
-    differ = np.zeros(spectrum.outcomes.shape, dtype=bool)
-    for other in others:
-        own = spectrum.outcomes != other.outcomes
-        for one in (spectrum, other):
-            own[tuple(one.undecided.T)] = False
-        differ |= own
-    return np.argwhere(differ)
+    own, *laws = (letters_of(one.outcomes, one.undecided) for one in (spectrum, *others))
+    decided = own != UNDECIDED
+    return np.argwhere(
+        np.any([decided & (law != UNDECIDED) & (law != own) for law in laws], axis=0)
+    )
