@@ -55,9 +55,9 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
             and one.wall("right") is not None
         )
 
-    assert shrink(scene, shows, seconds=-1.0) == (scene, False)
+    assert shrink(scene, shows, 0) == (scene, False)
     for trials, whole in ((3, False), (2000, True)):
-        small, complete = shrink(scene, shows, trials=trials)
+        small, complete = shrink(scene, shows, trials)
         assert (shows(small), complete) == (True, whole)
     assert 0.5 < small.block.radius < 2.0
     assert len(small.excitation.unscaled) < 20
@@ -92,7 +92,7 @@ def test_work_is_all_runs_once_and_what_is_lost_is_halved():
     assert [(half.first, half.count) for half in halves] == [(0, 2), (2, 3)]
     assert halves[1].seconds < whole.seconds
     assert parts(Chunk("ebm", 1, 2, 1)) == []
-    shrinking = Shrinking(Broken("ebm", "mirror", 1, 3, 1.0), 10.0)
+    shrinking = Shrinking(Broken("ebm", "mirror", 1, 3, 1.0), 400)
     assert [part.trials for part in parts(shrinking)] == [shrinking.trials // 4]
     assert parts(dataclasses.replace(shrinking, trials=1)) == []
 

@@ -246,21 +246,16 @@ FIRST: dict[str | int, int] = {"vertical": 0, "excitation": 1}
 
 
 def shrink(
-    scene: Scene,
-    shows: Callable[[Scene], bool],
-    *,
-    trials: int = MOST_TRIALS,
-    seconds: float = math.inf,
+    scene: Scene, shows: Callable[[Scene], bool], trials: int = MOST_TRIALS
 ) -> tuple[Scene, bool]:
     """A minimal scene that `shows` the failure as `scene` does.
 
     No single simplification can be made without losing the failure. Ends after this many `trials`
-    or `seconds` with the scene found by then; the second value is then false.
+    with the scene found by then; the second value is then false.
     """
-    until = time.monotonic() + seconds
     simpler = _simpler(scene)
     while one := next(simpler, None):
-        if trials == 0 or time.monotonic() > until:
+        if trials == 0:
             return scene, False
         trials -= 1
         if shows(one):
@@ -479,15 +474,14 @@ def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") ->
 
 @dataclass(frozen=True)
 class Shrinking(Task):
-    """The search for a smaller scene that fails in the same way, limited in trials and s."""
+    """The search for a smaller scene that fails in the same way, in so many trials."""
 
     broken: Broken
-    budget: float
-    trials: int = MOST_TRIALS
+    trials: int
     label = "smallest scenes"
 
     def play(self) -> str:
-        """The file of the smallest scene that was found in time."""
+        """The file of the smallest scene that was found."""
         broken, name = self.broken, self.broken.invariant
         most = math.inf if name == "ends" else 100.0 * INVARIANTS[name].bound
 
@@ -505,30 +499,23 @@ class Shrinking(Task):
 
         if not shows(broken.scene):
             return broken.text(broken.scene, "as it was found: it does not fail again")
-        scene, complete = shrink(broken.scene, shows, trials=self.trials, seconds=self.budget)
+        scene, complete = shrink(broken.scene, shows, self.trials)
         return broken.text(
-            scene,
-            ""
-            if complete
-            else "not the smallest: time was over before all that is simpler was tried",
+            scene, "" if complete else "not the smallest: not all that is simpler was tried"
         )
 
 
-def chunk(model: str, seed: int, first: int, count: int) -> Chunk:
-    """These runs as a task.
+def limits(model: str, runs: int) -> dict[str, Any]:
+    """For a `Task`: time limit and usual time (s) of so many runs, and what they compile.
 
-    Its time limit is far more than it takes, and short enough for a hang to be found soon.
+    The limit is far more than they take, and short enough for a hang to be found soon.
     """
     a_run = A_RUN if isinstance(PLAYERS[model], EventBased) else AN_APPROXIMATE_RUN
-    return Chunk(
-        model,
-        seed,
-        first,
-        count,
-        seconds=PATIENCE + count * a_run,
-        expected=count * a_run / AMPLE,
-        compiles=models.compiles(model.split()[0]),
-    )
+    return {
+        "seconds": PATIENCE + runs * a_run,
+        "expected": runs * a_run / AMPLE,
+        "compiles": models.compiles(model.split()[0]),
+    }
 
 
 def parts(task: Task) -> Sequence[Task]:
@@ -536,9 +523,10 @@ def parts(task: Task) -> Sequence[Task]:
     if isinstance(task, Chunk) and task.count > 1:
         half = task.count // 2
         return [
-            chunk(task.model, task.seed, task.first, half),
-            chunk(task.model, task.seed, task.first + half, task.count - half),
+            replace(task, first=first, count=count, **limits(task.model, count))
+            for first, count in ((task.first, half), (task.first + half, task.count - half))
         ]
     if isinstance(task, Shrinking) and task.trials > 1:
-        return [replace(task, trials=task.trials // 4)]
+        fewer = task.trials // 4
+        return [replace(task, trials=fewer, **limits(task.broken.model, fewer))]
     return []

@@ -39,13 +39,14 @@ from rockcheck.validation.studies.stress.invariants import (
 from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
+    MOST_TRIALS,
     PLAYERS,
     Broken,
     Chunk,
     EventBased,
     RunTotals,
     Shrinking,
-    chunk,
+    limits,
     parts,
 )
 from rockcheck.validation.study import Study, Task
@@ -289,9 +290,8 @@ def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
 What = Literal["all", "runs", "maps"]
 #: Runs in one task: event-based ones, others.
 CHUNK, APPROXIMATE_CHUNK = 250, 20
-#: How long (s) all failures may be shrunk, one process at work, in a whole run and in a quick one;
-#: the part of that for one of them; and how much later a process whose trial hangs is ended.
-SHRINKING, SHRINKING_QUICK, ONE_FAILURE, HANGING = 120.0, 10.0, 0.25, 5.0
+#: Trials by which all failures may be shrunk, in a whole run and in a quick one.
+SHRINKING, SHRINKING_QUICK = 6000, 600
 #: Listed movements of a block that should stand still, and their units.
 MOVES = {"creep": "R", "sinking": "R", "rotation": "α", "uplift": "R", "jitter": "√(gR)"}
 
@@ -329,12 +329,9 @@ class Stress(Study):
             for one in totals.shown
             if (one.model, one.number) not in gone
         ]
-        budget = (SHRINKING_QUICK if self.quick else SHRINKING) * min(
-            ONE_FAILURE, 1.0 / max(1, len(small))
-        )
-        return work + [
-            Shrinking(one, budget, seconds=budget + HANGING, expected=0.5 * budget) for one in small
-        ]
+        every = SHRINKING_QUICK if self.quick else SHRINKING
+        trials = min(MOST_TRIALS, every // max(1, len(small)))
+        return work + [Shrinking(one, trials, **limits(one.model, trials)) for one in small]
 
     def _chunks(self) -> Iterator[Chunk]:
         """The runs, the slowest models first, so that all cores end together."""
@@ -349,7 +346,8 @@ class Stress(Study):
             most = CHUNK if isinstance(player, EventBased) else APPROXIMATE_CHUNK
             most = max(10, min(most, count // 4)) if self.quick else most
             for first in range(0, count, most):
-                yield chunk(label, self.seed, first, min(most, count - first))
+                runs = min(most, count - first)
+                yield Chunk(label, self.seed, first, runs, **limits(label, runs))
 
     def _totals(self, done: Mapping[Any, Any]) -> list[RunTotals]:
         """Totals of the models; a run whose process was lost counts as one that does not end."""
