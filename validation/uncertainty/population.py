@@ -216,11 +216,8 @@ class Inputs(Stored):
 
         Of theta_rms the RMS over time of half the band's width, alpha.
         """
-        if name == "theta_rms":
-            return self.theta_band
-        return next(
-            (max(f.high - f.value, f.value - f.low) for f in self.figures if f.name == name), None
-        )
+        farther = {f.name: max(f.high - f.value, f.value - f.low) for f in self.figures}
+        return (farther | {"theta_rms": self.theta_band}).get(name)
 
 
 def propagate(
@@ -257,10 +254,13 @@ def propagate(
     ended = np.arange(found.out.shape[1]) >= found.rows[:, None]
     theta = np.where(ended, found.motion["theta"][:, None], found.out)[1:]
     low, high = _ends(theta / given.scene.block.alpha)
-    slips = np.empty(len(scenes))
-    for n, (scene, end) in enumerate(zip(scenes, found.motion.tolist(), strict=True)):
-        ((x, _, tilt, *_),) = natural.to_si(scene, np.array([end]))
-        slips[n] = kinematics.slip(scene.block, x, tilt)
+    slips = np.array(
+        [
+            kinematics.slip(scene.block, x, tilt)
+            for scene, end in zip(scenes, found.motion.tolist(), strict=True)
+            for x, _, tilt, *_ in natural.to_si(scene, np.array([end]))
+        ]
+    )
     stands, fallen = found.side == 0, found.side[1:] != 0
     share = binomtest(int(np.sum(fallen)), count).proportion_ci(
         measures.CONFIDENCE, method="wilson"
@@ -324,8 +324,9 @@ def sensitivities(
         return np.array([peaks, found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
-    chance = np.random.default_rng(seed)
-    found = sobol_indices(func=peak_and_fall, n=samples, dists=laws, rng=chance)
+    found = sobol_indices(
+        func=peak_and_fall, n=samples, dists=laws, rng=np.random.default_rng(seed)
+    )
     # of one input scipy gives numbers in place of rows
     first, total = (np.reshape(some, (2, -1))[0] for some in (found.first_order, found.total_order))
     if not np.any(total):

@@ -267,15 +267,17 @@ def _in_units(scene: Scene, history: History) -> None:
                 " SI units unless their names say otherwise, such as x_mm, theta_deg"
             )
     turned = float(np.max(np.abs(history.channels["theta"])))
-    if turned > math.pi:
-        raise errors.ModelFailure(
-            f"unit? theta reaches {turned:.4g} rad: degrees are called theta_deg"
-        )
-    if turned < 1.0 and t[-1] < 0.9 * scene.duration - scene.output_step:
-        raise errors.ModelFailure(
-            f"unit? t ends at {t[-1]:.4g} s, and the scene at {scene.duration:g} s: milliseconds"
-            " are called t_ms"
-        )
+    early = turned < 1.0 and t[-1] < 0.9 * scene.duration - scene.output_step
+    for wrong, said in (
+        (turned > math.pi, f"theta reaches {turned:.4g} rad: degrees are called theta_deg"),
+        (
+            early,
+            f"t ends at {t[-1]:.4g} s, and the scene at {scene.duration:g} s: milliseconds are"
+            " called t_ms",
+        ),
+    ):
+        if wrong:
+            raise errors.ModelFailure(f"unit? {said}")
 
 
 def _card(player: Player, found: Mapping[str, Seen | pool.Failure]) -> Card:

@@ -448,8 +448,7 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
 
     A block that falls counts as 1 alpha.
     """
-    forms = dict(found.apart)
-    laws = forms.pop(LAW, ())
+    forms = [apart for model, apart in found.apart.items() if model != LAW]
     peaks = [[run.peak for run in runs] for runs in found.runs.values() if runs]
     inputs = found.own.inputs
     squares: dict[str, list[float]] = {
@@ -462,8 +461,8 @@ def contributions_of(found: Found) -> list[dict[str, Any]]:
             ),
         ],
         STEPS: _by_steps(found),
-        LAW: [(0.5 * difference) ** 2 for difference in laws],
-        "model form": np.square(list(itertools.chain(*forms.values()))).tolist(),
+        LAW: [(0.5 * difference) ** 2 for difference in found.apart.get(LAW, ())],
+        "model form": np.square(list(itertools.chain(*forms))).tolist(),
     }
     variance = {source: float(np.mean(some)) for source, some in squares.items() if some}
     total = sum(variance.values()) or 1.0
@@ -713,20 +712,22 @@ def _by_hand(found: Found) -> Answer:
 
 def _models(found: Found) -> Iterator[Block]:
     """How far the other models are from the first, and what the suites know of them."""
-    rows = []
-    for model, apart in found.apart.items():
-        trust = experience.trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
-        rows.append(
-            [
-                "floor-first law of impacts" if model == LAW else model,
-                len(apart),
-                sum(run.fell for run in found.others[model].values()),
-                float(np.sqrt(np.mean(np.square(apart)))) if apart else None,
-                max(map(abs, apart), default=None),
-                trust and trust.bias,
-                trust and trust.scatter,
-            ]
-        )
+    trusted = {
+        model: experience.trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
+        for model in found.apart
+    }
+    rows = [
+        [
+            "floor-first law of impacts" if model == LAW else model,
+            len(apart),
+            sum(run.fell for run in found.others[model].values()),
+            float(np.sqrt(np.mean(np.square(apart)))) if apart else None,
+            max(map(abs, apart), default=None),
+            (trust := trusted[model]) and trust.bias,
+            trust and trust.scatter,
+        ]
+        for model, apart in found.apart.items()
+    ]
     if rows:
         yield Table(
             "models",

@@ -148,10 +148,7 @@ class Certainty(OneScene):
 
     def depends(self) -> Any:
         """Also what is not known of the scene, where it is drawn."""
-        if self.given is None:
-            return super().depends()
-        return (
-            super().depends(),
+        return super().depends(), self.given and (
             {name: spread.model_dump() for name, spread in self.given.spreads.items()},
             self.given.correlation.tolist(),
         )

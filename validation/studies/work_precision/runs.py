@@ -222,22 +222,21 @@ _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (1e-2, 1e-3, 1e-4, 3e-5)
 #: Three steps tell an order; the CM's step is 3/sqrt(k/m), k/m = g/penetration: 8e-4, 9e-5 and 1e-5
 #: s.
-_CONVERGE = {"mujoco": 3, "pybullet": 3, "pymunk": 3, "dart": 2, "drake": 2}
 _REFINED, _PENETRATIONS = (1e-3, 1e-4, 4e-5), (1e-6, 1e-8, 1e-10)
 _LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
-#: The dearer a step, the fewer of them: the time of the whole benchmark is limited.
-ENGINE_STEPS = {
-    "mujoco": _STEPS,
-    "pybullet": _STEPS,
-    "pymunk": _STEPS[:3],
-    "dart": _STEPS[:3],
-    "drake": _STEPS[:2],
-    "box2d": _STEPS[:3],
-    "physx": _STEPS[:3],
-    "jolt": _STEPS[:3],
+#: Engines: their steps, those of convergence, which is not measured in single precision, and
+#: whether their steps can vary. The dearer a step, the fewer of them: the time of the whole
+#: benchmark is limited.
+ENGINES = {
+    "mujoco": (_STEPS, _REFINED, True),
+    "pybullet": (_STEPS, _REFINED, True),
+    "pymunk": (_STEPS[:3], _REFINED, True),
+    "dart": (_STEPS[:3], _REFINED[:2], True),
+    "drake": (_STEPS[:2], _REFINED[:2], False),
+    "box2d": (_STEPS[:3], (), False),
+    "physx": (_STEPS[:3], (), False),
+    "jolt": (_STEPS[:3], (), False),
 }
-#: Engines whose steps cannot vary. Convergence is not measured for those in single precision.
-FIXED = ("drake", "box2d", "physx", "jolt")
 LINES = {
     line.label: line
     for line in (
@@ -263,7 +262,7 @@ LINES = {
         ),
         *(
             line
-            for engine, steps in ENGINE_STEPS.items()
+            for engine, (steps, refined, varies) in ENGINES.items()
             for line in (
                 DiagramLine(
                     engine,
@@ -272,7 +271,7 @@ LINES = {
                     steps,
                     # without the finest one, which costs more than all others together
                     quick=steps[: max(len(steps) - 1, 2)],
-                    converge=_REFINED[: _CONVERGE.get(engine, 0)],
+                    converge=refined,
                 ),
                 DiagramLine(
                     f"{engine} adaptive",
@@ -291,7 +290,7 @@ LINES = {
                     quick=_STEPS[:2],
                 ),
             )
-            if engine not in FIXED or "adaptive" not in line.label
+            if varies or "adaptive" not in line.label
         ),
     )
 }
@@ -481,7 +480,7 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
 
 def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind; `family` is the kind."""
-    engines = _ordered(frame[[LINES[line].model in ENGINE_STEPS for line in frame.line]], "line")
+    engines = _ordered(frame[[LINES[line].model in ENGINES for line in frame.line]], "line")
     return points_of(
         pd.concat(
             engines[engines.family.str.startswith(starts)].assign(family=kind)

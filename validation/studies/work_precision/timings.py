@@ -591,10 +591,8 @@ def _started(model: Any) -> Any:
 
     data = mujoco.MjData(model)
     tilt, pose = _TILTED.initial_rotation, _TILTED.initial_state
-    if model.nq == 3:
-        data.qpos[:] = pose[:3]
-    else:
-        data.qpos[:] = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
+    free = pose[0], 0.0, pose[1], math.cos(0.5 * tilt), 0.0, -math.sin(0.5 * tilt), 0.0
+    data.qpos[:] = pose[:3] if model.nq == 3 else free
     return data
 
 
