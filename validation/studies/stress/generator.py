@@ -152,12 +152,14 @@ def _scene(
         start.pop("initial_height", None)
     if kind == "no-slip":
         start.pop("initial_velocity", None)
-    settings["floor"] = Floor(
-        friction=mu,
-        static_friction=None if mu_s == mu or kind == "bouc-wen" else mu_s,
-        restitution=bounce,
-    )
-    settings["output_step"] = settings["duration"] / ROWS
+    settings |= {
+        "floor": Floor(
+            friction=mu,
+            static_friction=None if mu_s == mu or kind == "bouc-wen" else mu_s,
+            restitution=bounce,
+        ),
+        "output_step": settings["duration"] / ROWS,
+    }
     for key in doubtful:
         try:
             return Scene(**settings, **start)

@@ -142,8 +142,7 @@ class Motion:
         block, gravity, channels = scene.block, scene.gravity, history.channels
         t, theta = channels["t"], channels["theta"]
         self.scene, self.history, self.channels = scene, history, channels
-        self.radius = block.radius
-        self.unit = math.sqrt(block.radius / gravity)
+        self.radius, self.unit = block.radius, math.sqrt(block.radius / gravity)
         self.u: Floats = scene.excitation.acceleration(t) / gravity
         self.vertical: Floats = scene.vertical.acceleration(t) / gravity
         self.w: Floats = channels["theta_dot"] * self.unit
@@ -165,8 +164,7 @@ class Motion:
         left, right = (
             self.gaps.get(side, np.full(len(t), np.inf)) < CLOSED for side in ("left", "right")
         )
-        self.tip = np.where(sign < 0.0, right, left)
-        self.far = np.where(sign < 0.0, left, right)
+        self.tip, self.far = np.where(sign < 0.0, (right, left), (left, right))
 
     def within(self, *modes: str) -> Mask:
         """The rows in these modes of motion."""

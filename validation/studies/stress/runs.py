@@ -154,7 +154,6 @@ class Approximate(Player):
         return played
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
-        """Plays a scene and checks its history."""
         try:
             history = models.build(self.label, self.settings(scene, number)).simulate(scene)
         except (ModelFailure, InputError) as error:
@@ -304,12 +303,10 @@ def _simpler(scene: Scene) -> Iterator[Scene]:
 def _places(part: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     if path:
         yield path, part
-    if isinstance(part, dict):  # name and step are never dropped or rounded
-        inner = [(key, part[key]) for key in part if key not in ("name", "output_step")]
-    else:
-        inner = list(enumerate(part)) if isinstance(part, list) and len(part) <= SHORT else []
-    for key, value in inner:
-        yield from _places(value, (*path, key))
+    short = isinstance(part, list) and len(part) <= SHORT
+    for key, value in part.items() if isinstance(part, dict) else enumerate(part if short else ()):
+        if key not in ("name", "output_step"):  # these are never dropped or rounded
+            yield from _places(value, (*path, key))
 
 
 def _with(tables: dict[str, Any], path: Path, *value: Any) -> dict[str, Any]:
@@ -364,8 +361,8 @@ class Broken:
             remark,
             " ".join([f"rockcheck simulate {self.name} --model {model}", *options]),
         )
-        tables = files.tables_of(scene)
-        tables.pop("name", None)  # it is the file's own
+        # the name is the file's own
+        tables = {key: part for key, part in files.tables_of(scene).items() if key != "name"}
         return files.scene_text(tables, "\n".join(filter(None, words)))
 
 
@@ -392,18 +389,17 @@ class RunTotals:
 
     def see(self, played: CheckedRun, seed: int, number: int) -> None:
         """Count one more run."""
-        figures = played.figures
         self.add(
             RunTotals(
                 model=self.model,
-                looked_at=Counter(figures.keys()),
+                looked_at=Counter(played.figures.keys()),
                 unjudged=Counter(played.unjudged),
                 worst={
                     name: (math.inf if math.isnan(figure) else figure, number)
-                    for name, figure in figures.items()
+                    for name, figure in played.figures.items()
                 },
                 failures=[
-                    Broken(self.model, name, seed, number, figures[name], played.failure)
+                    Broken(self.model, name, seed, number, played.figures[name], played.failure)
                     for name in played.broken
                 ],
                 outcomes=Counter([played.outcome or "failed"]),
