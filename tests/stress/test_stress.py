@@ -167,9 +167,9 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     only = Stress("all", quick=True, runs=1, models=("ebm", "cm")).tasks({})
     assert {one.line for one in only if isinstance(one, Place)} == {"cm", "cm paper"}
     done: dict = {
-        task: Found(task.line, task.at, 5.0, 5e-3, {"creep": 1e-3})
+        task: Found(5.0, 5e-3, {"creep": 1e-3})
         if task.at in CASES
-        else Found(task.line, task.at, task.value, 0.1, fault="sinks")
+        else Found(task.value, 0.1, fault="sinks")
         for task in work
     }
     done[work[-1]] = pool.Failure("did not end")
@@ -182,7 +182,7 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     assert "(0.001, with adaptive steps 0.01)" in (tmp_path / "index.html").read_text()
     rows = (tmp_path / "stable-steps.csv").read_text().splitlines()
     assert len(rows) == 1 + sum(
-        isinstance(one, Found) and one.at not in CASES for one in done.values()
+        isinstance(one, Found) and task.at not in CASES for task, one in done.items()
     )
 
 

@@ -207,10 +207,11 @@ def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
     """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
     if _side(history) != "stands":
         return [("end_time", "s", float(history.channels["t"][-1]))]
-    found = [("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha)]
-    if "slip" in history.channels:
-        found.append(("last_slip", "m", float(history.channels["slip"][-1])))
-    return found
+    last_slip = history.channels.get("slip", np.empty(0))[-1:]
+    return [
+        ("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha),
+        *(("last_slip", "m", slip) for slip in last_slip.tolist()),
+    ]
 
 
 def _side(history: History) -> str:

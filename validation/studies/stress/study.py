@@ -116,7 +116,7 @@ SETUPS = {
 
 @dataclass(frozen=True)
 class Found:
-    """What is found at a `Place`: its `line`, `at` and `value`, a step, and a fault.
+    """What is found at a `Place`: its `value`, a step, and a fault.
 
     On an axis `step` is the largest (sqrt(R/g)) up to which the model is stable, 0 where none is,
     and `fault` is how the next coarser one breaks. Of a block that should stand still for `value` s
@@ -124,8 +124,6 @@ class Found:
     sqrt(g R), and `fault` says why the run did not end.
     """
 
-    line: str
-    at: str
     value: float
     step: float
     moves: dict[str, float] = field(default_factory=dict)
@@ -206,7 +204,7 @@ def stand_still(label: str, case: str, duration: float) -> Found:
     try:
         history = build(line.family, dict(line.settings) | steps).simulate(scene)
     except (errors.ModelFailure, errors.InputError) as error:
-        return Found(label, case, duration, step, fault=printable(error, 120))
+        return Found(duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius
     late = channels["t"] > 0.5 * channels["t"][-1]
     height = kinematics.pivot_height(block, channels["y"], channels["theta"])
@@ -215,8 +213,6 @@ def stand_still(label: str, case: str, duration: float) -> Found:
         channels["x_dot"] ** 2 + channels["y_dot"] ** 2 + (radius * channels["theta_dot"]) ** 2
     )
     return Found(
-        label,
-        case,
         float(channels["t"][-1]),
         float(history.settings.get("time_step", step)) if line.family == "cm" else step,
         {
@@ -255,7 +251,7 @@ class Place(Task):
             if fault := fault_of(setup, scene, step):
                 break
             best = step
-        return Found(self.line, self.at, self.value, best, fault=fault)
+        return Found(self.value, best, fault=fault)
 
 
 def places(quick: bool = False, models: Sequence[str] = ()) -> list[Place]:
@@ -381,7 +377,14 @@ class Stress(Study):
             ),
             [
                 *(_runs(totals) if totals else ()),
-                *_maps(list(map(done.get, places(self.quick, self.models))), self.quick),
+                *_maps(
+                    {
+                        place: one
+                        for place in places(self.quick, self.models)
+                        if isinstance(one := done.get(place), Found)
+                    },
+                    self.quick,
+                ),
             ],
             data={
                 "seed": self.seed,
@@ -520,14 +523,14 @@ def _worst(name: str, totals: Sequence[RunTotals]) -> list[Any]:
     ]
 
 
-def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
+def _maps(found: Mapping[Place, Found], quick: bool) -> Iterator[Plot | Table]:
     stable, still = (
-        [one for one in found if isinstance(one, Found) and (one.at in CASES) == stands]
+        {place: one for place, one in found.items() if (place.at in CASES) == stands}
         for stands in (False, True)
     )
     if stable:
         steps = QUICK_STEPS if quick else STEPS
-        lines = list(dict.fromkeys(one.line for one in stable))
+        lines = list(dict.fromkeys(place.line for place in stable))
         drawn = [_by_axis(axis, lines, stable) for axis in AXES]
         yield Plot(
             "stable-steps",
@@ -546,7 +549,10 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
         yield Table(
             "stable-steps",
             list(map(Column, ("line", "axis", "value", "step", "fault"))),
-            [[one.line, one.at, one.value, one.step, one.fault] for one in stable],
+            [
+                [place.line, place.at, place.value, one.step, one.fault]
+                for place, one in stable.items()
+            ],
             on="file",
         )
     if still:
@@ -561,8 +567,8 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
                 text("fault", " ", brief=False),
             ],
             [
-                [one.at, one.line, one.value, one.step, *map(one.moves.get, MOVES), one.fault]
-                for one in still
+                [place.at, place.line, one.value, one.step, *map(one.moves.get, MOVES), one.fault]
+                for place, one in still.items()
             ],
             "What should stand still",
             "The paper's block on friction 0.3: left alone, pushed by half of what would move it,"
@@ -571,8 +577,10 @@ def _maps(found: Sequence[Any], quick: bool) -> Iterator[Plot | Table]:
         )
 
 
-def _by_axis(axis: str, lines: Sequence[str], found: Sequence[Found]) -> tuple[list[Any], Table]:
-    of = {(one.line, one.value): one for one in found if one.at == axis}
+def _by_axis(
+    axis: str, lines: Sequence[str], found: Mapping[Place, Found]
+) -> tuple[list[Any], Table]:
+    of = {(place.line, place.value): one for place, one in found.items() if place.at == axis}
     values = list(dict.fromkeys(value for _, value in of))
     rows = [[of.get((line, value)) for value in values] for line in lines]
     words, _, _ = AXES[axis]
