@@ -58,10 +58,9 @@ def random_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     alpha = float(r.uniform(*ALPHA)) if r.random() < 0.7 else _log(r, *ALPHA)
     radius = _log(r, *RADIUS)
     gravity = 9.81 if r.random() < 0.8 else _log(r, 1.0, 30.0)
-    block = Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha))
     chance = np.random.default_rng([seed, number, 2])
     block, most = loaded(
-        block,
+        Block(half_width=radius * math.sin(alpha), half_height=radius * math.cos(alpha)),
         chance,
         lambda: float(chance.uniform(*OFF_CENTRE)),
         lambda: float(chance.uniform(*INERTIA)),
@@ -308,9 +307,11 @@ def exact_scene(seed: int, number: int, kind: Kind = "unilateral") -> Scene:
     r = np.random.default_rng([seed, number, 1])
     width, height = SIDES[int(r.integers(len(SIDES)))]
     chance = np.random.default_rng([seed, number, 3])
-    block = Block(half_width=width, half_height=height)
     block, most = loaded(
-        block, chance, lambda: _pick(chance, PLACES), lambda: _pick(chance, INERTIAS)
+        Block(half_width=width, half_height=height),
+        chance,
+        lambda: _pick(chance, PLACES),
+        lambda: _pick(chance, INERTIAS),
     )
     gravity = _pick(r, (9.81, 10.0, 1.0))
     side = block.pivot("left" if chance.random() < 0.5 else "right")

@@ -410,10 +410,12 @@ def frame_of(samples: Sequence[BenchmarkRun]) -> pd.DataFrame:
     Besides their fields the errors against each of `REFERENCES`, infinite where a run failed.
     """
     frame = pd.DataFrame([*samples])
-    for reference, error in zip(REFERENCES, ("rms", "against_ebm"), strict=True):
-        frame[reference] = frame[error].where(frame.failure == "").fillna(math.inf)
-    for name, order in (("family", [*FAMILIES, *WALLS]), ("line", [*LINES])):
-        frame[name] = pd.Categorical(frame[name], order)
+    errors = {
+        reference: frame[error].where(frame.failure == "").fillna(math.inf)
+        for reference, error in zip(REFERENCES, ("rms", "against_ebm"), strict=True)
+    }
+    families = pd.Categorical(frame.family, [*FAMILIES, *WALLS])
+    frame = frame.assign(**errors, family=families, line=pd.Categorical(frame.line, [*LINES]))
     return _ordered(frame, "family", "line")
 
 

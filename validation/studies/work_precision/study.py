@@ -434,12 +434,11 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
             series += [
                 Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
                 for one in (good.get((model, name), frame[:0]) for name in WALLS)
-            ]
-            series.append(
+            ] + [
                 Series(
                     model, mine.step.tolist(), mine["median"].clip(upper=3.0).tolist(), look=model
                 )
-            )
+            ]
         if reference == "ebm":
             series.append(replace(FORM, y=[form]))
         panels.append(Panel(f"against {reference}", series))
