@@ -287,7 +287,7 @@ What = Literal["all", "runs", "maps"]
 #: Runs in one task: event-based ones, others.
 CHUNK, APPROXIMATE_CHUNK = 250, 20
 #: Trials by which all failures may be shrunk, in a whole run and in a quick one.
-SHRINKING, SHRINKING_QUICK = 6000, 600
+SHRINKING, SHRINKING_QUICK = 8000, 1600
 #: Listed movements of a block that should stand still, and their units.
 MOVES = {"creep": "R", "sinking": "R", "rotation": "α", "uplift": "R", "jitter": "√(gR)"}
 
