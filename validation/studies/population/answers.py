@@ -538,6 +538,7 @@ def numerical_of(found: Found) -> dict[str, Any]:
     """
     numerical, parts, inputs = (value for _, value in found.own)
     converged = numerical is not None and numerical.converged and parts is None
+    unknown = "a model without step or tolerance" if "" in found.sure else "its runs failed"
     return {
         "scene": found.study.own.scene.name,
         "model": found.study.model,
@@ -550,7 +551,7 @@ def numerical_of(found: Found) -> dict[str, Any]:
         ],
         "said": f"{'converged' if converged else 'not converged'}, by {numerical.method}"
         if numerical
-        else "a model without step or tolerance; its numerical error is not known",
+        else f"{unknown}; its numerical error is not known",
     }
 
 
@@ -615,10 +616,10 @@ def _certainty(found: Found) -> Answer:
             ),
             Text(inputs.note),
         ]
-    return _sure(found, data["converged"]), data, blocks
+    return _sure(found, data), data, blocks
 
 
-def _sure(found: Found, converged: bool) -> list[str]:
+def _sure(found: Found, data: Mapping[str, Any]) -> list[str]:
     if found.study.recorded:
         judged = [one.converged for one in found.judged.values()]
         laws = sum(
@@ -627,8 +628,8 @@ def _sure(found: Found, converged: bool) -> list[str]:
         said = f"{sum(judged)} of {len(judged)} runs are numerically converged."
         return [said, f"The law of impacts matters in {laws}."] if laws else [said]
     if found.own.numerical is None:
-        return [f"{found.study.model} has no step or tolerance: its numerical error is not known."]
-    return ["Numerically converged." if converged else "Not converged: no figure of it is sure."]
+        return [f"{found.study.model}: {data['said']}."]
+    return ["Numerically converged." if data["converged"] else "Not converged: no figure of it is sure."]
 
 
 #: The event of a hand method: the figure of a run, its unit, and above what it happens.
