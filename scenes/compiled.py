@@ -7,7 +7,6 @@ code in its cache. Here a file is read only if this user wrote it and it is comp
 """
 
 import contextlib
-import gc
 import hashlib
 import os
 import pickle
@@ -26,16 +25,13 @@ import numba
 import numpy as np
 from numba import types
 from numba.core import config as numba_config, serialize
-from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.event import Event, Listener, register
+from numba.core.compiler import Compiler, CompileResult
 from numba.core.registry import CPUDispatcher
 from numba.np import linalg
 
-from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.progress import announce, announced
-from rockcheck.scenes.reading import MOST_BYTES, open_regular
+from rockcheck.scenes import progress
+from rockcheck.scenes.reading import read_bytes
 from rockcheck.scenes.writing import write_whole
 
 # numba imports scipy.linalg (0.2 s) only to check that BLAS is there. It is, since rockcheck needs
@@ -61,48 +57,13 @@ _PURPOSES = {
 }
 
 
-class _Compiling(Listener):
-    """Disables garbage collection while numba compiles, and announces long compilations.
-
-    The search for cycles among the compiler's objects takes a tenth of the compile time. A
-    compilation longer than `_SILENT` is announced, once a package and process.
-    """
-
-    def __init__(self) -> None:
-        self.depth = 0
-        self.wanted = False
-        self.told: set[str] = set()
-
-    def on_start(self, event: Event) -> None:
-        """Start of a compilation, perhaps inside another one; numba's lock admits one thread."""
-        if self.depth == 0:
-            self.wanted = gc.isenabled()
-            gc.disable()
-            function = getattr((event.data or {}).get("dispatcher"), "py_func", None)
-            self.timer = threading.Timer(_SILENT, self._tell, [getattr(function, "__module__", "")])
-            self.timer.daemon = True
-            if announced():
-                self.timer.start()
-        self.depth += 1
-
-    def on_end(self, event: Event) -> None:
-        self.depth -= 1
-        if self.depth == 0:
-            self.timer.cancel()
-            if self.wanted:
-                gc.enable()
-
-    def _tell(self, module: str) -> None:
-        package = ".".join(module.split(".")[:2])
-        if package not in self.told:
-            self.told.add(package)
-            announce(
-                f"compiling {_PURPOSES.get(package, package)} for this machine, once a version:"
-                " about a minute (`rockcheck warm` does it ahead)"
-            )
-
-
-register("numba:compile", _Compiling())
+@cache
+def _tell(package: str) -> None:
+    """Announce that a package's code is being compiled; once a process."""
+    progress.announce(
+        f"compiling {_PURPOSES.get(package, package)} for this machine, once a version: about a"
+        " minute (`rockcheck warm` does it ahead)"
+    )
 
 
 @cache
@@ -181,17 +142,24 @@ def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
 class _Compiler(Compiler):
     """numba's own compiler, which resolves each kind of call once (`_call_type`).
 
-    Only one thread compiles: it holds numba's lock.
+    Only one thread compiles: it holds numba's lock. A compilation longer than `_SILENT` is
+    announced.
     """
 
     def _compile_core(self) -> Any:
         if "get_call_type" in vars(types.Function):  # within another compilation
             return super()._compile_core()
+        package = ".".join(self.state.func_id.func.__module__.split(".")[:2])
+        timer = threading.Timer(_SILENT, _tell, [package])
+        timer.daemon = True
+        if progress.announcer is not None:
+            timer.start()
         types.Function.get_call_type = _call_type
         try:
             return super()._compile_core()
         finally:
             del types.Function.get_call_type
+            timer.cancel()
 
 
 class _Linked(JITCodeLibrary):
@@ -239,66 +207,47 @@ class _InnerCompiler(_Compiler):
         )
 
 
-class _Cache(FunctionCache):
+class _Cache:
     """The compiled variants of one function, a file each that begins with the hash of the rest.
 
-    A damaged file is removed and the function compiled again; numba itself would unpickle it.
+    It takes the place of numba's own cache, which would unpickle a damaged file. Here that is
+    removed, and the function compiled again.
     """
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        before = config.CACHE_DIR
-        config.CACHE_DIR = str(folder)
-        try:
-            super().__init__(function)
-        finally:
-            config.CACHE_DIR = before
-        self.folder = folder
+        self.cache_path = folder
         self.name = f"{function.__module__}.{function.__qualname__}"
-        self._cache_file = self  # numba's own, with an index of many files, is not used
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function for a signature, or None if it is absent or unusable."""
-        try:
-            return super().load_overload(sig, target_context)
-        except Exception:
-            return None  # whole, but unusable by this numba: it is compiled and written again
+    def path(self, signature: Any, codegen: Any) -> Path:
+        """The file of a function compiled for these types by this compiler for this processor."""
+        key = numba.__version__, sys.version, signature, codegen.magic_tuple()
+        about = hashlib.sha256(repr(key).encode()).hexdigest()
+        return self.cache_path / f"{self.name[-100:]}-{about[:32]}.nbc"
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function; it is usable even if it cannot be written."""
-        with contextlib.suppress(OSError):
-            super().save_overload(sig, data)
-
-    def _path(self, key: object) -> Path:
-        about = hashlib.sha256(repr((numba.__version__, sys.version, key)).encode())
-        return self.folder / f"{self.name[-100:]}-{about.hexdigest()[:32]}.nbc"
-
-    def load(self, key: object) -> Any:
-        """The data that `save` wrote; None if there are none, or if they are damaged."""
-        path = self._path(key)
+    def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
+        """The compiled function for a signature; None if it is absent, damaged or unusable."""
+        path = self.path(sig, target_context.codegen())
         if not os.path.lexists(path):  # nothing to remove: another process may be about to write it
             return None
-        with contextlib.suppress(OSError, InputError), open_regular(path, MOST_BYTES) as stream:
-            content = stream.read()
+        with contextlib.suppress(Exception):
+            content = read_bytes(path)
             if hashlib.sha256(content[32:]).digest() == content[:32]:
-                return pickle.loads(content[32:])
-        self._drop(path)
-        return None
-
-    def save(self, key: object, data: object) -> None:
-        path = self._path(key)
-        if path.is_dir():
-            self._drop(path)
-        content = serialize.dumps(data)
-        write_whole(path, hashlib.sha256(content).digest() + content)
-
-    def _drop(self, path: Path) -> None:
+                target_context.refresh()
+                return CompileResult._rebuild(target_context, *pickle.loads(content[32:]))
         with contextlib.suppress(OSError):
             shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+        return None
 
-    def flush(self) -> None:
-        """Remove all cached variants of this function."""
-        for path in self.folder.glob(f"{self.name[-100:]}-*.nbc"):
-            self._drop(path)
+    def save_overload(self, sig: Any, data: CompileResult) -> None:
+        """Keep a compiled function, unless it holds addresses of this process.
+
+        It is usable even if it cannot be written.
+        """
+        if not data.library.has_dynamic_globals:
+            content = serialize.dumps(data._reduce())
+            with contextlib.suppress(OSError):
+                path = self.path(sig, data.codegen)
+                write_whole(path, hashlib.sha256(content).digest() + content)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -340,7 +289,7 @@ def is_ready(compiled: Any, *args: Any) -> bool:
     signature = tuple(map(compiled.typeof_pyval, args))
     cache, codegen = compiled._cache, compiled.targetctx.codegen()
     return signature in compiled.overloads or (  # or has a file, whole or not
-        isinstance(cache, _Cache) and cache._path(cache._index_key(signature, codegen)).exists()
+        isinstance(cache, _Cache) and cache.path(signature, codegen).exists()
     )
 
 

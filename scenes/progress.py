@@ -55,7 +55,8 @@ def within(variable: ContextVar[Value], value: Value) -> Iterator[None]:
         variable.reset(token)
 
 
-_announcer: Callable[[str], None] | None = None
+#: What receives this process's announcements; None: nobody does.
+announcer: Callable[[str], None] | None = None
 
 
 def announce(words: str) -> None:
@@ -63,30 +64,20 @@ def announce(words: str) -> None:
 
     Silent where no block is `announcing`.
     """
-    if _announcer is not None:
-        _announcer(words)
-
-
-def announced() -> bool:
-    """Whether a block is `announcing`."""
-    return _announcer is not None
-
-
-def announce_by(say: Callable[[str], None] | None) -> None:
-    """From now on `say` receives this process's announcements; None: nobody does."""
-    global _announcer
-    _announcer = say
+    if announcer is not None:
+        announcer(words)
 
 
 @contextmanager
 def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
     """Within this block `say` receives this process's announcements; None: nobody does."""
-    before = _announcer
-    announce_by(say)
+    global announcer
+    before = announcer
+    announcer = say
     try:
         yield
     finally:
-        announce_by(before)
+        announcer = before
 
 
 #: Whether a short run does not wait for the compiler: nothing else will be played.

@@ -124,7 +124,7 @@ def test_what_was_compiled_is_read_back_until_a_source_of_the_package_changes(
 ):
     """By a new process, too. A function of rockcheck.ebm.core.march may call one of any module of
     rockcheck.ebm."""
-    assert march.play._cache.folder.name.startswith("ebm-kernels-")
+    assert march.play._cache.cache_path.name.startswith("ebm-kernels-")
     assert replay(f"not ready {COMPILED}") == ""
     assert len(files(tmp_path)) == 2
     place = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -148,7 +148,7 @@ class Pool:
             max_workers=self.jobs,
             context=multiprocessing.get_context("spawn"),
             initializer=prepare,
-            initargs=(self.memory_mb, progress.announced()),
+            initargs=(self.memory_mb, progress.announcer is not None),
         )
         try:
             with _interrupts_held():
@@ -292,7 +292,7 @@ def prepare(memory_mb: float | None, announces: bool = False) -> None:
         threading.Thread(target=_follow, args=(run,), daemon=True).start()
     if announces:
         terminal = os.dup(2)
-        progress.announce_by(lambda words: _write(terminal, f"rockcheck: {words}\n"))
+        progress.announcer = lambda words: _write(terminal, f"rockcheck: {words}\n")
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (1, 2):  # the terminal is the run's; engines greet on it from C
         os.dup2(nowhere, stream)
