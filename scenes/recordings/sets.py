@@ -25,6 +25,10 @@ _UPWARD = re.compile(
 )
 
 
+#: Components of files, by their names.
+Components = dict[Path, list[tuple[str, Recording]]]
+
+
 class Odd(str):
     """Fault of a file in a folder or pattern that is no record: it is reported and left out."""
 
@@ -65,39 +69,51 @@ def record_path(name: str, folder: Path) -> Path:
 
 
 def motions_of(
-    paths: Iterable[Path], reading: Reading
+    paths: Iterable[Path], reading: Reading, *, paired: bool = False
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The horizontal components of the files with their names, and the names left out.
 
     Left out are vertical components, by name, and `Odd` files. A component or column that `reading`
-    names is taken as horizontal. Raises as `read_components`, and where all components are
-    vertical.
+    names is taken as horizontal, unless the motions are `paired` with vertical ones. Raises as
+    `read_components`, and where all components are vertical.
     """
-    motions: list[tuple[str, Recording]] = []
-    read, faults = read_files(paths, reading)
-    if faults and not read:
+    named = not paired and (reading.component, reading.column) != (None, None)
+    across, upward, faults = _parted(paths, reading, named)
+    if faults and not across:
         raise faults[0]
-    left_out: list[str] = []
-    for path, components in read.items():
-        for name, one in components:
-            if reading.component is None and reading.column is None and is_vertical(path, one):
-                left_out.append(name)
-            else:
-                motions.append((name, one))
+    motions = [one for components in across.values() for one in components]
+    left_out = [name for components in upward.values() for name, _ in components]
     if left_out and not motions:
         raise InputError(f"{left_out[0]}: a vertical component, and no horizontal one is given")
     return motions, [*left_out, *map(Odd, faults)]
 
 
-def read_files(
-    paths: Iterable[Path], reading: Reading
-) -> tuple[dict[Path, list[tuple[str, Recording]]], list[InputError]]:
+def _parted(
+    paths: Iterable[Path], reading: Reading, named: bool
+) -> tuple[Components, Components, list[InputError]]:
+    """The horizontal and the vertical components of each file, and the faults of the others.
+
+    All are horizontal if they are `named`.
+    """
+    read, faults = read_files(paths, reading)
+    across = {
+        path: [one for one in found if named or not is_vertical(path, one[1])]
+        for path, found in read.items()
+    }
+    upward = {
+        path: [one for one in found if not named and is_vertical(path, one[1])]
+        for path, found in read.items()
+    }
+    return across, upward, faults
+
+
+def read_files(paths: Iterable[Path], reading: Reading) -> tuple[Components, list[InputError]]:
     """The components of each file that can be read, by name, and the faults of the others.
 
     A component's name is that of its file, with its own name added where the file has several.
     Raises `InputError` for a file that was named itself.
     """
-    read: dict[Path, list[tuple[str, Recording]]] = {}
+    read: Components = {}
     faults: list[InputError] = []
     for path in paths:
         try:
@@ -121,9 +137,13 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
     in the component, as ELC-UP.AT2 does from ELC180.AT2. Raises `InputError` where there is not
     exactly one, and for a vertical component that belongs to no motion.
     """
-    horizontal, upward = _directions(paths, reading)
-    alone = [path for path in upward if path not in horizontal]
-    sources = {path: path if upward[path] else _vertical_file(path, alone) for path in horizontal}
+    across, upward, _ = _parted(paths, reading, named=False)
+    alone = [path for path, components in across.items() if not components]
+    sources = {
+        path: path if upward[path] else _vertical_file(path, alone)
+        for path, components in across.items()
+        if components
+    }
     found: dict[str, Recording] = {}
     for path, source in sources.items():
         up = upward[source] if source else []
@@ -133,31 +153,13 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
                 " that is named alike: give exactly one",
                 "vertical",
             )
-        found |= dict.fromkeys(horizontal[path], up[0])
+        found |= {name: up[0][1] for name, _ in across[path]}
     if unused := [path for path in alone if path not in sources.values()]:
         raise InputError(
             f"{printable(unused[0])}: a vertical component, and no horizontal one is named alike",
             "vertical",
         )
     return found
-
-
-def _directions(
-    paths: Iterable[Path], reading: Reading
-) -> tuple[dict[Path, list[str]], dict[Path, list[Recording]]]:
-    """The names of the motions of each file that holds any; the vertical components of each."""
-    read = read_files(paths, reading)[0]
-    upward = {
-        path: [one for _, one in components if is_vertical(path, one)]
-        for path, components in read.items()
-    }
-    named = reading.component is not None or reading.column is not None
-    horizontal = {
-        path: [name for name, one in components if named or not is_vertical(path, one)]
-        for path, components in read.items()
-        if named or len(upward[path]) < len(components)
-    }
-    return horizontal, upward
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:

@@ -65,18 +65,20 @@ def test_a_folder_means_its_files_and_a_pattern_those_that_fit(tmp_path, monkeyp
 def test_vertical_components_are_left_out_unless_they_are_asked_for(tmp_path, fault_of):
     both, alone = channels(tmp_path / "two.v2", East=1.0, Up=0.5), table(tmp_path / "up.csv", 0.25)
     every = [both, table(tmp_path / "ns.csv", 2.0), alone]
-    for paths, reading, found, other in (
+    for paths, reading, paired, found, other in (
         (
             every,
             recordings.Reading(),
+            False,
             [("two.v2 East", 1.0), ("ns.csv", 2.0)],
             ["two.v2 Up", "up.csv"],
         ),
-        ([both], recordings.Reading(component="Up"), [("two.v2", 0.5)], []),
-        ([alone], recordings.Reading(column=2), [("up.csv", 0.25)], []),
-        ([], recordings.Reading(), [], []),
+        ([both], recordings.Reading(component="Up"), False, [("two.v2", 0.5)], []),
+        ([alone], recordings.Reading(column=2), False, [("up.csv", 0.25)], []),
+        (every[1:], recordings.Reading(column=2), True, [("ns.csv", 2.0)], ["up.csv"]),
+        ([], recordings.Reading(), False, [], []),
     ):
-        motions, left_out = sets.motions_of(paths, reading)
+        motions, left_out = sets.motions_of(paths, reading, paired=paired)
         assert ([(name, peak(one)) for name, one in motions], left_out) == (found, other)
     assert "up.csv: a vertical component" in str(
         fault_of(sets.motions_of, [alone], recordings.Reading())
@@ -88,13 +90,18 @@ def test_the_vertical_component_is_that_of_the_same_file_or_of_one_named_alike(t
         channels(tmp_path / "two.v2", East=1.0, North=2.0, Up=0.5),
         table(tmp_path / "a-ns.csv"),
         table(tmp_path / "a-up.csv", 0.25),
+        table(tmp_path / "b-ns.csv"),
+        table(tmp_path / "b-up.csv", 0.75),
     ]
     assert {
-        name: peak(one) for name, one in sets.verticals_of(paths, recordings.Reading()).items()
+        name: peak(one)
+        for files, column in ((paths[:3], None), (paths[3:], 2))
+        for name, one in sets.verticals_of(files, recordings.Reading(column=column)).items()
     } == {
         "two.v2 East": 0.5,
         "two.v2 North": 0.5,
         "a-ns.csv": 0.25,
+        "b-ns.csv": 0.75,
     }
 
 

@@ -116,7 +116,7 @@ def _motions(
 ) -> tuple[list[tuple[str, dict[str, Record]]], list[str]]:
     """The motions of a set by their labels, as what they replace; and what is left out."""
     files = sets.files_of(given.files, folder)
-    motions, left_out = sets.motions_of(files, given)
+    motions, left_out = sets.motions_of(files, given, paired=given.vertical)
     upward = sets.verticals_of(files, given) if given.vertical else {}
     if given.vertical:
         left_out = [one for one in left_out if isinstance(one, sets.Odd)]
