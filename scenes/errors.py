@@ -109,13 +109,15 @@ def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputEr
         return InputError(inner.reason, ".".join([*path, inner.key] if inner.key else path))
     message = fault["msg"].removeprefix("Value error, ")
     key = ".".join(path)
-    if fault["type"] == "extra_forbidden":
-        return InputError(f"unknown key{suggestion(path[-1], keys)}", key)
-    if fault["type"] == "missing":
-        return InputError("is missing", key)
-    if fault["type"] == "union_tag_invalid":
-        known = re.findall(r"'([^']*)'", str(fault["ctx"]["expected_tags"]))
-        return InputError(str(unknown_name("kind", str(fault["ctx"]["tag"]), known)), key)
-    if isinstance(fault["input"], int | float | str | bool):
-        message = f"{printable(fault['input'])!s} is not allowed: {message[0].lower()}{message[1:]}"
+    match fault["type"]:
+        case "extra_forbidden":
+            message = f"unknown key{suggestion(path[-1], keys)}"
+        case "missing":
+            message = "is missing"
+        case "union_tag_invalid":
+            known = re.findall(r"'([^']*)'", str(fault["ctx"]["expected_tags"]))
+            message = str(unknown_name("kind", str(fault["ctx"]["tag"]), known))
+        case _ if isinstance(fault["input"], int | float | str | bool):
+            given = printable(fault["input"])
+            message = f"{given} is not allowed: {message[0].lower()}{message[1:]}"
     return InputError(message, key)

@@ -182,8 +182,7 @@ class Record(Motion):
         `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is
         malformed, or something is not known.
         """
-        settings: dict[str, Any] = {"file": path, "scale": scale} | reading
-        return cls(**settings)
+        return cls(**{"file": path, "scale": scale, **reading})
 
     @classmethod
     def from_samples(cls, samples: ArrayLike, time_step: float, scale: float = 1.0) -> Self:

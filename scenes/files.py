@@ -23,7 +23,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal, TypeVar, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import model_validator
@@ -32,10 +32,9 @@ from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
-from rockcheck.scenes.scene import Scene, Wall
+from rockcheck.scenes.scene import Scene
 
 Place = tuple[str | int, ...]
-Part = TypeVar("Part", bound=Frozen)
 #: Keys that mark a table of a scene file as an uncertain number.
 _KEYS = {"sd", "low", "high"}
 CORRELATION = "correlation"
@@ -287,25 +286,17 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
 
     Raises `InputError`.
     """
-    change: dict[str, Any] = {}
-    walls: dict[str, Wall] = {wall.side: wall for wall in scene.walls}
+    parts: dict[str, Any] = {wall.side: wall for wall in scene.walls}
     for place, value in numbers.items():
-        table, _, name = place.partition(".")
+        table, _, name = place.removeprefix("walls.").partition(".")
         if not name:
-            change[table] = value
-        elif table == "walls":
-            side, _, name = name.partition(".")
-            walls[side] = _changed(walls[side], name, value, f"walls.{side}")
-        else:
-            change[table] = _changed(change.get(table, getattr(scene, table)), name, value, table)
-    return scene.replace(**change, walls=tuple(walls.values()))
-
-
-def _changed(part: Part, name: str, value: float, place: str) -> Part:
-    try:
-        return part.replace(**{name: value})
-    except InputError as error:
-        raise InputError(error.reason, f"{place}.{error.key}") from None
+            parts[table] = value
+            continue
+        try:
+            parts[table] = (parts.get(table) or getattr(scene, table)).replace(**{name: value})
+        except InputError as error:
+            raise InputError(error.reason, place.removesuffix(name) + error.key) from None
+    return scene.replace(walls=tuple(parts.pop(wall.side) for wall in scene.walls), **parts)
 
 
 def _plain(value: Any, place: Place, spreads: dict[str, Spread]) -> Any:

@@ -47,8 +47,10 @@ def observe(
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
     rows = max(int(tipped[0]) if tipped.size else len(state), 1)
     state = state[:rows]
-    channels: dict[str, NDArray[Any]] = {"t": scene.output_times[:rows]}
-    channels |= {name: state[:, column] for column, name in enumerate(STATE)}
+    channels: dict[str, NDArray[Any]] = {
+        "t": scene.output_times[:rows],
+        **dict(zip(STATE, state.T, strict=True)),
+    }
     channels["slip"] = kinematics.slip(scene.block, channels["x"], channels["theta"])
     channels["slip_rate"] = kinematics.slip_rate(
         scene.block, channels["theta"], channels["x_dot"], channels["theta_dot"]
