@@ -25,24 +25,20 @@ SLAB, REACH = 20.0, 600.0  # thickness and extent of floor and walls
 class _DrakeWorld(steps.World):
     """A plant with a planar box, floor and walls, with Drake's default parameters.
 
-    The plant is made when the step's length is known.
+    The plant is made by `ready`, when the step's length is known.
     """
 
     def __init__(self, scene: Scene) -> None:
         from pydrake import geometry, math
         from pydrake.multibody import plant
 
-        self.scene, self.dt, self.start = scene, 0.0, np.zeros(6)
+        self.scene = scene
         self.geometry, self.contacts, self.math = geometry, plant, math
 
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
-        self.start = np.array([x, y, theta, vx, vy, w])
-        if self.dt:
-            self.plant.SetPositionsAndVelocities(self.context, self.start)
+        self.plant.SetPositionsAndVelocities(self.context, np.array([x, y, theta, vx, vy, w]))
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        if not self.dt:
-            self.ready(dt)
         self.force.set_value([felt[0], felt[1], 0.0])
         self.steps += 1
         try:
@@ -58,7 +54,7 @@ class _DrakeWorld(steps.World):
         from pydrake.multibody import tree
         from pydrake.systems import analysis, framework
 
-        self.dt, self.steps = dt, 0
+        self.steps = 0
         builder = framework.DiagramBuilder()
         self.plant, _ = self.contacts.AddMultibodyPlantSceneGraph(builder, time_step=dt)
         self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
@@ -85,7 +81,6 @@ class _DrakeWorld(steps.World):
             .FixValue(self.context, np.zeros(3))
             .GetMutableData()
         )
-        self.plant.SetPositionsAndVelocities(self.context, self.start)
         self.simulator.Initialize()
 
     def shape(self, body: Any) -> None:
@@ -132,6 +127,7 @@ class _RigidDrakeWorld(_DrakeWorld):
                 self.coarser = _RigidDrakeWorld(
                     self.scene, self.stiffness, self.dissipation, 10.0 * self.stiction
                 )
+                self.coarser.ready(dt)
             self.coarser.place(*self.state())
             self.coarser.step(felt, dt)
             self.place(*self.coarser.state())

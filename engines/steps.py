@@ -53,7 +53,7 @@ class World(ABC):
         """Where the block is."""
 
     def ready(self, dt: float) -> None:  # noqa: B027 - most engines take steps of any length
-        """Before the first of steps of `dt` s: what is done here is no run time."""
+        """Before the block is placed for steps of `dt` s: what is done here is no run time."""
 
     def velocity(self) -> Vector:
         """How fast the block is."""

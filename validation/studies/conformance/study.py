@@ -661,6 +661,7 @@ def _played(model: Any, scene: Scene, parameters: Mapping[str, float], step: flo
     times: Floats = step * np.arange(math.ceil(scene.duration / step) + 1, dtype=np.float64)
     world = model.tuned_world(scene, parameters, step)
     try:
+        world.ready(step)
         return steps.march_fixed(world, scene, times, np.tile([0.0, -G], (len(times) - 1, 1)))[1]
     except errors.ModelFailure as error:
         raise errors.InputError(
