@@ -66,23 +66,24 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
                 if named and path.exists() and not path.is_file() and not path.is_dir():
                     path.write_bytes(data)
                     continue
-                handle, temporary = tempfile.mkstemp(
-                    dir=target.parent, prefix=f".{target.name[:60]}.", suffix=".part"
-                )
-                leavings.callback(Path(temporary).unlink, missing_ok=True)
-                with os.fdopen(handle, "wb") as stream:
+                with tempfile.NamedTemporaryFile(
+                    dir=target.parent,
+                    prefix=f".{target.name[:60]}.",
+                    suffix=".part",
+                    delete=False,
+                ) as stream:
+                    leavings.callback(Path(stream.name).unlink, missing_ok=True)
                     stream.write(data)
-                os.chmod(temporary, 0o644)
+                os.chmod(stream.name, 0o644)
                 if target.is_dir() and not target.is_symlink():
                     raise IsADirectoryError(21, "Is a directory")
-                finished.append((temporary, target))
+                finished.append((stream.name, target))
         for temporary, target in finished:
             with _naming(target):
                 os.replace(temporary, target)
-        leavings.pop_all()
 
 
-def write_new(path: Path, content: str) -> Path:
+def write_new(path: Path, content: str) -> None:
     """Write a text file that must not be there yet, whole or not at all.
 
     Raises `FileExistsError` where it is.
@@ -95,7 +96,6 @@ def write_new(path: Path, content: str) -> Path:
         except BaseException:
             path.unlink(missing_ok=True)
             raise
-    return path
 
 
 @contextmanager

@@ -123,9 +123,9 @@ def read_files(paths: Iterable[Path], reading: Reading) -> tuple[Components, lis
                 raise
             faults.append(error)
         else:
-            several = len(found) > 1
             read[path] = [
-                (f"{path.name} {one.component}" if several else path.name, one) for one in found
+                (f"{path.name} {one.component}" if len(found) > 1 else path.name, one)
+                for one in found
             ]
     return read, faults
 
@@ -168,15 +168,26 @@ def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
     Its name agrees with that of `path` in most letters around the component. None if several agree
     equally.
     """
-    fits: dict[int, list[Path]] = {}
-    for other in alone:
-        for said in _UPWARD.finditer(other.name):
-            before, after = other.name[: said.start()].lower(), other.name[said.end() :].lower()
-            name = path.name.lower()
-            if other.parent == path.parent and name.startswith(before) and name.endswith(after):
-                fits.setdefault(len(before) + len(after), []).append(other)
-    best = fits[max(fits)] if fits else []
-    return best[0] if len(set(best)) == 1 else None
+    letters = {
+        other: _agreement(path.name.lower(), other.name.lower())
+        for other in alone
+        if other.parent == path.parent
+    }
+    most = max(letters.values(), default=-1)
+    best = [other for other, count in letters.items() if count == most >= 0]
+    return best[0] if len(best) == 1 else None
+
+
+def _agreement(name: str, other: str) -> int:
+    """In how many letters around the component of `other` the names agree; -1 where they do not."""
+    return max(
+        (
+            len(other) - len(said[0])
+            for said in _UPWARD.finditer(other)
+            if name.startswith(other[: said.start()]) and name.endswith(other[said.end() :])
+        ),
+        default=-1,
+    )
 
 
 def is_vertical(path: Path, recording: Recording) -> bool:
