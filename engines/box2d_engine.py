@@ -64,13 +64,9 @@ class _RigidBox2DWorld(_Box2DWorld):
         super().__init__(scene)
         self.world.sleeping_enabled = False
         self.world.restitution_threshold = THRESHOLD
-        self.dt = 0.0
 
-    def step(self, felt: tuple[float, float], dt: float) -> None:
-        if dt != self.dt:
-            self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, PUSH)
-            self.dt = dt
-        super().step(felt, dt)
+    def ready(self, dt: float) -> None:
+        self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, PUSH)
 
 
 class Box2D(Engine):

@@ -31,7 +31,6 @@ class _DartWorld(steps.World):
         self.dart: Any = dartpy
         self.scale = np.array([scale, scale, 1.0])
         self.world = dartpy.simulation.World()
-        self.dt = 0.0
         b, h = scale * scene.block.half_width, scale * scene.block.half_height
         self.block = dartpy.dynamics.Skeleton("block")
         joint, body = self.block.createPlanarJointAndBodyNodePair()
@@ -71,9 +70,7 @@ class _DartWorld(steps.World):
         self.block.setVelocities(self.scale * (vx, vy, w))
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        if dt != self.dt:
-            self.world.setTimeStep(dt)
-            self.dt = dt
+        self.world.setTimeStep(dt)
         scale = self.scale[0]
         self.world.setGravity([scale * felt[0], 0.0, scale * felt[1]])
         self.world.step()

@@ -131,7 +131,7 @@ def _remove_old(folder: Path, package: str) -> None:
 def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
     """Signature of a call of a numba built-in (also `operator.add`), cached by argument types.
 
-    numba tries some ten candidates at each call site: a quarter of the event loop's compile time.
+    numba tries some ten candidates at each call site: a tenth of the compile time.
     """
     known, asked = self.__dict__.setdefault("_rockcheck_known", {}), (args, tuple(kws.items()))
     if asked not in known:
@@ -166,8 +166,8 @@ class _Linked(JITCodeLibrary):
     """Code of an inner kernel, linked into its callers without machine code of its own.
 
     numba would make machine code of each inner kernel and of all that it calls, though nothing runs
-    it: a third of the event loop's compile time. Here only loops and arithmetic are simplified;
-    full optimisation follows in the calling kernel.
+    it: half of the compile time. Here only loops and arithmetic are simplified; full optimisation
+    follows in the calling kernel.
     """
 
     def _optimize_final_module(self) -> None:
