@@ -70,8 +70,8 @@ FAULTS = [
     (
         "output shifted by one sample",
         "scenes/observation.py",
-        r"name: state\[:, column\] for",
-        "name: np.roll(state[:, column], 1) for",
+        r"zip\(STATE, state\.T,",
+        "zip(STATE, np.roll(state, 1, axis=0).T,",
         0,
     ),
     (
