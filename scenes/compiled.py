@@ -61,7 +61,7 @@ _PURPOSES = {
 def _tell(package: str) -> None:
     """Announce that a package's code is being compiled; once a process."""
     progress.announce(
-        f"compiling {_PURPOSES.get(package, package)} for this machine, once a version: about a"
+        f"compiling {_PURPOSES.get(package, package)} for this machine, once a version: half a"
         " minute (`rockcheck warm` does it ahead)"
     )
 

@@ -629,7 +629,9 @@ def _sure(found: Found, data: Mapping[str, Any]) -> list[str]:
         return [said, f"The law of impacts matters in {laws}."] if laws else [said]
     if found.own.numerical is None:
         return [f"{found.study.model}: {data['said']}."]
-    return ["Numerically converged." if data["converged"] else "Not converged: no figure of it is sure."]
+    return [
+        "Numerically converged." if data["converged"] else "Not converged: no figure of it is sure."
+    ]
 
 
 #: The event of a hand method: the figure of a run, its unit, and above what it happens.
