@@ -27,6 +27,7 @@ from pydantic import Field, ValidationError
 
 from rockcheck.scenes import InputError, errors, experience, printable, reading
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.discrepancy.measures import SMALLEST_PEAK
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -325,16 +326,15 @@ def _panel(name: str, values: Sequence[float | None], moments: Sequence[Moment])
     )
 
 
-#: Smallest peak (alpha) for a meaningful ratio, and the fewest pairs from which a
-#: scatter is computed.
-LEAST, FEWEST = 1e-3, 5
+#: The fewest pairs from which a scatter is computed.
+FEWEST = 5
 
 
 def pairs_of(runs: Iterable[results.Run]) -> dict[str, list[tuple[float, float]]]:
     """Peak rotations (reference's, model's) of all scenes by model, if both allow a ratio.
 
-    Both must be finite and larger than `LEAST`. Blocks that fall have no peak: they are left out,
-    as are cells of the reference itself.
+    Both must be finite and larger than `SMALLEST_PEAK`. Blocks that fall have no peak: they are
+    left out, as are cells of the reference itself.
     """
     found: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
     for run in runs:
@@ -356,7 +356,7 @@ def pairs_of(runs: Iterable[results.Run]) -> dict[str, list[tuple[float, float]]
         stands = {
             key: peak
             for key, outcome, peak in ends
-            if peak is not None and peak > LEAST and not outcome.startswith("overturned")
+            if peak is not None and peak > SMALLEST_PEAK and not outcome.startswith("overturned")
         }
         for (model, scene, n), peak in stands.items():
             if model != run.reference and (run.reference, scene, n) in stands:

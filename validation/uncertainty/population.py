@@ -14,6 +14,7 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy  # it loads its parts as they are used
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
@@ -97,11 +98,9 @@ def curve_of(
     With `draws` of the motions the fitted median has an interval, `NO_FIT` if under 90 % of the
     draws fit.
     """
-    from scipy.special import ndtr
-
     hits, decided = (hit & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
     median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
-    fitted = ndtr(np.log(intensities / median) / dispersion)
+    fitted = scipy.special.ndtr(np.log(intensities / median) / dispersion)
     points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
     sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     medians = [
@@ -142,8 +141,6 @@ def fit_lognormal(
     `hits` counts the decided runs (`runs`) in which the event happened at each intensity. `NO_FIT`
     where that is all or none of them, or where the curve does not rise with the intensity.
     """
-    from scipy import optimize, special
-
     if not 0 < hits.sum() < runs.sum():
         return NO_FIT
     logarithm = np.log(intensities)
@@ -152,10 +149,12 @@ def fit_lognormal(
     def unlikelihood(line: Floats) -> float:
         # convex, as a straight line in ln x; not so in median and dispersion
         linear = line[0] + line[1] * (logarithm - centre)
-        likelihood = hits * special.log_ndtr(linear) + (runs - hits) * special.log_ndtr(-linear)
+        likelihood = hits * scipy.special.log_ndtr(linear) + (runs - hits) * scipy.special.log_ndtr(
+            -linear
+        )
         return -float(np.sum(likelihood))
 
-    level, slope = optimize.minimize(
+    level, slope = scipy.optimize.minimize(
         unlikelihood,
         [0.0, 1.0],
         method="Nelder-Mead",
@@ -233,8 +232,6 @@ def propagate(
     `samples` is rounded up to a power of two. Deterministic in `seed`. Raises `InputError` where
     nothing of the scene is uncertain, or a draw is not a scene.
     """
-    from scipy.stats import binomtest, qmc
-
     from rockcheck.ebm import natural
 
     if not given.spreads:
@@ -244,7 +241,7 @@ def propagate(
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-8)
     count = 1 << max(1, (samples - 1).bit_length())
     values = given.values(
-        qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count)
+        scipy.stats.qmc.Sobol(len(given.spreads), seed=np.random.default_rng(seed)).random(count)
     )
     step = max(given.scene.output_step, given.scene.duration / MOST_ROWS)
     given = replace(given, scene=given.scene.replace(output_step=step))
@@ -262,7 +259,7 @@ def propagate(
         ]
     )
     stands, fallen = found.side == 0, found.side[1:] != 0
-    share = binomtest(int(np.sum(fallen)), count).proportion_ci(
+    share = scipy.stats.binomtest(int(np.sum(fallen)), count).proportion_ci(
         measures.CONFIDENCE, method="wilson"
     )
     return Inputs(
@@ -317,14 +314,13 @@ def sensitivities(
     By scipy, after Saltelli et al. (2010). The number of runs is `samples` (a power of two) times
     the number of inputs plus two. Empty where the peak does not vary.
     """
-    from scipy.stats import sobol_indices
 
     def peak_and_fall(points: Floats) -> Floats:
         found, peaks = _played([given.at(row) for row in points.T], model)
         return np.array([peaks, found.side != 0], dtype=float)
 
     laws: list[Any] = [spread.law for spread in given.spreads.values()]
-    found = sobol_indices(
+    found = scipy.stats.sobol_indices(
         func=peak_and_fall, n=samples, dists=laws, rng=np.random.default_rng(seed)
     )
     # of one input scipy gives numbers in place of rows

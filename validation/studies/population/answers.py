@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import experience, writing
+from rockcheck.scenes import experience, history, writing
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.compare import QUANTITIES, spread
 from rockcheck.validation.execute import pool
@@ -42,7 +42,6 @@ from rockcheck.validation.uncertainty.numerical import Numerical
 
 #: Name of the error of a step or tolerance, among the sources of uncertainty.
 STEPS = "numerical error"
-OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
 #: Units as readers know them, where these are other words.
 UNITS = {"alpha": "α"}
@@ -242,7 +241,9 @@ def _falls(found: Found) -> Answer:
         "count": int(hits.sum()),
         **dict(zip(INTERVAL, writing.finite(ends.tolist()), strict=True)),
     }
-    outcomes = {name: sum(run.outcome == name for _, run in found.each) for name in OUTCOMES}
+    outcomes = {
+        name: sum(run.outcome == name for _, run in found.each) for name in history.OUTCOMES
+    }
     if count == 0:
         said = f"{name}: no run has a result."
     elif count == 1:
