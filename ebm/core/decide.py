@@ -102,7 +102,7 @@ def energy_of(block, motion):
 def swings_again(state, energy):
     """Whether this swing repeats the last one: then all to come do, too.
 
-    The swing turns back in a step that starts now with this energy. After the excitation the energy
+    The swing has turned back in this step, with this energy. After the excitation the energy
     and the place of the pivot are all that a swing depends on. Beside a wall that takes no energy a
     block may rock so for ever, however near its balance it turns back. A swing counts only where
     the pivot sticks to the floor and the block touches no wall.

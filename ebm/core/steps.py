@@ -67,7 +67,6 @@ def advance(block, base, run):
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     order, tau, t = state.order, state.tau, state.t
     rises = mode.family == Family.TILT and a[Row.OMEGA, 0] > 0.0
-    energy = energy_of(block, motion) if run.state.control.until_decided else 0.0
     motion_at(block, state, run.a, tau, motion)
     turns = rises and mode.sense * motion.w < 0.0
     if turns and not stays_below(a, Row.PHI, order, tau, state.peak):
@@ -76,7 +75,7 @@ def advance(block, base, run):
         if top > 0.0:
             state.peak = max(state.peak, value(a, Row.PHI, order, top))
     if turns and run.state.control.until_decided:
-        state.repeats = swings_again(state, energy)
+        state.repeats = swings_again(state, energy_of(block, motion))
     state.peak = max(state.peak, abs(motion.theta))
     state.swing = max(state.swing, abs(motion.w))
     state.stride = max(tau, INSTANT, _FADES * min(state.stride, state.length))
