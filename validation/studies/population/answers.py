@@ -727,8 +727,7 @@ def _models(found: Found) -> Iterator[Block]:
             sum(run.fell for run in found.others[model].values()),
             float(np.sqrt(np.mean(np.square(apart)))) if apart else None,
             max(map(abs, apart), default=None),
-            (trust := trusted[model]) and trust.bias,
-            trust and trust.scatter,
+            *(getattr(trusted[model], name, None) for name in ("bias", "scatter")),
         ]
         for model, apart in found.apart.items()
     ]
