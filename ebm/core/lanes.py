@@ -3,8 +3,8 @@
 A Taylor series has sixteen terms (see `ebm.core.series.ORDER`), two vectors. LLVM makes the
 machine code: one instruction where a register holds eight numbers (AVX-512), two or four where it
 holds fewer, with the same result to the bit. Here numba learns the type and what can be done with
-it: for each function there is the plain one, on an array of eight, which also says what it does,
-and the code that is built in its place.
+it: each function is the plain one, on an array of eight, which also says what it does, and is
+decorated with the code that is built in its place.
 
 `put`, `upto` and `above` take any lane number: where there is no such lane they put nothing, keep
 all, or keep none.
@@ -68,34 +68,41 @@ def _where(b: Any, how: str, place: Any) -> Any:
     )
 
 
-def _compiled(result: Any, *given: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Tells numba to compile the decorated function in place of the plain one.
+def _place(context: Any, b: Any, kind: Any, a: Any, row: Any, k: Any) -> Any:
+    """A pointer to the lanes from a[row, k] on of a matrix."""
+    matrix = make_array(kind)(context, b, a)
+    number = cgutils.get_item_pointer(context, b, kind, matrix, [row, k], wraparound=False)
+    return b.bitcast(number, ir.PointerType(_VECTOR))
 
-    The plain function has the same name without the underscore. The decorated one is called with
-    numba's context, the builder of the code, the types and the values of the arguments, for
-    arguments of the types `given`.
+
+def _compiled_as(
+    code: Callable[..., Any], result: Any, *given: Any
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Tells numba to compile `code` in place of the decorated function, the plain one.
+
+    `code` is called with the builder of the machine code and the values of the arguments, which are
+    of the types `given`. In place of a matrix, a row and a column it gets a pointer to the lanes.
     """
 
-    def tell(code: Callable[..., Any]) -> Callable[..., Any]:
-        plain = globals()[code.__name__[1:]]
-
+    def tell(plain: Callable[..., Any]) -> Callable[..., Any]:
         class _Template(AbstractTemplate):
             key = plain
 
             def generic(self, args: Any, kws: Any) -> Any:
+                kinds = zip(args, given, strict=True)
                 return signature(
-                    result,
-                    *(
-                        a if isinstance(a, types.Array) else kind
-                        for a, kind in zip(args, given, strict=True)
-                    ),
+                    result, *(a if isinstance(a, types.Array) else k for a, k in kinds)
                 )
 
+        def lower(context: Any, b: Any, kinds: Any, values: Any) -> Any:
+            if types.Array in given:
+                values = [_place(context, b, kinds.args[0], *values[:3]), *values[3:]]
+            found = code(b, *values)
+            return context.get_dummy_value() if result == types.none else found
+
         infer_global(plain, types.Function(_Template))
-        lower_builtin(plain, *given)(
-            lambda context, b, kinds, values: code(context, b, kinds.args, values)
-        )
-        return code
+        lower_builtin(plain, *given)(lower)
+        return plain
 
     return tell
 
@@ -131,38 +138,20 @@ _calculates(operator.add, "fadd")
 _calculates(operator.mul, "fmul")
 
 
+@_compiled_as(lambda b: _ZEROS, _LANES)
 def zeros() -> Floats:
     """0 in each lane."""
     return np.zeros(LANES)
 
 
-@_compiled(_LANES)
-def _zeros(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return _ZEROS
-
-
+@_compiled_as(lambda b: _RAMP, _LANES)
 def ramp() -> Floats:
     """Each lane's own number: 0, 1, 2, ..."""
     return np.arange(float(LANES))
 
 
-@_compiled(_LANES)
-def _ramp(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return _RAMP
-
-
-def powers(t: float) -> Floats:
-    """1, t, t^2, ..."""
-    result = np.ones(LANES)
-    for bit in (1, 2, 4):
-        result = result * np.where(_PLACES & bit, t, 1.0)
-        t = t * t
-    return result
-
-
-@_compiled(_LANES, types.float64)
-def _powers(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    result, t = _ONES, values[0]
+def _powers(b: Any, t: Any) -> Any:
+    result = _ONES
     for bit in (1, 2, 4):
         has = ir.Constant(
             ir.VectorType(ir.IntType(1), LANES), [bool(place & bit) for place in _PLACES]
@@ -172,67 +161,70 @@ def _powers(context: Any, b: Any, kinds: Any, values: Any) -> Any:
     return result
 
 
+@_compiled_as(_powers, _LANES, types.float64)
+def powers(t: float) -> Floats:
+    """1, t, t^2, ..."""
+    result = np.ones(LANES)
+    for bit in (1, 2, 4):
+        result = result * np.where(_PLACES & bit, t, 1.0)
+        t = t * t
+    return result
+
+
+@_compiled_as(lambda b, v: b.extract_element(v, ir.IntType(32)(0)), types.float64, _LANES)
 def first(v: Floats) -> float:
     """The number in lane 0."""
     return v[0]
 
 
-@_compiled(types.float64, _LANES)
-def _first(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.extract_element(values[0], ir.IntType(32)(0))
-
-
+@_compiled_as(lambda b, v: b.shuffle_vector(v, _ZEROS, _indices(_PLACES + 1)), _LANES, _LANES)
 def shifted(v: Floats) -> Floats:
     """Each lane's number moved to the lane before; 0 comes into the last one."""
     return np.append(v[1:], 0.0)
 
 
-@_compiled(_LANES, _LANES)
-def _shifted(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.shuffle_vector(values[0], _ZEROS, _indices(_PLACES + 1))
-
-
+@_compiled_as(
+    lambda b, v, place, number: b.select(_where(b, "==", place), _all(b, number), v),
+    *(_LANES, _LANES, types.int64, types.float64),
+)
 def put(v: Floats, place: int, number: float) -> Floats:
     """The lanes with this number in one place."""
     return np.where(place == _PLACES, number, v)
 
 
-@_compiled(_LANES, _LANES, types.int64, types.float64)
-def _put(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    v, place, number = values
-    return b.select(_where(b, "==", place), _all(b, number), v)
-
-
+@_compiled_as(
+    lambda b, v, place: b.select(_where(b, "<=", place), v, _ZEROS), _LANES, _LANES, types.int64
+)
 def upto(v: Floats, place: int) -> Floats:
     """The lanes up to this place, 0 in those behind it."""
     return np.where(place >= _PLACES, v, 0.0)
 
 
-@_compiled(_LANES, _LANES, types.int64)
-def _upto(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.select(_where(b, "<=", values[1]), values[0], _ZEROS)
-
-
+@_compiled_as(
+    lambda b, v, place: b.select(_where(b, ">", place), v, _ZEROS), _LANES, _LANES, types.int64
+)
 def above(v: Floats, place: int) -> Floats:
     """The lanes behind this place, 0 in those up to it."""
     return np.where(place < _PLACES, v, 0.0)
 
 
-@_compiled(_LANES, _LANES, types.int64)
-def _above(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.select(_where(b, ">", values[1]), values[0], _ZEROS)
-
-
+@_compiled_as(lambda b, v: b.select(b.fcmp_ordered(">", v, _ZEROS), _ZEROS, v), _LANES, _LANES)
 def falls(v: Floats) -> Floats:
     """The negative numbers, and 0 for the positive ones. NaN stays NaN."""
     return np.where(v > 0.0, 0.0, v)
 
 
-@_compiled(_LANES, _LANES)
-def _falls(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.select(b.fcmp_ordered(">", values[0], _ZEROS), _ZEROS, values[0])
+def _total(b: Any, v: Any) -> Any:
+    count = LANES
+    while count > 1:
+        count //= 2
+        nothing = ir.Constant(v.type, ir.Undefined)
+        low = b.shuffle_vector(v, nothing, _indices(range(count)))
+        v = b.fadd(low, b.shuffle_vector(v, nothing, _indices(range(count, 2 * count))))
+    return b.extract_element(v, ir.IntType(32)(0))
 
 
+@_compiled_as(_total, types.float64, _LANES)
 def total(v: Floats) -> float:
     """The sum of all lanes, by halving.
 
@@ -244,42 +236,16 @@ def total(v: Floats) -> float:
     return v[0]
 
 
-@_compiled(types.float64, _LANES)
-def _total(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    v, count = values[0], LANES
-    while count > 1:
-        count //= 2
-        nothing = ir.Constant(v.type, ir.Undefined)
-        low = b.shuffle_vector(v, nothing, _indices(range(count)))
-        v = b.fadd(low, b.shuffle_vector(v, nothing, _indices(range(count, 2 * count))))
-    return b.extract_element(v, ir.IntType(32)(0))
+_IN_MATRIX = types.Array, types.int64, types.int64
 
 
+@_compiled_as(lambda b, place: b.load(place, align=8), _LANES, *_IN_MATRIX)
 def load(a: Floats, row: int, k: int) -> Floats:
     """The numbers a[row, k], a[row, k + 1], ... of a matrix; they must all be in the row."""
     return a[row, k : k + LANES].copy()
 
 
-def _place(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    """A pointer to lanes in a matrix."""
-    matrix = make_array(kinds[0])(context, b, values[0])
-    number = cgutils.get_item_pointer(
-        context, b, kinds[0], matrix, [values[1], values[2]], wraparound=False
-    )
-    return b.bitcast(number, ir.PointerType(_VECTOR))
-
-
-@_compiled(_LANES, types.Array, types.int64, types.int64)
-def _load(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    return b.load(_place(context, b, kinds, values), align=8)
-
-
+@_compiled_as(lambda b, place, v: b.store(v, place, align=8), types.none, *_IN_MATRIX, _LANES)
 def store(a: Floats, row: int, k: int, v: Floats) -> None:
     """Writes a[row, k], a[row, k + 1], ... of a matrix; they must all be in the row."""
     a[row, k : k + LANES] = v
-
-
-@_compiled(types.none, types.Array, types.int64, types.int64, _LANES)
-def _store(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-    b.store(values[3], _place(context, b, kinds, values), align=8)
-    return context.get_dummy_value()
