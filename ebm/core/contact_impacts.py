@@ -25,19 +25,15 @@ where it lands flat while it slides. Rigid-body mechanics does not say which law
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import record, side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
 from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Friction, Kind, Law
 from rockcheck.ebm.core.series import NOISE
-from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-#: Rows of scratch that an impact needs.
-WORK = 20
 # Every set of at most three contacts: their number, the contacts, and these as bits.
 _SETS = np.array(
     [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in CONTACT_SETS]
@@ -56,44 +52,37 @@ _MOST_STAGES = 40
 _HALVINGS, _FRICTIONS = 45, len(Friction)
 
 
-class Impact(NamedTuple):
-    """Contacts that touch at one instant.
-
-    The block tips by phi to `sense`; `touching[6]` says which gaps are closed (not 0), `resting` is
-    the approach speed below which a contact closes for good, and v (xi, y, phi rates) becomes the
-    velocities after the impact.
-    """
-
-    sense: float
-    phi: float
-    touching: Floats
-    e_tip: float
-    e_far: float
-    resting: float
-    v: Floats
-
-
-class Stage(NamedTuple):
-    """What a stage of an impact works on.
-
-    `rows` of the contacts, a linear `system`; of a trial the impulses `lam` and the velocities
-    `trial`. Of each contact its restitution, the velocity that it is to leave with (`target`), its
-    impulse (`part`), its approach, how far its next impact is `ahead`, whether it takes part
-    (`taking`), and its `full` rebound. `after` has the velocities after the stage.
-    """
-
-    rows: Floats
-    system: Floats
-    lam: Floats
-    trial: Floats
-    restitution: Floats
-    target: Floats
-    part: Floats
-    approach: Floats
-    ahead: Floats
-    after: Floats
-    taking: Floats
-    full: Floats
+#: Contacts that touch at one instant, and what their stages work on.
+IMPACT = record(
+    # The block tips by phi to `sense`; which gaps are closed; the restitution at the tip wall and
+    # the far one; the approach speed below which a contact closes for good; the velocities (xi, y,
+    # phi rates), which become those after the impact.
+    sense="f8",
+    phi="f8",
+    touching=("i1", (CONTACTS,)),
+    e_tip="f8",
+    e_far="f8",
+    resting="f8",
+    v=("f8", (3,)),
+    # The contacts' rows (see `contact_rows`), and a linear system; of a trial the impulses and the
+    # velocities.
+    rows=("f8", (CONTACTS + 1, 3)),
+    system=("f8", (3, 4)),
+    lam=("f8", (3,)),
+    trial=("f8", (3,)),
+    # Of each contact, in this stage: its approach and its restitution, how far its next impact is,
+    # whether it takes part, the velocity that it is to leave with, that of a full rebound, and its
+    # impulse.
+    approach=("f8", (CONTACTS,)),
+    restitution=("f8", (CONTACTS,)),
+    ahead=("f8", (CONTACTS,)),
+    taking=("i1", (CONTACTS,)),
+    target=("f8", (CONTACTS,)),
+    full=("f8", (CONTACTS,)),
+    part=("f8", (CONTACTS,)),
+    # The velocities after the stage.
+    after=("f8", (3,)),
+)
 
 
 @inner_kernel
@@ -204,15 +193,16 @@ def _unknown(number, i):
 
 
 @inner_kernel
-def _try_set(block, stage, v, number, friction):
+def _try_set(block, impact, number, friction):
     """The impulses of the contacts in the set and the velocities after them; False if singular."""
-    rows, system, lam, trial, spin = stage.rows, stage.system, stage.lam, stage.trial, block.spin
+    rows, system, v, spin = impact.rows, impact.system, impact.v, block.spin
+    lam, trial = impact.lam, impact.trial
     n = _SETS[number, 0] + (1 if friction == Friction.HELD else 0)
     mu_k = block.mu_k
     kappa = mu_k if friction == Friction.PLUS else (-mu_k if friction == Friction.MINUS else 0.0)
     for i in range(n):
         row = _unknown(number, i)
-        system[i, n] = 0.0 if row == Contact.TANGENT else stage.target[row]
+        system[i, n] = 0.0 if row == Contact.TANGENT else impact.target[row]
         for k in range(3):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
@@ -233,13 +223,13 @@ def _try_set(block, stage, v, number, friction):
 
 
 @inner_kernel
-def _violation(block, stage, number, friction, rounding):
+def _violation(block, impact, number, friction, rounding):
     """By how much a solution violates the law, 0 within the rounding.
 
     Violations are a pull, a contact that still closes, friction beyond its cone or in the wrong
     sense.
     """
-    rows, lam, trial = stage.rows, stage.lam, stage.trial
+    rows, lam, trial = impact.rows, impact.lam, impact.trial
     count = _SETS[number, 0]
     worst = 0.0
     floor_normal = 0.0
@@ -253,13 +243,13 @@ def _violation(block, stage, number, friction, rounding):
     elif friction != Friction.FREE:
         worst = max(worst, -slip if friction == Friction.PLUS else slip)
     for j in range(CONTACTS):
-        if stage.taking[j] != 0.0:
-            worst = max(worst, stage.target[j] - _dot(rows[j], trial))
+        if impact.taking[j]:
+            worst = max(worst, impact.target[j] - _dot(rows[j], trial))
     return 0.0 if worst <= rounding else worst
 
 
 @called_kernel
-def _strike(block, stage, v):
+def _strike(block, impact):
     """One stage over the contacts that take part: writes the velocities and impulses after it.
 
     Every set of contacts is tried with every friction. Of those that obey the law the one that
@@ -267,22 +257,22 @@ def _strike(block, stage, v):
     (Painleve), the one that contradicts it least is taken, and the result is False.
     """
     least, lowest = np.inf, np.inf
-    bits = _bits_of(stage.taking)
+    bits = _bits_of(impact.taking)
     for place in range(_WITHIN.shape[1]):
         number = _WITHIN[bits, place]
         if number < 0:
             break
         for friction in range(_FRICTIONS):
             fits = _fits(number, friction, block.mu_s == 0.0)
-            if not fits or not _try_set(block, stage, v, number, friction):
+            if not fits or not _try_set(block, impact, number, friction):
                 continue
-            scale = _size(v) + _size(stage.trial) + _size(stage.lam)
-            wrong = _violation(block, stage, number, friction, ROUNDING * scale)
-            energy = kinetic_energy(block.spin, stage.trial)
+            scale = _size(impact.v) + _size(impact.trial) + _size(impact.lam)
+            wrong = _violation(block, impact, number, friction, ROUNDING * scale)
+            energy = kinetic_energy(block.spin, impact.trial)
             lower = wrong == least and energy < lowest - ROUNDING * scale * scale
             if wrong < least or lower:
                 least, lowest = wrong, energy
-                _keep(stage, number, friction)
+                _keep(impact, number, friction)
     return least == 0.0
 
 
@@ -290,45 +280,44 @@ def _strike(block, stage, v):
 def _bits_of(taking):
     bits = 0
     for j in range(CONTACTS):
-        bits |= (1 if taking[j] != 0.0 else 0) << j
+        bits |= (1 if taking[j] else 0) << j
     return bits
 
 
 @inner_kernel
-def _keep(stage, number, friction):
+def _keep(impact, number, friction):
     """Keeps what was tried."""
-    stage.part[:] = 0.0
+    impact.part[:] = 0.0
     for i in range(_SETS[number, 0]):
-        stage.part[_SETS[number, 1 + i]] = max(stage.lam[i], 0.0)
-    for k in range(3):
-        stage.after[k] = stage.trial[k]
+        impact.part[_SETS[number, 1 + i]] = max(impact.lam[i], 0.0)
+    impact.after = impact.trial
     if friction == Friction.HELD:
         # Rounding only: the pivot stands.
-        stage.after[0] -= _dot(stage.rows[Contact.TANGENT], stage.after)
+        impact.after[0] -= _dot(impact.rows[Contact.TANGENT], impact.after)
 
 
 @inner_kernel
-def _moreau(law, stage, touching, rounding):
+def _moreau(law, impact, rounding):
     """Whatever touches takes part; at an elastic wall only the corners that approach."""
     for j in range(CONTACTS):
-        elastic = law != Law.CLOSED_BRANCH and not stage.restitution[j] < 1.0
+        elastic = law != Law.CLOSED_BRANCH and not impact.restitution[j] < 1.0
         rests = j <= Contact.OTHER or (law != Law.OPEN_BRANCH and not elastic)
-        takes = touching[j] != 0.0 and (rests or stage.approach[j] < -rounding)
-        stage.taking[j] = 1.0 if takes else 0.0
+        takes = rests or impact.approach[j] < -rounding
+        impact.taking[j] = impact.touching[j] and takes
 
 
 @inner_kernel
-def _one_corner(law, stage, slip):
+def _one_corner(law, impact):
     """Of two bottom corners that approach the floor only the law's first one takes part.
 
     F stands on the side of negative slip. Without slip neither leads, and both take part.
     """
     if law != Law.LEADING_FIRST and law != Law.TRAILING_FIRST:
         return
-    approach = stage.approach
+    approach, slip = impact.approach, _dot(impact.rows[Contact.TANGENT], impact.v)
     if max(approach[Contact.FOOT], approach[Contact.OTHER]) < -SLOW and abs(slip) >= SLOW:
         trails = (slip < 0.0) == (law == Law.LEADING_FIRST)
-        stage.taking[Contact.OTHER if trails else Contact.FOOT] = 0.0
+        impact.taking[Contact.OTHER if trails else Contact.FOOT] = False
 
 
 @inner_kernel
@@ -342,108 +331,89 @@ def _soonest(approach, ahead, rounding):
 
 
 @inner_kernel
-def _floor_first(stage, touching, number, rounding):
+def _floor_first(impact, number, rounding):
     """The contacts that are struck next in a neighbouring trajectory, and those that rest.
 
     `ahead` keeps how far each contact is from its next impact there: where the floor is struck
     first, a wall is one unit away.
     """
-    approach, ahead, taking = stage.approach, stage.ahead, stage.taking
+    approach, ahead, taking = impact.approach, impact.ahead, impact.taking
     if number == 0:
         floor = min(approach[Contact.FOOT], approach[Contact.OTHER]) < -rounding
-        for j in range(CONTACTS):
-            ahead[j] = floor * (j > Contact.OTHER)
+        ahead[: Contact.TIP_TOP], ahead[Contact.TIP_TOP :] = 0.0, floor
     soonest = _soonest(approach, ahead, rounding)
     for j in range(CONTACTS):
-        taking[j] = 0.0
-        if approach[j] < -rounding and ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL):
+        strikes = ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL)
+        taking[j] = approach[j] < -rounding and strikes
+        if taking[j]:
             ahead[j] = 0.0
-            taking[j] = 1.0
-        elif touching[j] != 0.0:
+        elif impact.touching[j]:
             ahead[j] = max(0.0, ahead[j] + approach[j] * soonest)
-            rests = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
-            taking[j] = 1.0 if rests else 0.0
+            taking[j] = abs(approach[j]) <= rounding and ahead[j] <= _PARALLEL
 
 
 @inner_kernel
-def _approaches(block, impact, stage, plastic, rounding):
+def _approaches(block, impact, plastic, rounding):
     """Writes how each contact approaches and rebounds; whether any approaches."""
     closes = False
     for j in range(CONTACTS):
-        touches = impact.touching[j] != 0.0
-        stage.approach[j] = _dot(stage.rows[j], impact.v) if touches else 0.0
-        closes = closes or stage.approach[j] < -rounding
+        impact.approach[j] = _dot(impact.rows[j], impact.v) if impact.touching[j] else 0.0
+        closes = closes or impact.approach[j] < -rounding
         e_wall = impact.e_tip if j <= Contact.TIP_BOTTOM else impact.e_far
-        stage.restitution[j] = block.e_floor if j <= Contact.OTHER else e_wall
-        if plastic:
-            stage.restitution[j] = 0.0
+        e = block.e_floor if j <= Contact.OTHER else e_wall
+        impact.restitution[j] = 0.0 if plastic else e
     return closes
 
 
 @inner_kernel
-def _choose(law, impact, stage, number, rounding):
+def _choose(law, impact, number, rounding):
     """Writes which contacts take part in stage `number` by this law, and their targets.
 
     A target is the velocity with which a contact is to leave.
     """
     if law == Law.FLOOR_FIRST:
-        _floor_first(stage, impact.touching, number, rounding)
+        _floor_first(impact, number, rounding)
     else:
-        _moreau(law, stage, impact.touching, rounding)
-        _one_corner(law, stage, _dot(stage.rows[Contact.TANGENT], impact.v))
+        _moreau(law, impact, rounding)
+        _one_corner(law, impact)
     for j in range(CONTACTS):
-        rebounds = stage.taking[j] != 0.0 and stage.approach[j] < -impact.resting
-        stage.target[j] = -stage.restitution[j] * stage.approach[j] if rebounds else 0.0
+        rebounds = impact.taking[j] and impact.approach[j] < -impact.resting
+        impact.target[j] = -impact.restitution[j] * impact.approach[j] if rebounds else 0.0
 
 
 @called_kernel
-def contact_impact(block, impact, state, work):
-    """All stages of an `Impact`; returns what came of it, a Found.
+def contact_impact(block, state):
+    """All stages of the state's IMPACT; returns what came of it, a Found.
 
-    `work` is scratch, such as that of the root search: `WORK` rows. The state gathers the normal
-    impulses, counts the stages that added energy and keeps the largest relative gain.
+    The state gathers the normal impulses, counts the stages that added energy and keeps the largest
+    relative gain.
     """
-    v, touching, rows = impact.v, impact.touching, work[:7]
-    # The impulses and velocities of a trial stand below the system.
-    stage = Stage(
-        rows,
-        work[7:12],
-        work[10],
-        work[11],
-        work[12],
-        work[13],
-        work[14],
-        work[15],
-        work[16],
-        work[17],
-        work[18],
-        work[19],
-    )
-    contact_rows(block, impact.sense, impact.phi, rows)
-    stage.part[:] = 0.0
-    stage.after[:] = 0.0
+    impact, v = state.impact, state.impact.v
+    contact_rows(block, impact.sense, impact.phi, impact.rows)
+    impact.part[:], impact.after[:] = 0.0, 0.0
     rounding = ROUNDING * _size(v)
     found = Found.FITS
     for number in range(_MOST_STAGES):
         # Impacts that alternate between floor and wall without end become plastic.
         plastic = 2 * number >= _MOST_STAGES
-        if not _approaches(block, impact, stage, plastic, rounding):
-            _close(block, stage, impact)
+        if not _approaches(block, impact, plastic, rounding):
+            _close(block, impact)
             return found
-        _choose(Law.MOREAU if plastic else block.law, impact, stage, number, rounding)
+        _choose(Law.MOREAU if plastic else block.law, impact, number, rounding)
         before = kinetic_energy(block.spin, v)
-        if not _strike(block, stage, v):
+        if not _strike(block, impact):
             found = Found.LEAST_WRONG
         noise = 2.0 * ROUNDING * before
-        gains = kinetic_energy(block.spin, stage.after) - before > noise
+        gains = kinetic_energy(block.spin, impact.after) - before > noise
         if block.energy_cap and not plastic and gains:
-            _strike_without_gain(block, stage, v, before)
-        gain = kinetic_energy(block.spin, stage.after) - before
+            _strike_without_gain(block, impact, before)
+        gain = kinetic_energy(block.spin, impact.after) - before
         if gain > noise:
             state.gains += 1
             state.largest_gain = max(state.largest_gain, gain / before)
-        _end_stage(stage, v, state)
-    if touching[Contact.TIP_TOP] != 0.0 and touching[Contact.FAR_BOTTOM] != 0.0:
+        impact.v = impact.after
+        _gather(state, impact.part)
+    if impact.touching[Contact.TIP_TOP] and impact.touching[Contact.FAR_BOTTOM]:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.
         v[0] = v[2] = 0.0
@@ -451,46 +421,40 @@ def contact_impact(block, impact, state, work):
 
 
 @inner_kernel
-def _end_stage(stage, v, state):
-    """Gathers the impulses of a stage, and makes its velocities those of the block."""
+def _gather(state, impulses):
     for j in range(CONTACTS):
-        state.impulse += stage.part[j]
-    for k in range(3):
-        v[k] = stage.after[k]
+        state.impulse += impulses[j]
 
 
 @called_kernel
-def _strike_without_gain(block, stage, v, before):
+def _strike_without_gain(block, impact, before):
     """Strikes with the largest share of the rebound at which no energy is gained."""
-    for j in range(CONTACTS):
-        stage.full[j] = stage.target[j]
+    impact.full = impact.target
     low, high = 0.0, 1.0
     for trial in range(_HALVINGS + 1):
         scale = low if trial == _HALVINGS else 0.5 * (low + high)
         for j in range(CONTACTS):
-            stage.target[j] = scale * stage.full[j]
-        _strike(block, stage, v)
-        if kinetic_energy(block.spin, stage.after) > before:
+            impact.target[j] = scale * impact.full[j]
+        _strike(block, impact)
+        if kinetic_energy(block.spin, impact.after) > before:
             high = scale
         else:
             low = scale
 
 
 @called_kernel
-def _close(block, stage, impact):
+def _close(block, impact):
     """Closes the contacts that part more slowly than `resting`.
 
     They strike without rebound and without friction: as many as have a solution, the floor's first.
     """
-    v = impact.v
+    impact.target[:] = 0.0
     for j in range(CONTACTS):
-        slow = abs(_dot(stage.rows[j], v)) < impact.resting
-        stage.taking[j] = 1.0 if impact.touching[j] != 0.0 and slow else 0.0
-        stage.target[j] = 0.0
-    others = ~_bits_of(stage.taking)
+        slow = abs(_dot(impact.rows[j], impact.v)) < impact.resting
+        impact.taking[j] = impact.touching[j] and slow
+    others = ~_bits_of(impact.taking)
     for number in _LARGEST_FIRST:
         inside = _SETS[number, 4] & others == 0
-        if inside and _try_set(block, stage, v, number, Friction.FREE):
-            for k in range(3):
-                v[k] = stage.trial[k]
+        if inside and _try_set(block, impact, number, Friction.FREE):
+            impact.v = impact.trial
             return

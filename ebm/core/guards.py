@@ -10,7 +10,8 @@ How to add a guard:
 
 1. `ebm.core.names`: a member of `Guard`. Its place is its priority at one instant, and up to
    FAR_GAP a guard is a gap, whose end is an impact. No other name in `ebm` may be the same.
-2. A line in `GUARDS`, and in `fill_guards` its weights, positive as long as the mode may last.
+2. A line in `GUARDS`, and in `fill_guards` its constant and weights, positive as long as the mode
+   may last.
 3. `rock_guards_hold`: ROCK takes a short cut past the table, so that a guard of ROCK is bounded
    there, too.
 4. `ebm.core.coulomb._change` names the event by the modes before and after it. A new one is a
@@ -31,32 +32,32 @@ from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
 
-#: Each guard: what it is, and the series that it can combine. A rate is that of its combination.
+#: Each guard: what it is, how many terms fewer than the order it has, and the series that it
+#: combines, in the order of its weights. A rate is that of its combination.
 GUARDS: dict[int, tuple[int, ...]] = {
-    Guard.PHI: (Kind.POSITION, Row.PHI),
-    Guard.TOPPLE: (Kind.POSITION, Row.PHI),
-    Guard.LANDING: (Kind.POSITION, Row.COS, Row.Y),
-    Guard.TIP_GAP: (Kind.POSITION, Row.SIN, Row.COS, Row.XI),
-    Guard.FAR_GAP: (Kind.POSITION, Row.SIN, Row.COS, Row.XI),
-    Guard.FLOOR_PUSH: (Kind.FORCE, Row.P),
-    Guard.TIP_PUSH: (Kind.FORCE, Row.Q, Row.NA),
-    Guard.FAR_PUSH: (Kind.FORCE, Row.NB),
-    Guard.CONE_PLUS: (Kind.FORCE, Row.P, Row.Q),
-    Guard.CONE_MINUS: (Kind.FORCE, Row.P, Row.Q),
-    Guard.SLIP: (Kind.RATE, Row.PHI, Row.SIN, Row.XI),
-    Guard.UPLIFT_PLUS: (Kind.FORCE, Row.P, Row.Q),
-    Guard.UPLIFT_MINUS: (Kind.FORCE, Row.P, Row.Q),
-    Guard.LOADS: (Kind.POSITION, Row.Z),
+    Guard.PHI: (Kind.POSITION, 0, Row.PHI),
+    Guard.TOPPLE: (Kind.POSITION, 0, Row.PHI),
+    Guard.LANDING: (Kind.POSITION, 0, Row.COS, Row.Y),
+    Guard.TIP_GAP: (Kind.POSITION, 0, Row.SIN, Row.COS, Row.XI),
+    Guard.FAR_GAP: (Kind.POSITION, 0, Row.SIN, Row.COS, Row.XI),
+    Guard.FLOOR_PUSH: (Kind.FORCE, 2, Row.P),
+    Guard.TIP_PUSH: (Kind.FORCE, 2, Row.Q, Row.NA),
+    Guard.FAR_PUSH: (Kind.FORCE, 2, Row.NB),
+    Guard.CONE_PLUS: (Kind.FORCE, 2, Row.P, Row.Q),
+    Guard.CONE_MINUS: (Kind.FORCE, 2, Row.P, Row.Q),
+    Guard.SLIP: (Kind.RATE, 1, Row.PHI, Row.SIN, Row.XI),
+    Guard.UPLIFT_PLUS: (Kind.FORCE, 2, Row.P, Row.Q),
+    Guard.UPLIFT_MINUS: (Kind.FORCE, 2, Row.P, Row.Q),
+    Guard.LOADS: (Kind.POSITION, 1, Row.Z),
 }
-KIND = np.array([GUARDS[which][0] for which in range(len(GUARDS))])
-_MOST = max(map(len, GUARDS.values())) - 1
+KIND, _SHORTER = np.array([GUARDS[which][:2] for which in range(len(GUARDS))]).T.copy()
+_MOST = max(map(len, GUARDS.values())) - 2
 # The series that a guard combines. The guard itself fills the empty places: it has no weight.
 _COMBINES = np.array(
-    [[*GUARDS[which][1:], *[Row.GUARD] * _MOST][:_MOST] for which in range(len(GUARDS))]
+    [[*GUARDS[which][2:], *[Row.GUARD] * _MOST][:_MOST] for which in range(len(GUARDS))]
 )
-# The columns of the table: the weight of each series, a constant, and how many terms fewer than the
-# order the guard has (-1: no guard).
-_CONSTANT, _SHORTER = Row.GUARD + 1, Row.GUARD + 2
+# The columns of the table: the weight of each series, a constant, and whether there is the guard.
+_CONSTANT, _THERE = Row.GUARD + 1, Row.GUARD + 2
 #: A force is the second derivative of a truncated series: its zero is found to rounding from nearby
 #: only, within this share of a step.
 _NEARBY = 0.25
@@ -66,21 +67,18 @@ _ANY = 2.0**400
 
 
 @inner_kernel
-def _enter(a, which, shorter, source, weight):
-    """Enters a guard into the table, `shorter` terms shorter than the series.
-
-    It gets the weight of one series; its other weights and its constant are zero.
-    """
+def _enter(a, which, constant, *weights):
+    """Enters a guard into the table: its constant, and the weights of its series (see GUARDS)."""
     row = Row.TABLE + which
-    for k in range(_MOST):
-        a[row, _COMBINES[which, k]] = 0.0
-    a[row, source], a[row, _CONSTANT], a[row, _SHORTER] = weight, 0.0, shorter
+    for k in range(len(weights)):
+        a[row, _COMBINES[which, k]] = weights[k]
+    a[row, _CONSTANT], a[row, _THERE] = constant, 1.0
 
 
 @inner_kernel
 def drop(a, which):
     """Removes a guard from the table."""
-    a[Row.TABLE + which, _SHORTER] = -1.0
+    a[Row.TABLE + which, _THERE] = 0.0
 
 
 @inner_kernel
@@ -92,49 +90,48 @@ def fill_guards(block, state, a):
     if mode.family == Family.FLAT:
         _fill_flat(block, state, a)
         return
-    _enter(a, Guard.PHI, 0, Row.PHI, 1.0)
+    _enter(a, Guard.PHI, 0.0, 1.0)
     # Else no step on the floor is long enough to turn the block over.
     if a[Row.PHI, 0] >= 0.5 or mode.pivot == Pivot.OFF:
-        _enter(a, Guard.TOPPLE, 0, Row.PHI, -1.0)
-        a[Row.TABLE + Guard.TOPPLE, _CONSTANT] = 0.5 * math.pi
+        _enter(a, Guard.TOPPLE, 0.5 * math.pi, -1.0)
     if mode.pivot == Pivot.OFF:
-        _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
-        a[Row.TABLE + Guard.LANDING, Row.COS] = -1.0
+        _enter(a, Guard.LANDING, 0.0, -1.0, 1.0)
     else:
-        _fill_friction(block, state, block.mu_s * mode.pull, a)
+        _fill_friction(block, state, block.mu_s * mode.pull, 0.0, a)
+    slip = float(mode.slip)
     if mode.pivot == Pivot.SLIPPING and on_wall(mode):
         # Along a wall V = (c + C) dtheta/dt, and C = -c at theta = 0: the rotation tells the sense
         # of slip everywhere.
-        _enter(a, Guard.SLIP, 1, Row.PHI, float(mode.slip))
+        _enter(a, Guard.SLIP, 0.0, slip, 0.0, 0.0)
     elif mode.pivot == Pivot.SLIPPING:
-        _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
-        a[Row.TABLE + Guard.SLIP, Row.SIN] = -mode.slip
+        _enter(a, Guard.SLIP, 0.0, 0.0, -slip, slip)
     if block.walls:
         _fill_gap(block, state, a, True)
         _fill_gap(block, state, a, False)
         if mode.tip != 0:
-            _enter(a, Guard.TIP_PUSH, 2, Row.NA, 1.0)
+            _enter(a, Guard.TIP_PUSH, 0.0, 0.0, 1.0)
         if mode.far != 0:
-            _enter(a, Guard.FAR_PUSH, 2, Row.NB, 1.0)
+            _enter(a, Guard.FAR_PUSH, 0.0, 1.0)
 
 
 @inner_kernel
-def _fill_friction(block, state, mu, a):
-    """The floor's push, and the two sides of the friction cone |Q| <= mu P.
+def _fill_friction(block, state, mu, constant, a):
+    """The floor's push, and the two sides of the friction cone |Q| <= mu P + constant.
 
     The friction of a wedged block that winds (Bouc-Wen's) has no cone to leave. Where the pivot
     unloads, z comes to the sense of slip.
     """
-    mode = state.mode
-    wedged = state.winds and mode.family == Family.TILT and mode.pivot == Pivot.STICK
-    if block.unilateral or mode.pivot == Pivot.SLIPPING or wedged:
-        _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
+    mode, flat = state.mode, state.mode.family == Family.FLAT
+    wedged = state.winds and not flat and mode.pivot == Pivot.STICK
+    # The paper's floor holds a flat block that no wall holds.
+    pushes = on_wall(mode) or mode.pull < 0 if flat else mode.pivot == Pivot.SLIPPING or wedged
+    if block.unilateral or pushes:
+        _enter(a, Guard.FLOOR_PUSH, 0.0, float(mode.pull))
     if mode.pivot == Pivot.STICK and not block.no_slip and not wedged:
-        _enter(a, Guard.CONE_PLUS, 2, Row.P, mu)
-        _enter(a, Guard.CONE_MINUS, 2, Row.P, mu)
-        a[Row.TABLE + Guard.CONE_PLUS, Row.Q], a[Row.TABLE + Guard.CONE_MINUS, Row.Q] = -1.0, 1.0
+        _enter(a, Guard.CONE_PLUS, constant, mu, -1.0)
+        _enter(a, Guard.CONE_MINUS, constant, mu, 1.0)
     if state.winds and mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]:
-        _enter(a, Guard.LOADS, 1, Row.Z, -float(mode.slip))
+        _enter(a, Guard.LOADS, 0.0, -float(mode.slip))
 
 
 @inner_kernel
@@ -146,24 +143,16 @@ def _fill_gap(block, state, a, tip):
     if (mode.tip if tip else mode.far) != 0 or distance == np.inf:
         return
     sense = 1.0 if tip else -1.0
-    rock = rocks(mode)
-    if (
-        rock
-        and not tip
-        and distance - pivot - (block.left.arm + block.right.arm) > -contacts.CLOSED
-    ):
-        # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands:
-        # it cannot close before.
-        return
-    row = Row.TABLE + which
     along, across = wall_turn(side_of(block, mode.sense), tip)
-    _enter(a, which, 0, Row.COS, -along)
-    a[row, Row.SIN], a[row, _CONSTANT] = across, distance
-    if rock:  # xi is s and a constant
-        a[row, Row.SIN] += sense
-        a[row, _CONSTANT] += sense * pivot
-    else:
-        a[row, Row.XI] = sense
+    if not rocks(mode):
+        _enter(a, which, distance, across, -along, sense)
+        return
+    # About a fixed pivot the far gap shrinks with phi, down to this value as the block lands: it
+    # cannot close before.
+    landed = distance - pivot - (block.left.arm + block.right.arm)
+    if tip or not landed > -contacts.CLOSED:
+        # xi is s and a constant.
+        _enter(a, which, distance + sense * pivot, across + sense, -along, 0.0)
 
 
 @inner_kernel
@@ -172,39 +161,23 @@ def _fill_flat(block, state, a):
     mode = state.mode
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
     if block.gap_left < np.inf and mode.tip == 0:
-        _enter(a, Guard.TIP_GAP, 0, Row.XI, 1.0)
-        a[Row.TABLE + Guard.TIP_GAP, _CONSTANT] = block.gap_left
+        _enter(a, Guard.TIP_GAP, block.gap_left, 0.0, 0.0, 1.0)
     if block.gap_right < np.inf and mode.far == 0:
-        _enter(a, Guard.FAR_GAP, 0, Row.XI, -1.0)
-        a[Row.TABLE + Guard.FAR_GAP, _CONSTANT] = block.gap_right
+        _enter(a, Guard.FAR_GAP, block.gap_right, 0.0, 0.0, -1.0)
     if mode.tip != mode.far and mode.pivot == Pivot.OFF:
-        _enter(a, Guard.TIP_PUSH, 2, Row.NA, 1.0)
+        _enter(a, Guard.TIP_PUSH, 0.0, 0.0, 1.0)
     elif mode.tip != mode.far and hangs:
         # On the floor, Q is the base acceleration that the wall takes.
-        _enter(a, Guard.TIP_PUSH, 2, Row.Q, float(mode.tip - mode.far))
+        _enter(a, Guard.TIP_PUSH, 0.0, float(mode.tip - mode.far), 0.0)
     if mode.pivot == Pivot.OFF:
-        _enter(a, Guard.LANDING, 0, Row.Y, 1.0)
-        a[Row.TABLE + Guard.LANDING, _CONSTANT] = -block.height
-    else:
-        _fill_flat_floor(block, state, hangs, a)
-
-
-@inner_kernel
-def _fill_flat_floor(block, state, hangs, a):
-    """The guards of a translating block that the floor holds."""
-    mode = state.mode
+        _enter(a, Guard.LANDING, -block.height, 0.0, 1.0)
+        return
     if mode.pivot == Pivot.SLIPPING:
-        _enter(a, Guard.SLIP, 1, Row.XI, float(mode.slip))
+        _enter(a, Guard.SLIP, 0.0, 0.0, 0.0, float(mode.slip))
     # A force below rounding is to stay what it is where P vanishes.
     least = block.mu_s == LEAST_FRICTION
-    _fill_friction(block, state, 0.0 if least else block.mu_s, a)
-    if least:
-        a[Row.TABLE + Guard.CONE_PLUS, _CONSTANT] = block.mu_s
-        a[Row.TABLE + Guard.CONE_MINUS, _CONSTANT] = block.mu_s
-    drop(a, Guard.FLOOR_PUSH)
-    # Otherwise the paper's floor holds what no wall does.
-    if block.unilateral or on_wall(mode) or hangs:
-        _enter(a, Guard.FLOOR_PUSH, 2, Row.P, float(mode.pull))
+    mu, constant = (0.0, block.mu_s) if least else (block.mu_s, 0.0)
+    _fill_friction(block, state, mu, constant, a)
     _fill_uplift(block, mode, hangs, True, a)
     _fill_uplift(block, mode, hangs, False, a)
 
@@ -213,15 +186,14 @@ def _fill_flat_floor(block, state, hangs, a):
 def _fill_uplift(block, mode, hangs, plus, a):
     """The guard against a tilt to one side, unless a wall holds the block there."""
     held = (mode.tip if plus else mode.far) != 0
-    uplift = Guard.UPLIFT_PLUS if plus else Guard.UPLIFT_MINUS
     if mode.pivot != Pivot.STICK or not held:
         # A block that hangs by both corners tips as soon as anything favours one side, however
         # little.
         hangs_flat = hangs and not on_wall(mode)
         arm = block.left.arm if plus else block.right.arm
-        _enter(a, uplift, 2, Row.P, 0.0 if hangs_flat else arm)
-        moment = -block.height if plus else block.height
-        a[Row.TABLE + uplift, Row.Q] = moment * (_ANY if hangs_flat else 1.0)
+        moment = (-block.height if plus else block.height) * (_ANY if hangs_flat else 1.0)
+        uplift = Guard.UPLIFT_PLUS if plus else Guard.UPLIFT_MINUS
+        _enter(a, uplift, 0.0, 0.0 if hangs_flat else arm, moment)
     if held or hangs:
         drop(a, Guard.CONE_PLUS if plus else Guard.CONE_MINUS)
 
@@ -241,17 +213,25 @@ def _coefficients(which, half, a):
 
 
 @inner_kernel
+def _halves(which, degree, a):
+    """The two halves of a guard of the table that is no rate, without its constant."""
+    return lanes.upto(_coefficients(which, 0, a), degree), lanes.upto(
+        _coefficients(which, lanes.LANES, a), degree - lanes.LANES
+    )
+
+
+@inner_kernel
 def guard(which, order, a):
     """Writes a guard of the table into the workspace; returns its degree, -1 if there is none."""
     row = Row.TABLE + which
-    if a[row, _SHORTER] < 0.0:
+    if a[row, _THERE] == 0.0:
         return -1
     for half in (0, lanes.LANES):
         lanes.store(a, Row.GUARD, half, _coefficients(which, half, a))
     a[Row.GUARD, 0] += a[row, _CONSTANT]
     if Guard.LANDING <= which <= Guard.FAR_GAP:
         a[Row.GUARD, 0], a[Row.GUARD, 1] = contacts.closed_gap(a[Row.GUARD, 0], a[Row.GUARD, 1])
-    return order - int(a[row, _SHORTER])
+    return order - _SHORTER[which]
 
 
 @inner_kernel
@@ -287,33 +267,29 @@ def seen(kind, smooth):
 
 
 @inner_kernel
-def _coefficient(which, k, a):
-    """Coefficient k of a guard of the table that is no rate, without its constant."""
-    row = Row.TABLE + which
-    one, two, three = _COMBINES[which, 0], _COMBINES[which, 1], _COMBINES[which, 2]
-    return a[row, one] * a[one, k] + a[row, two] * a[two, k] + a[row, three] * a[three, k]
-
-
-@inner_kernel
 def starts_positive(which, ahead, a):
     """A cheap proof, without writing the guard, that it leaves zero upward within `ahead`.
 
     A guard that the mode does not have needs no proof: True.
     """
     row = Row.TABLE + which
-    if a[row, _SHORTER] < 0.0:
+    if a[row, _THERE] == 0.0:
         return True
     if KIND[which] == Kind.RATE:
         return False
-    begin = _coefficient(which, 0, a) + a[row, _CONSTANT]
+    terms = _coefficients(which, 0, a)
+    later = lanes.shifted(terms)
     floor = (
         max(series.NOISE[KIND[which]], contacts.CLOSED)
         if Guard.LANDING <= which <= Guard.FAR_GAP
         else series.NOISE[KIND[which]]
     )
-    return series.leads_up(
-        begin, _coefficient(which, 1, a), _coefficient(which, 2, a), floor, ahead
+    begin, rate, half_bend = (
+        lanes.first(terms),
+        lanes.first(later),
+        lanes.first(lanes.shifted(later)),
     )
+    return series.leads_up(begin + a[row, _CONSTANT], rate, half_bend, floor, ahead)
 
 
 @inner_kernel
@@ -323,15 +299,12 @@ def _stays_positive(which, order, until, slack, a):
     It starts higher than the sum of all its falling terms.
     """
     row = Row.TABLE + which
-    if a[row, _SHORTER] < 0.0:
+    if a[row, _THERE] == 0.0:
         return True
     if KIND[which] == Kind.RATE:
         return False
-    begin, degree = a[row, _CONSTANT] + _coefficient(which, 0, a), order - int(a[row, _SHORTER])
-    low, high = (
-        lanes.upto(_coefficients(which, 0, a), degree),
-        lanes.upto(_coefficients(which, lanes.LANES, a), degree - lanes.LANES),
-    )
+    low, high = _halves(which, order - _SHORTER[which], a)
+    begin = a[row, _CONSTANT] + lanes.first(low)
     fallen = lanes.total(
         (lanes.above(lanes.falls(low), 0) + lanes.falls(high) * series.eighth(until))
         * lanes.powers(until)
@@ -411,10 +384,12 @@ def rock_guards_hold(block, run):
         for which in (Guard.TIP_GAP, Guard.FAR_GAP):
             drop(a, which)
             _fill_gap(block, run.state, a, which == Guard.TIP_GAP)
-            if a[Row.TABLE + which, _SHORTER] == 0.0 and not _rock_gap_holds(
-                Row.TABLE + which, order, h, a
-            ):
-                return False
+            row = Row.TABLE + which
+            if a[row, _THERE] != 0.0:
+                low, high = _halves(which, order, a)
+                begin = lanes.first(low) + a[row, _CONSTANT]
+                if not begin + series.least_change(low, high, h) > contacts.CLOSED:
+                    return False
     if block.no_slip and not block.unilateral:
         return True
     mu, share = (1.0, 0.0) if block.no_slip else (block.mu_s, 1.0)
@@ -424,17 +399,3 @@ def rock_guards_hold(block, run):
     minus = series.least_change(mu * p_low + share * q_low, mu * p_high + share * q_high, h)
     push, pull = mu * a[Row.P, 0], share * a[Row.Q, 0]
     return min(push - pull + plus, push + pull + minus) > series.NOISE[Kind.FORCE]
-
-
-@inner_kernel
-def _rock_gap_holds(row, order, h, a):
-    """Whether a bound on the gap in this row of the table shows it open in ROCK up to h."""
-    along, across = a[row, Row.COS], a[row, Row.SIN]
-    cos_low, cos_high = series.halves(a, Row.COS, order)
-    sin_low, sin_high = series.halves(a, Row.SIN, order)
-    low = series.least_change(
-        along * cos_low + across * sin_low, along * cos_high + across * sin_high, h
-    )
-    return (
-        along * a[Row.COS, 0] + across * a[Row.SIN, 0] + a[row, _CONSTANT] + low > contacts.CLOSED
-    )

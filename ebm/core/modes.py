@@ -21,42 +21,44 @@ import numpy as np
 from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
-from rockcheck.ebm.core.state import MODES, code_of, on_wall, rests
+from rockcheck.ebm.core.state import MODE, MODES, code_of, on_wall, rests
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series that a selection looks at.
 _LOOK = 6
 
 
-def _candidates() -> np.ndarray:
-    """All modes in the order of trial.
+def _candidates(first: int) -> list[tuple[int, ...]]:
+    """All modes in the order of trial, each a MODE; the left side is first (1), or the right (-1).
 
-    More contacts come first, sticking before slipping, a pushing floor before a pulling one.
-    Columns: family, sense of tilting or slip, what the pivot does, slip, pull, walls (1 tip or
-    left, 2 far or right, 3 both), whether only a flat block tries it. For a flat block all senses
-    are relative to the side that is `favoured`, left where none is.
+    More contacts come first, sticking before slipping, a pushing floor before a pulling one. The
+    first side of a flat block is the one that is `favoured`, left where none is.
     """
-    stands = [
-        (Family.FLAT, 1, Pivot.STICK, 0, pull, walls, 0)
-        for walls in (3, 1, 2, 0)
-        for pull in (1, -1)
-    ]
+    tilted = (1, 1), (1, 0), (0, 1), (0, 0)  # on the wall that it tips to, on the other one
+    flat = [walls[::first] for walls in tilted]
+    rows = [(Family.FLAT, 1, Pivot.STICK, 0, pull, *walls) for walls in flat for pull in (1, -1)]
     # With static friction above kinetic both rocking and sliding can be consistent. Then the pivot
     # sticks.
-    rows = [*stands, (Family.TILT, 1, Pivot.STICK, 0, 1, 0, 1)]
-    for family, sense in ((Family.FLAT, 1), (Family.TILT, 1), (Family.TILT, -1)):
-        pivot = ((Pivot.STICK, 0), (Pivot.SLIPPING, -1), (Pivot.SLIPPING, 1))
-        for walls in (3, 1, 2, 0):
-            for pull in (1, -1):
-                rows += [
-                    (family, sense, floor, slip, pull, walls, 0)
-                    for floor, slip in pivot[family == Family.FLAT :]
-                ]
-            rows.append((family, sense, Pivot.OFF, 0, 1, walls, 0))
-    return np.array(rows)
+    rows.append((Family.TILT, first, Pivot.STICK, 0, 1, 0, 0))
+    pivots = (Pivot.STICK, 0), (Pivot.SLIPPING, -1), (Pivot.SLIPPING, 1)
+    slides = (Pivot.SLIPPING, -first), (Pivot.SLIPPING, first)
+    for family, sense, leans, floors in (
+        (Family.FLAT, 1, flat, slides),
+        (Family.TILT, first, tilted, pivots),
+        (Family.TILT, -first, tilted, pivots),
+    ):
+        for walls in leans:
+            rows += [
+                (family, sense, floor, slip, pull, *walls)
+                for pull in (1, -1)
+                for floor, slip in floors
+            ]
+            rows.append((family, sense, Pivot.OFF, 0, 1, *walls))
+    return rows
 
 
-_CANDIDATES = _candidates()
+#: Row 1 has the left side first, row 0 the right one.
+_CANDIDATES = np.array([_candidates(-1), _candidates(1)], MODE)
 _FLAT_TRIES = 4
 
 
@@ -66,13 +68,13 @@ def _tries() -> np.ndarray:
     Row 0 is none, 1 the tip wall, 2 the far wall, 3 both; the last row is a flat block's. Behind
     the numbers stands -1.
     """
-    family, sense, walls, only_flat = _CANDIDATES[:, [0, 1, 5, 6]].T
-    rows = np.full((_FLAT_TRIES + 1, len(_CANDIDATES) + 1), -1, dtype=np.int8)
-    rows[_FLAT_TRIES, :-1] = range(len(_CANDIDATES))
+    modes = _CANDIDATES[1]
+    walls, tilts = modes["tip"] + 2 * modes["far"], modes["family"] == Family.TILT
+    rows = np.full((_FLAT_TRIES + 1, len(modes) + 1), -1, dtype=np.int8)
+    rows[_FLAT_TRIES, :-1] = range(len(modes))
     for touched in range(_FLAT_TRIES):
-        found = np.flatnonzero(
-            (family == Family.TILT) & (sense > 0) & (only_flat == 0) & (walls & ~touched == 0)
-        )
+        # The first tilted one is a flat block's only.
+        found = np.flatnonzero(tilts & (modes["sense"] > 0) & (walls & ~touched == 0))[1:]
         rows[touched, : len(found)] = found
     return rows
 
@@ -193,16 +195,9 @@ def hangs_flat(mode):
 
 
 @inner_kernel
-def _write(number, first, mode):
-    """Writes candidate `number` into m."""
-    family, sense, walls = _CANDIDATES[number, 0], _CANDIDATES[number, 1], _CANDIDATES[number, 5]
-    mode.family, mode.sense = family, 1 if family == Family.FLAT else sense * first
-    mode.pivot, mode.slip = _CANDIDATES[number, 2], _CANDIDATES[number, 3]
-    mode.pull = _CANDIDATES[number, 4]
-    mode.tip, mode.far = walls & 1, walls >> 1
-    if family == Family.FLAT and first < 0:
-        mode.slip = -mode.slip
-        mode.tip, mode.far = walls >> 1, walls & 1
+def _candidate(at, number):
+    """A candidate, as the side that is tried first has it."""
+    return _CANDIDATES[int(at.first > 0), number]
 
 
 @inner_kernel
@@ -353,7 +348,7 @@ def select(block, base, run):
             least, chosen = wrong, number
     if chosen < 0:
         return False
-    _write(chosen, at.first, mode)
+    state.mode = _candidate(at, chosen)
     again = least <= state.least_slack
     state.rules[Rule.MODE_AGAIN if again else Rule.LEAST_CONTRADICTION] += 1
     state.slack = max(least, state.least_slack)
@@ -387,14 +382,12 @@ def _comes_up(block, state, at, number, again):
 
     Returns whether it is possible, and has been tried at this instant (`again`) or not.
     """
-    mode = state.mode
-    tilts = _CANDIDATES[number, 0] == Family.TILT
-    touched = (at.near if _CANDIDATES[number, 1] > 0 else at.away) if tilts else at.upright_walls
-    if not tilts and at.first < 0:
-        touched = touched >> 1 | (touched & 1) << 1
-    if _CANDIDATES[number, 5] & ~touched or (tilts and at.favoured == 0):
+    mode = _candidate(at, number)
+    tilts = mode.family == Family.TILT
+    touched = (at.near if mode.sense == at.first else at.away) if tilts else at.upright_walls
+    if (mode.tip + 2 * mode.far) & ~touched or (tilts and at.favoured == 0):
         # Where nothing tells left from right it does not tilt.
         return False
-    _write(number, at.first, mode)
+    state.mode = mode
     tried = state.tried[code_of(mode)] != 0
     return tried == again and _possible(block, state, at)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import record
+from rockcheck.ebm.core.contact_impacts import IMPACT
 from rockcheck.ebm.core.ground import Ground
 from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, HistoryMode, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
@@ -118,8 +119,9 @@ STATE = record(
     gains="i8",
     largest_gain="f8",
     rules=("i8", (RULES,)),
-    # Scratch: a motion between the ends of a step.
+    # Scratch: a motion between the ends of a step, and the impact that is resolved.
     sampled=MOTION,
+    impact=IMPACT,
 )
 
 #: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an

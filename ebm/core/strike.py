@@ -11,7 +11,7 @@ import numpy as np
 
 from rockcheck.ebm.core import contacts, impacts, modes
 from rockcheck.ebm.core.block import side_of
-from rockcheck.ebm.core.contact_impacts import ROUNDING, WORK, Impact, contact_impact
+from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
 from rockcheck.ebm.core.names import Contact, Event, Family, Found, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, place
@@ -213,30 +213,29 @@ def _corner_impact(block, state, sw, e, resting):
 @called_kernel
 def _strike_all(block, base, run, resting):
     """Unilateral pivot: resolves all contacts touched at this instant."""
-    state, mode, motion, work = run.state, run.state.mode, run.state.motion, run.stack
+    state, mode, motion, impact = run.state, run.state.mode, run.state.motion, run.state.impact
     # That of a flat block is the one in which a selection calculates.
     flat_block = mode.family == Family.FLAT
     sense = (modes.favoured(block, base, state) or 1) if flat_block else mode.sense
     sign = float(sense)
-    phi = abs(motion.theta)
     flat = motion.theta == 0.0
     floor = abs(contacts.floor_gap(block, motion)) < contacts.CLOSED
     tip = abs(contacts.wall_gap(block, motion, sign)) < contacts.CLOSED
     far = abs(contacts.wall_gap(block, motion, -sign)) < contacts.CLOSED
-    touching, v = work[WORK], work[WORK + 1]
+    touching, v = impact.touching, impact.v
     touching[Contact.FOOT], touching[Contact.OTHER] = floor, flat and floor
     touching[Contact.TIP_TOP], touching[Contact.TIP_BOTTOM] = tip, flat and tip
     touching[Contact.FAR_BOTTOM], touching[Contact.FAR_TOP] = far, flat and far
     v[0], v[1], v[2] = sign * motion.vx, motion.vy, sign * motion.w
     slower = v[1] + max(side_of(block, -sign).arm * v[2], -side_of(block, sign).arm * v[2])
     state.rules[Rule.FLAT_LANDING] += flat and floor and slower < -contacts.SLOW
-    e_tip = block.e_left if sign > 0 else block.e_right
-    e_far = block.e_right if sign > 0 else block.e_left
+    impact.sense, impact.phi, impact.resting = sign, abs(motion.theta), resting
+    impact.e_tip = block.e_left if sign > 0 else block.e_right
+    impact.e_far = block.e_right if sign > 0 else block.e_left
     if tip and far:
         state.rules[Rule.WEDGED] += 1
-        e_tip = e_far = 0.0
-    impact = Impact(sign, phi, touching, e_tip, e_far, resting, v)
-    found = contact_impact(block, impact, state, work)
+        impact.e_tip = impact.e_far = 0.0
+    found = contact_impact(block, state)
     if found != Found.FITS:
         least = found == Found.LEAST_WRONG
         state.rules[Rule.LEAST_CONTRADICTION if least else Rule.ENDLESS_STAGES] += 1

@@ -131,12 +131,11 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     touch = np.array([place * place - dip, -2.0 * place, 1.0])
     for which in range(len(guards.KIND)):
         guards.drop(run.a, which)
-    run.a[Row.TABLE + Guard.FLOOR_PUSH] = 0.0
-    run.a[Row.TABLE + Guard.FLOOR_PUSH, Row.P] = 1.0
+    guards._enter(run.a, Guard.FLOOR_PUSH, 0.0, 1.0)
 
     def first(terms, length: float) -> tuple[float, int]:
         run.a[Row.P, :3] = terms
-        run.state.order, run.state.length = 2, length
+        run.state.order, run.state.length = 4, length
         guards.first_event(run)
         return float(run.state.tau), int(run.state.guard)
 
