@@ -1,5 +1,5 @@
 """The paper's Continuous Model: penalty contact at the corners, one equation of motion."""
 
-from rockcheck.cm.model import ContinuousModel, measured_restitution
+from rockcheck.cm.model import ContinuousModel
 
-__all__ = ["ContinuousModel", "measured_restitution"]
+__all__ = ["ContinuousModel"]

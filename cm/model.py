@@ -1,17 +1,15 @@
-"""The Continuous Model as a model of a scene: settings, set-up, run; the restitution reached."""
+"""The Continuous Model as a model of a scene: settings, set-up, run."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
-from rockcheck.cm import contact
 from rockcheck.scenes import (
     Cost,
     Event,
@@ -70,13 +68,13 @@ class ContinuousModel(Frozen):
         at 30 times 1/sqrt(k/m)). Impacts have shorter steps of their own, whatever it is.
     damping_rule
         "calibrated": a contact that closes is given the damping with which a clamped contact of its
-        effective mass has the scene's restitution (`contact.damping_ratio`,
+        effective mass has the scene's restitution (`kernels.damping_ratio`,
         `kernels.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
     the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
     the impact presses down (a wall hit at more than the slenderness angle, 0.02). A restitution of
-    zero is reached within `contact.least_restitution`, 7e-5 for the paper's block.
+    zero is reached within `kernels.least_restitution`, 7e-5 for the paper's block.
     """
 
     #: The name by which reports and the command line call this model.
@@ -177,10 +175,10 @@ class ContinuousModel(Frozen):
         happened = [
             Event(
                 t=float(t),
-                kind="floor impact" if contact_ >= 2 * kernels.FLOOR else "wall impact",
+                kind="floor impact" if contact >= 2 * kernels.FLOOR else "wall impact",
                 impulse=float(impulse),
             )
-            for t, contact_, impulse in np.concatenate(strikes)
+            for t, contact, impulse in np.concatenate(strikes)
         ]
         happened.sort(key=lambda event: event.t)
         if ending == kernels.OVERTURNED:
@@ -206,7 +204,7 @@ class ContinuousModel(Frozen):
 
         k = self.stiffness_in(scene)
         calibrated = self.damping_rule == "calibrated"
-        least = contact.least_restitution(k, scene.frequency_parameter)
+        least = kernels.least_restitution(k, scene.frequency_parameter)
         walls = scene.wall("left"), scene.wall("right")
         b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
         restitution = (
@@ -225,9 +223,9 @@ class ContinuousModel(Frozen):
             mu_k=scene.floor.friction,
             restitution=restitution,
             damping_ratio=tuple(
-                contact.damping_ratio(one, least)
+                kernels.damping_ratio(one, least)
                 if calibrated
-                else contact.damping_ratio_of_paper(one)
+                else kernels.damping_ratio_of_paper(one)
                 for one in restitution
             ),
             distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
@@ -284,45 +282,3 @@ def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tupl
     step = excitation.period / SAMPLES_A_PERIOD
     until = min(excitation.quiet_after, duration)
     return excitation.acceleration(step * np.arange(math.ceil(until / step) + 2)), 1.0 / step
-
-
-def measured_restitution(model: ContinuousModel, scene: Scene) -> float:
-    """Restitution of the first impact in `scene`: normal speed after over normal speed before.
-
-    The scene is played twice, the second time up to that impact with 20 output times in every
-    1/sqrt(k/m). Raises `InputError` if nothing strikes.
-    """
-    events = model.simulate(scene).event_list
-    first = next((event for event in events if event.kind.endswith("impact")), None)
-    if first is None:
-        raise errors.InputError(f"nothing strikes in scene {scene.name!r}")
-    contact_time = 1.0 / math.sqrt(model.stiffness_in(scene))
-    sample = max(0.05 * contact_time, first.t / 2e6)
-    history = model.simulate(
-        scene.replace(duration=first.t + 6.0 * contact_time, output_step=sample)
-    )
-    onset = int(first.t / sample)
-    # Of the corners about to touch, the fastest.
-    near = [
-        rate
-        for gap, rate in _contacts(scene, history, first.kind)
-        if rate[onset] < 0.0 and gap[onset] < -3.0 * sample * rate[onset]
-    ]
-    struck = min(near, key=lambda rate: float(rate[onset]))
-    return float(max(np.max(struck[onset:]), 0.0) / -struck[onset])
-
-
-def _contacts(scene: Scene, history: History, kind: str) -> Iterator[tuple[Floats, Floats]]:
-    """Gap (m) and rate (m/s) of every corner that may meet the floor, or a wall."""
-    c, block = history.channels, scene.block
-    sin, cos, w = np.sin(c["theta"]), np.cos(c["theta"]), c["theta_dot"]
-    for outward in (1.0, -1.0):  # the left and the right side
-        for up in (-1.0, 1.0):
-            a, b = -outward * block.half_width, up * block.half_height
-            rx, ry = a * cos - b * sin, a * sin + b * cos
-            wall = scene.wall("left" if outward > 0.0 else "right")
-            if kind == "floor impact" and up < 0.0:
-                yield c["y"] + ry, c["y_dot"] + w * rx
-            elif kind == "wall impact" and wall is not None:
-                gap = outward * (c["x"] + rx) + block.half_width + wall.gap
-                yield gap, outward * (c["x_dot"] - w * ry)

@@ -1,7 +1,4 @@
-from .cm import (
-    ContinuousModel as ContinuousModel,
-    measured_restitution as measured_restitution,
-)
+from .cm import ContinuousModel as ContinuousModel
 from .ebm import (
     EventBasedModel as EventBasedModel,
     Spectrum as Spectrum,

@@ -6,17 +6,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rockcheck.cm.contact import (
+from rockcheck.cm.kernels import (
     damping_ratio,
     damping_ratio_of_paper,
-    least_restitution,
-    restitution_of,
-)
-from rockcheck.cm.kernels import (
     effective_mass,
     felt_share,
     friction_force,
+    least_restitution,
     normal_forces,
+    restitution_of,
 )
 
 

@@ -12,9 +12,9 @@ from rockcheck import (
     Floor,
     Scene,
     Wall,
-    measured_restitution,
 )
-from rockcheck.cm.contact import damping_ratio_of_paper, restitution_of
+from rockcheck.cm.kernels import damping_ratio_of_paper, restitution_of
+from rockcheck.engines.contacts import arm_of, contacts_of, gap_of, rate_of
 from rockcheck.scenes import PAPER_BLOCK
 
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
@@ -32,6 +32,23 @@ def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change
         }
         | change
     )
+
+
+def restitution_reached(model, scene):
+    """Normal speed after the first impact over that before it, of the fastest corner about to touch;
+    the scene is played again up to there, with 20 output times in every 1/sqrt(k/m)."""
+    first = next(one for one in model.simulate(scene).event_list if one.kind.endswith("impact"))
+    sample = max(0.05 / math.sqrt(model.stiffness_in(scene)), first.t / 2e6)
+    close = scene.replace(duration=first.t + 120.0 * sample, output_step=sample)
+    c, onset, near = model.simulate(close).channels, int(first.t / sample), []
+    for one in contacts_of(scene):
+        arm = arm_of(*one.corner, np.cos(c["theta"]), np.sin(c["theta"]))
+        gap = gap_of(*one.normal, one.distance, c["x"], c["y"], arm)
+        rate = rate_of(*one.normal, c["x_dot"], c["y_dot"], c["theta_dot"], arm)
+        if gap[onset] < -3.0 * sample * rate[onset]:
+            near.append((rate[onset], np.max(rate[onset:])))
+    before, after = min(near)
+    return max(after, 0.0) / -before
 
 
 FLOOR = {
@@ -77,9 +94,9 @@ WALL = {
 )
 def test_floor_and_wall_have_the_restitution_asked_for(struck, case, e):
     strike = scene(**{struck: e} | (FLOOR | WALL)[case])
-    assert measured_restitution(ContinuousModel(), strike) == pytest.approx(e, abs=1e-3)
+    assert restitution_reached(ContinuousModel(), strike) == pytest.approx(e, abs=1e-3)
     if case in ("rocking block", "top corner"):
-        assert measured_restitution(ContinuousModel(penetration=1e-6), strike) == pytest.approx(
+        assert restitution_reached(ContinuousModel(penetration=1e-6), strike) == pytest.approx(
             e, abs=0.01
         )
 
@@ -91,13 +108,9 @@ def test_paper_rule_misses_as_its_formula_says(e):
     drop = scene(friction=0.0, floor=e, initial_height=0.02, initial_rotation=0.1)
     lever = PAPER_BLOCK.radius * math.sin(PAPER_BLOCK.alpha - 0.1)
     xi = damping_ratio_of_paper(e) * math.sqrt(1.0 + 3.0 * (lever / PAPER_BLOCK.radius) ** 2)
-    assert measured_restitution(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(
+    assert restitution_reached(ContinuousModel(damping_rule="paper"), drop) == pytest.approx(
         restitution_of(xi), abs=1e-3
     )
-
-
-def test_scene_without_an_impact_has_no_restitution(fault_of):
-    assert "strikes" in str(fault_of(measured_restitution, ContinuousModel(), scene()))
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
