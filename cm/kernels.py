@@ -200,7 +200,7 @@ def damping_ratio(restitution: float, least: float) -> float:
     return 0.5 * (low + high)
 
 
-@kernel
+@inner_kernel
 def felt_share(x: float) -> float:
     """Share of a step's change of speed that a damper feels within that step.
 
@@ -213,7 +213,7 @@ def felt_share(x: float) -> float:
     return (1.0 + x) / (2.0 + x)
 
 
-@kernel
+@inner_kernel
 def normal_forces(
     f1: float, f2: float, d1: float, d2: float, k11: float, k12: float, k21: float, k22: float
 ) -> tuple[float, float]:
@@ -234,7 +234,7 @@ def normal_forces(
     return force1, force2
 
 
-@kernel
+@inner_kernel
 def friction_force(
     stiffness: float,
     damping: float,
@@ -261,7 +261,7 @@ def friction_force(
     return math.copysign(mu_k * normal, force), True
 
 
-@kernel
+@inner_kernel
 def effective_mass(
     k_n: float,
     k_t: float,
@@ -290,7 +290,7 @@ def effective_mass(
     return 1.0 / (k_n + math.copysign(friction, shear) * k_c)
 
 
-@kernel
+@inner_kernel
 def sampled(samples: Floats, rate: float, t: float) -> float:
     """Linear interpolation in `samples`, `rate` a second from t = 0; zero after the last."""
     place = t * rate
@@ -300,7 +300,7 @@ def sampled(samples: Floats, rate: float, t: float) -> float:
     return samples[left] + (place - left) * (samples[left + 1] - samples[left])
 
 
-@kernel
+@inner_kernel
 def facing(surface: int, corners: Corners) -> tuple[Vector, Vector, Vector]:
     """Normal of a surface and offsets of the two corners that face it."""
     if surface == FLOOR:
@@ -310,7 +310,7 @@ def facing(surface: int, corners: Corners) -> tuple[Vector, Vector, Vector]:
     return (-1.0, 0.0), corners[2:4], corners[6:8]
 
 
-@kernel
+@inner_kernel
 def kicked(v: Velocity, inverse: float, n: Vector, lever: float, impulse: float) -> Velocity:
     """Velocity after an impulse along n with that lever; `inverse` is 1/I."""
     return v[0] + n[0] * impulse, v[1] + n[1] * impulse, v[2] + inverse * lever * impulse
@@ -414,7 +414,7 @@ def closes(
     return min(FINE * contact_time, FINE_DAMPER / (memory[one, DAMPING] * comes.mobility + 1e-300))
 
 
-@kernel
+@inner_kernel
 def closes_in(parameters: Parameters, gap: float, before: float, rate: float, step: float) -> float:
     """Time from the end of a step until an open contact closes.
 
@@ -432,7 +432,7 @@ def closes_in(parameters: Parameters, gap: float, before: float, rate: float, st
     return (2.0 * gap / (arrival - rate) if rate < 0.0 else (arrival + rate) / -pull) - 0.5 * step
 
 
-@kernel
+@inner_kernel
 def is_closed(
     memory: Floats, contact: int, gap: float, rate: float, ahead: float, t: float
 ) -> bool:
@@ -585,13 +585,13 @@ def press(
     return v, closing, min(fine, asked)
 
 
-@kernel
+@inner_kernel
 def wall_force(memory: Floats) -> float:
     """Sum of the forces of the walls."""
     return memory[0, FORCE] + memory[1, FORCE] + memory[2, FORCE] + memory[3, FORCE]
 
 
-@kernel
+@inner_kernel
 def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
     """Writes the strikes that began by `until` into `events`, behind the first `n_events`.
 
