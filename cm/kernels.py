@@ -586,23 +586,23 @@ def press(
 
 
 @inner_kernel
-def wall_force(memory: Floats) -> float:
-    """Sum of the forces of the walls."""
-    return memory[0, FORCE] + memory[1, FORCE] + memory[2, FORCE] + memory[3, FORCE]
+def gather(
+    memory: Floats, step: float, until: float, events: Floats, n_events: int
+) -> tuple[int, float]:
+    """Adds a step's forces to the impulses, and writes the strikes that began by `until`.
 
-
-@inner_kernel
-def flush(memory: Floats, until: float, events: Floats, n_events: int) -> int:
-    """Writes the strikes that began by `until` into `events`, behind the first `n_events`.
-
-    Returns how many there are then.
+    They go into `events`, behind the first `n_events`. Returns how many there are then, and when
+    the first of the other strikes began.
     """
+    first = math.inf
     for i in range(len(memory)):
+        memory[i, IMPULSE] += step * memory[i, FORCE]
         if memory[i, STRUCK] <= until:
             events[n_events, :] = memory[i, STRUCK], float(i), memory[i, IMPULSE]
             n_events += 1
             memory[i, STRUCK] = math.inf
-    return n_events
+        first = min(first, memory[i, STRUCK])
+    return n_events, first
 
 
 @inner_kernel
@@ -618,7 +618,8 @@ def kick(
     infinity; the sweeps over the surfaces.
     """
     memory, surfaces, corners, step = contacts.memory, contacts.surfaces, now.corners, now.length
-    touching = wall_force(memory) > 0.0
+    wall_forces = memory[: 2 * FLOOR, FORCE]
+    touching = wall_forces.any()
     if touching:
         for surface in surfaces:
             v = with_forces(contacts, surface, corners, v, step)
@@ -638,7 +639,7 @@ def kick(
             new1, new2 = memory[2 * surface, FORCE], memory[2 * surface + 1, FORCE]
             change += abs(new1 - force1) + abs(new2 - force2)
             whole += new1 + new2
-        if (not touching and wall_force(memory) == 0.0) or change <= SWEPT * whole:
+        if not (touching or wall_forces.any()) or change <= SWEPT * whole:
             break
         touching = True
     return v, closing, young, sweeps
@@ -680,23 +681,6 @@ def corners_at(parameters: Parameters, theta: float) -> Corners:
 
 
 @inner_kernel
-def first_of(memory: Floats) -> float:
-    """When the first of the strikes began that have not been written yet."""
-    first = math.inf
-    for i in range(len(memory)):
-        first = min(first, memory[i, STRUCK])
-    return first
-
-
-@inner_kernel
-def gather(memory: Floats, step: float, first_strike: float) -> None:
-    """Adds a step's forces to the impulses, if any contact is struck."""
-    if first_strike < math.inf:
-        for i in range(len(memory)):
-            memory[i, IMPULSE] += step * memory[i, FORCE]
-
-
-@inner_kernel
 def run_to(
     contacts: Contacts,
     base: tuple[Samples, Samples],
@@ -712,9 +696,8 @@ def run_to(
     """
     parameters, memory = contacts.parameters, contacts.memory
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
-    x, y, theta, vx, vy, w, calm, fine, closing, allowed, gross = state
+    x, y, theta, vx, vy, w, calm, fine, closing, first_strike, allowed, gross = state
     v = vx, vy, w
-    first_strike = first_of(memory)
     steps = sweeps = 0
     t, end = times
     while t < end and abs(theta) < 0.5 * math.pi:
@@ -740,18 +723,15 @@ def run_to(
         if young < math.inf:
             fine = young if settled else min(young, fine)
             calm = middle + YOUNG * contact_time
-            first_strike = first_of(memory)
-        gather(memory, step, first_strike)
+        if min(first_strike, young) < math.inf:
+            n_events, first_strike = gather(memory, step, t - STRIKE, events, n_events)
         work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
         allowed += work
         gross += abs(work)
         x += half * v[0]
         y += half * v[1]
         theta += half * v[2]
-        if t - first_strike >= STRIKE:
-            n_events = flush(memory, t - STRIKE, events, n_events)
-            first_strike = first_of(memory)
-    state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, allowed, gross
+    state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, first_strike, allowed, gross
     return abs(theta) >= 0.5 * math.pi, n_events, steps, sweeps, t
 
 
@@ -767,9 +747,10 @@ def advance(
 ) -> tuple[int, int, int, int, int, float]:
     """Fills the rows of `output` with the motion that follows `state`, which is moved along.
 
-    A row is x, y, theta and their rates. `state` (11) continues with the time until which a contact
-    is young, the step that it needs, the time until an open contact closes, the energy allowed by
-    the work done on the block, and that work with every part of it counted as positive. `events`
+    A row is x, y, theta and their rates. `state` (12) continues with the time until which a contact
+    is young, the step that it needs, the time until an open contact closes, when the first strike
+    began that is not written yet, the energy allowed by the work done on the block, and that work
+    with every part of it counted as positive. `events`
     gets rows (onset time, contact, impulse). Returns the ending (DONE, OVERTURNED or BLOWN_UP), the
     rows and events written, the steps taken, the sweeps over the surfaces, and the time reached.
     """
@@ -783,7 +764,7 @@ def advance(
         sweeps += swept
         if falls:
             return OVERTURNED, row, n_events, steps, sweeps, t
-        vx, vy, w, allowed, gross = state[3], state[4], state[5], state[9], state[10]
+        vx, vy, w, allowed, gross = state[3], state[4], state[5], state[10], state[11]
         energy = 0.5 * (vx**2 + vy**2 + w**2 / parameters.inverse_inertia) + parameters.gravity * (
             state[1] - parameters.reach[2]
         )

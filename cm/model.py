@@ -164,7 +164,7 @@ class ContinuousModel(Frozen):
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
                 f" with a step of {dt:.3g} s and a stiffness of {parameters.stiffness:.3g} 1/s^2"
             )
-        strikes.append(events[: kernels.flush(memory, reached, events, 0)])
+        strikes.append(events[: kernels.gather(memory, 0.0, reached, events, 0)[0]])
         cost = Cost(
             wall_seconds=time.perf_counter() - ready,
             cpu_seconds=time.process_time() - ready_cpu,
@@ -267,7 +267,7 @@ class ContinuousModel(Frozen):
             placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
             sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
         placed[1] -= sunk
-        return np.array((*placed, 0.0, math.inf, 0.0, energy, gross)), memory
+        return np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross)), memory
 
 
 def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[Floats, float]:
