@@ -433,20 +433,6 @@ def closes_in(parameters: Parameters, gap: float, before: float, rate: float, st
 
 
 @inner_kernel
-def is_closed(
-    memory: Floats, contact: int, gap: float, rate: float, ahead: float, t: float
-) -> bool:
-    """Whether a contact is closed; where it opens, `memory` holds when it was closed last.
-
-    A settled contact stays closed while it would close again within the step (`ahead`, s).
-    """
-    closed = gap < 0.0 or (memory[contact, CLOSED] != 0.0 and gap + ahead * rate < 0.0)
-    if memory[contact, CLOSED] != 0.0 and not closed:
-        memory[contact, CLOSED], memory[contact, LAST_CLOSED] = 0.0, t
-    return closed
-
-
-@inner_kernel
 def pushed(
     contacts: Contacts,
     one: int,
@@ -456,14 +442,19 @@ def pushed(
     now: Step,
     ahead: float,
 ) -> tuple[float, float, float]:
-    """Force of a closed contact as if its own forces did not move it, and the loss of force.
+    """Force of a contact as if its own forces did not move it, and the loss of force.
 
     The loss is for a unit of velocity gained. Third is the step that the contact needs, infinite
-    unless it has just closed.
+    unless it has just closed. A settled contact stays closed while it would close again within the
+    step (`ahead`, s). `memory` holds whether it is closed, and of an open one when it was last.
     """
     memory, before = contacts.memory, touches.before
-    fine = math.inf
-    if memory[one, CLOSED] == 0.0:
+    closed, fine = memory[one, CLOSED] != 0.0, math.inf
+    if not (touches.gap < 0.0 or (closed and touches.gap + ahead * touches.rate < 0.0)):
+        if closed:
+            memory[one, CLOSED], memory[one, LAST_CLOSED] = 0.0, now.t
+        return 0.0, 0.0, fine
+    if not closed:
         fine = closes(contacts, one, touches, other, coupling, now.t)
     k, damping = memory[one, STIFFNESS], memory[one, DAMPING]
     share = felt_share(damping * touches.mobility * now.length)
@@ -477,23 +468,24 @@ def floor_forces(
     contacts: Contacts,
     now: Step,
     v: Velocity,
-    levers: Vector,
-    mobilities: tuple[float, float, float],
+    first: Corner,
+    second: Corner,
+    coupling: float,
     pushes: tuple[float, float, float, float],
 ) -> tuple[float, float, Velocity, float, float]:
     """The normal forces of the floor, and what its friction does, which `friction` remembers.
 
     That is the velocity with the friction, and what it adds to the rates of the two corners.
-    `mobilities` are those of the corners and their coupling, `pushes` the forces as if they did not
-    move the corners, and the loss of each. Friction acts at the lower corner, within the cone of
+    `coupling` is the mobility of the two corners, `pushes` the forces as if they did not move the
+    corners, and the loss of each. Friction acts at the lower corner, within the cone of
     both: they slip together or not at all. It is first solved as if it stuck.
     """
-    k11, k22, k12 = mobilities
+    k11, k22, k12 = first.mobility, second.mobility, coupling
     f1, f2, d1, d2 = pushes
     friction, parameters, step = contacts.friction, contacts.parameters, now.length
     k, inverse = parameters.stiffness, parameters.inverse_inertia
     arm, slip = lower_corner(now, v)
-    kt1, kt2 = -inverse * arm * levers[0], -inverse * arm * levers[1]
+    kt1, kt2 = -inverse * arm * first.lever, -inverse * arm * second.lever
     ktt = 1.0 + inverse * arm * arm
     stop = parameters.friction_damping * step / (1.0 + parameters.friction_damping * step * ktt)
     free, _ = friction_force(
@@ -549,26 +541,17 @@ def press(
     first, second = seen(now, v, n, away, r1, inverse), seen(now, v, n, away, r2, inverse)
     rate1, rate2 = first.rate, second.rate
     coupling = 1.0 + inverse * first.lever * second.lever
-    closed1 = is_closed(memory, one, first.gap, rate1, ahead, now.t)
-    closed2 = is_closed(memory, two, second.gap, rate2, ahead, now.t)
-    fine = asked = closing = math.inf
-    force1 = force2 = f1 = f2 = d1 = d2 = 0.0
-    if closed1:
-        f1, d1, fine = pushed(contacts, one, first, second, coupling, now, ahead)
-    if closed2:
-        f2, d2, asked = pushed(contacts, two, second, first, coupling, now, ahead)
-    if closed1 or closed2:
+    f1, d1, fine = pushed(contacts, one, first, second, coupling, now, ahead)
+    f2, d2, asked = pushed(contacts, two, second, first, coupling, now, ahead)
+    force1 = force2 = 0.0
+    closing = math.inf
+    if memory[one, CLOSED] + memory[two, CLOSED] > 0.0:
         k11, k22 = first.mobility, second.mobility
         if surface != FLOOR:
             force1, force2 = normal_forces(f1, f2, d1, d2, k11, coupling, coupling, k22)
         else:
             force1, force2, v, more1, more2 = floor_forces(
-                contacts,
-                now,
-                v,
-                (first.lever, second.lever),
-                (k11, k22, coupling),
-                (f1, f2, d1, d2),
+                contacts, now, v, first, second, coupling, (f1, f2, d1, d2)
             )
             rate1, rate2 = rate1 + more1, rate2 + more2
         v = kicked(v, inverse, n, first.lever, step * force1)
@@ -578,9 +561,9 @@ def press(
     elif surface == FLOOR:
         friction[SHEAR] = friction[SLIPS] = 0.0
     memory[one, FORCE], memory[two, FORCE] = force1, force2
-    if not closed1:
+    if memory[one, CLOSED] == 0.0:
         closing = closes_in(parameters, first.gap, first.before, rate1, step)
-    if not closed2:
+    if memory[two, CLOSED] == 0.0:
         closing = min(closing, closes_in(parameters, second.gap, second.before, rate2, step))
     return v, closing, min(fine, asked)
 
@@ -619,13 +602,12 @@ def kick(
     """
     memory, surfaces, corners, step = contacts.memory, contacts.surfaces, now.corners, now.length
     wall_forces = memory[: 2 * FLOOR, FORCE]
-    touching = wall_forces.any()
+    touching = bool(wall_forces.any())
     if touching:
         for surface in surfaces:
             v = with_forces(contacts, surface, corners, v, step)
-    closing = young = math.inf
+    young, ahead = math.inf, step if settled else 0.0
     sweeps = 0
-    ahead = step if settled else 0.0
     for _ in range(MOST_SWEEPS):
         sweeps += 1
         closing = math.inf

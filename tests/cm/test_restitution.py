@@ -35,7 +35,7 @@ def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change
 
 
 def restitution_reached(model, scene):
-    """Normal speed after the first impact over that before it, of the fastest corner about to touch;
+    """Normal speed after the first impact over that before, of the fastest corner about to touch:
     the scene is played again up to there, with 20 output times in every 1/sqrt(k/m)."""
     first = next(one for one in model.simulate(scene).event_list if one.kind.endswith("impact"))
     sample = max(0.05 / math.sqrt(model.stiffness_in(scene)), first.t / 2e6)
