@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm.core.names import FAILURES, Ending
 from rockcheck.ebm.core.state import FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.packed import loop_of, pack, pack_pulses, state_for
+from rockcheck.ebm.natural import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
 
 __all__ = ["Outcomes", "pack", "pack_pulses", "run_batch", "run_decided"]

@@ -116,17 +116,17 @@ class EventBasedModel(Frozen):
         Raises `InputError` (see `check`) or `ModelFailure`.
         """
         began = time.perf_counter()
-        from rockcheck.ebm import natural, packed
+        from rockcheck.ebm import natural
         from rockcheck.ebm.core import state
 
-        given, unit = packed.pack([scene], self), natural.time_unit(scene)
+        given, unit = natural.pack([scene], self), natural.time_unit(scene)
         shape = 1, len(scene.output_times)
         records = state.Records(
             out=np.empty((*shape, 6)),
             out_mode=np.zeros(shape, dtype=np.int8),
             log=np.empty((1, self.most_events, 5)),
         )
-        states, work = packed.state_for(self, 0), state.workspace()
+        states, work = natural.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
         ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
         last: Any = kept[0].tolist()
@@ -186,17 +186,17 @@ class EventBasedModel(Frozen):
 
     def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
-        from rockcheck.ebm import packed
+        from rockcheck.ebm import natural
         from rockcheck.scenes import progress
 
         runs = rows, states, *work
         # What is compiled or loaded is so before the clock starts. A run of few steps is played
         # here: to hand it over takes longer. Each sample of a record is a step.
         short = len(rows.samples) < _INTERPRETED
-        slow = packed.interpreted_loop(self, *runs) if short else None
+        slow = natural.interpreted_loop(self, *runs) if short else None
         at_once = _INTERPRETED if slow else _AT_ONCE
         few = min(self.most_steps, at_once if len(rows.samples) < at_once else 0)
-        loop = slow or packed.loop_of(self, *runs)
+        loop = slow or natural.loop_of(self, *runs)
 
         def play(most_steps: int) -> int:
             states["control"]["most_steps"] = most_steps
@@ -207,7 +207,7 @@ class EventBasedModel(Frozen):
         ending = play(few) if few else names.Ending.TOO_MANY_STEPS
         if ending == names.Ending.TOO_MANY_STEPS and few < self.most_steps:
             if loop is slow:
-                loop = packed.loop_of(self, *runs)
+                loop = natural.loop_of(self, *runs)
                 ready, cpu = time.perf_counter(), time.process_time()
             ending = progress.interruptible(partial(play, self.most_steps))
         return ending, ready, time.perf_counter() - ready, time.process_time() - cpu

@@ -1,19 +1,29 @@
-"""Between a scene (SI) and the natural units of the compiled code.
+"""Scenes as the compiled code takes them: in natural units, packed into records, a row a run.
 
 Lengths are in R, accelerations in g, times in sqrt(R/g). Of a block that is not homogeneous R is
 that of its weaker pivot, and the compiled code follows its mass's centre, not the box's.
+
+Here is also the event loop that plays the rows. `EventBasedModel`, which plays a history by this,
+is known here by its settings only.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rockcheck.ebm.core import march
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
-from rockcheck.ebm.core.ground import ground_of
-from rockcheck.ebm.core.names import LAWS
-from rockcheck.ebm.core.state import Base
-from rockcheck.scenes import Block, Floats, Scene, kinematics
+from rockcheck.ebm.core.ground import FORM, ground_of
+from rockcheck.ebm.core.names import LAWS, Shape
+from rockcheck.ebm.core.state import MOTION, STATE, Base, Rows
+from rockcheck.scenes import Block, Floats, Scene, kinematics, progress
+from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
+
+#: The event loops that are compiled, by a model's friction.
+_READY: dict[str, Callable[..., None]] = {}
 
 
 def time_unit(scene: Scene) -> float:
@@ -111,3 +121,74 @@ def to_si(scene: Scene, states: Floats) -> Floats:
     if scene.block.centre_of_mass is not None:
         found[:, 0] += scene.block.offset[0]
     return np.asarray(kinematics.of_box(scene.block, found))
+
+
+def pack(scenes: Sequence[Scene], model: Any) -> Rows:
+    """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
+    for scene in scenes:
+        model.check(scene)
+    grounds = [ground for scene in scenes for ground in base_of(scene)]
+    forms = np.array([ground.form for ground in grounds], dtype=FORM)
+    forms["first"] = np.cumsum(forms["count"]) - forms["count"]
+    units = np.array([time_unit(scene) for scene in scenes])
+    return Rows(
+        settings=np.array([setting_of(scene, model) for scene in scenes], SETTING),
+        horizontal=forms[::2].copy(),
+        vertical=forms[1::2].copy(),
+        starts=np.array([tuple(state_of(scene).tolist()) for scene in scenes], MOTION),
+        durations=np.array([scene.duration for scene in scenes]) / units,
+        output_steps=np.array([scene.output_step for scene in scenes]) / units,
+        samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
+    )
+
+
+def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Rows:
+    """Packs one scene under many pulses of its own kind.
+
+    `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
+    """
+    pulse = scene.excitation.model_copy(update={"amplitude": 1.0, "period": 1.0})
+    *columns, samples = pack([scene.replace(excitation=pulse)], model)
+    rows = Rows._make([*(np.repeat(column, len(periods)) for column in columns), samples])
+    # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
+    horizontal, ratio = rows.horizontal, 1.0 / periods
+    bell = horizontal["kind"][0] == Shape.GAUSSIAN
+    for power in range(4):
+        horizontal[f"c{power}"] *= amplitudes * (ratio**power if bell else 1.0)
+    horizontal["rate"] *= ratio**2 if bell else ratio
+    horizontal["centre"] *= periods
+    horizontal["quiet"] *= periods
+    return rows
+
+
+def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArray[np.void]:
+    """An array of one state, with what the model's settings ask of a run."""
+    states = np.zeros(1, STATE)
+    states["control"] = model.tolerance, most_steps, model.most_events, until_decided, 0.0
+    return states
+
+
+def loop_of(model: Any, *given: Any) -> Callable[..., None]:
+    """The machine code of the event loop with the model's friction, loaded or compiled.
+
+    It is specialised to the types of `given`, which are always the same.
+    """
+    if model.friction not in _READY:
+        _READY[model.friction] = for_types_of(march.LOOPS[model.friction], *given)
+    return _READY[model.friction]
+
+
+def interpreted_loop(model: Any, *given: Any) -> Callable[..., None] | None:
+    """The event loop for a single run that need not wait for the compiler; None where it must.
+
+    It need not if the loop is not compiled yet. Bouc-Wen friction, which is stiff, takes too many
+    steps.
+    """
+    loop = march.LOOPS[model.friction]
+    if not progress.ONE_RUN.get() or model.friction == "bouc-wen" or is_ready(loop, *given):
+        return None
+    progress.announce(
+        f"{model.name} is not compiled for this machine yet: a short run is interpreted, with the"
+        " same figures (`rockcheck warm` compiles)"
+    )
+    return interpreted(loop)

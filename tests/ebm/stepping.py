@@ -11,7 +11,7 @@ from rockcheck.ebm.core import march, modes
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
-from rockcheck.ebm.packed import pack, state_for
+from rockcheck.ebm.natural import pack, state_for
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 

@@ -6,7 +6,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel, packed
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Floor,
@@ -110,10 +110,10 @@ def test_a_single_short_run_does_not_wait_for_the_compiler(monkeypatch, settings
     model, scene = EventBasedModel(**settings), load_scene("fig5a").replace(duration=3.0)
     scene = scene.replace(excitation=Ricker(amplitude=4.0, period=1.2, symmetric=True))
     expected = model.simulate(scene)
-    interpreted, compiled = (Mock(wraps=one) for one in (packed.interpreted, packed.loop_of))
-    monkeypatch.setattr(packed, "interpreted", interpreted)
-    monkeypatch.setattr(packed, "loop_of", compiled)
-    monkeypatch.setattr(packed, "is_ready", lambda *given: False)
+    interpreted, compiled = (Mock(wraps=one) for one in (natural.interpreted, natural.loop_of))
+    monkeypatch.setattr(natural, "interpreted", interpreted)
+    monkeypatch.setattr(natural, "loop_of", compiled)
+    monkeypatch.setattr(natural, "is_ready", lambda *given: False)
     monkeypatch.setattr("rockcheck.ebm.model._INTERPRETED", steps)
     with progress.within(progress.ONE_RUN, True):
         found = model.simulate(scene)

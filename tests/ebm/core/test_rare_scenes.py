@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 from stepping import assert_contacts_hold
 
-from rockcheck.ebm import EventBasedModel, packed
+from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.ebm.core import names
 from rockcheck.ebm.core.ground import acceleration, ground_of, impulse_ahead, weightless_at
@@ -289,7 +289,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
         return found
 
     monkeypatch.setattr(compiled._Inner, "__call__", watched)
-    monkeypatch.setattr(packed, "is_ready", lambda *given: False)
+    monkeypatch.setattr(natural, "is_ready", lambda *given: False)
     with progress.within(progress.ONE_RUN, True):  # which is interpreted, before it is compiled
         EventBasedModel(pivot="unilateral", tolerance=1e-8).simulate(SCENES["wedged"])
     assert len(seen) > 30
