@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import resources
 from importlib.metadata import entry_points
+from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import numpy as np
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
+#: The data that come with the package: scenes, records and the experience of the suites.
+DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 #: Allowed sizes of numbers in SI units: their squares, cubes and inverses are still finite.
 LEAST, MOST = 1e-30, 1e30
 
@@ -63,10 +68,14 @@ class Frozen(BaseModel):
 
 @dataclass(frozen=True, kw_only=True)
 class View:
-    """Display of the objects of one class: HTML for a notebook, and a figure."""
+    """Display of the objects of one class: HTML for a notebook, and a figure.
+
+    `figure` is the place of the function that draws one, "module:function". It is imported when it
+    is called, for matplotlib takes a second.
+    """
 
     html: Callable[[Any], str]
-    figure: Callable[[Any], Figure]
+    figure: str
 
 
 class Shown:
@@ -74,7 +83,8 @@ class Shown:
 
     def plot(self) -> Figure:
         """The object as a matplotlib figure."""
-        return _view_of(type(self)).figure(self)
+        figure: Figure = resolve_name(_view_of(type(self)).figure)(self)
+        return figure
 
     def _repr_html_(self) -> str:
         return _view_of(type(self)).html(self)

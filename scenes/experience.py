@@ -7,12 +7,11 @@ The data, data/experience.json, are written by docs/site_tools/experience.py fro
 import math
 from collections.abc import Mapping
 from functools import cache
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rockcheck.scenes.base import Frozen
+from rockcheck.scenes.base import DATA, Frozen
 from rockcheck.scenes.scene import Scene
 
 #: Standard deviations of a 95 % interval.
@@ -57,7 +56,7 @@ class Expected(NamedTuple):
 @cache
 def known() -> Experience:
     """The experience that comes with the package; empty if its file is missing."""
-    path = resources.files("rockcheck.scenes") / "data" / "experience.json"
+    path = DATA / "experience.json"
     return (
         Experience.model_validate_json(path.read_text(encoding="utf-8"))
         if path.is_file()

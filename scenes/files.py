@@ -21,14 +21,13 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import model_validator
 
-from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
+from rockcheck.scenes.base import DATA, Finite, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
@@ -38,7 +37,6 @@ Place = tuple[str | int, ...]
 #: Keys that mark a table of a scene file as an uncertain number.
 _KEYS = {"sd", "low", "high"}
 CORRELATION = "correlation"
-DATA = Path(str(resources.files("rockcheck.scenes"))) / "data"
 
 
 def named_scenes() -> dict[str, Path]:

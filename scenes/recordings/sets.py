@@ -2,14 +2,12 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 
+from rockcheck.scenes.base import DATA
 from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.recordings import Reading, Recording, read_components
 
-#: Where the records lie that come with the package.
-RECORDS = Path(str(resources.files("rockcheck.scenes"))) / "data" / "records"
 #: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net)
 #: are vertical, too. No network calls a horizontal component V or Z.
 _VERTICAL = re.compile(
@@ -62,7 +60,7 @@ def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, b
 
 def record_path(name: str, folder: Path) -> Path:
     """The file of that name in `folder`, else among the records that come with the package."""
-    beside, shipped = folder / name, RECORDS / name
+    beside, shipped = folder / name, DATA / "records" / name
     return (
         shipped if not beside.exists() and Path(name).name == name and shipped.exists() else beside
     )
