@@ -6,7 +6,8 @@ import gzip
 import io
 import json
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.util import find_spec
@@ -42,6 +43,25 @@ WORDS = ("kind", "mode_before", "mode_after")
 ABOUT = "rockcheck_history"
 #: Metadata of the block; `_MASS` of one that is not homogeneous.
 _SIZES, _MASS = ("half_width", "half_height"), ("centre_of_mass", "moment_of_inertia")
+#: Units that a column of a table may have, as in `theta_deg` or `x_dot_mm_s`, and their SI value.
+ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
+UNITS: Mapping[str, Mapping[str, float]] = {
+    "t": {"s": 1.0, "ms": 1e-3},
+    "theta": ANGLES,
+    "theta_dot": {f"{unit}_s": factor for unit, factor in ANGLES.items()},
+    **dict.fromkeys(("x", "y", "slip"), LENGTHS),
+    **{
+        name: {f"{unit}_s": factor for unit, factor in LENGTHS.items()}
+        for name in ("x_dot", "y_dot", "slip_rate")
+    },
+}
+#: By a column's name in a table: its name in a history, and the factor to SI units.
+MEANINGS = {name: (name, 1.0) for name in UNITS} | {
+    f"{name}_{unit}": (name, factor)
+    for name, units in UNITS.items()
+    for unit, factor in units.items()
+}
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -246,26 +266,32 @@ class History(Shown):
         return {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
 
     @classmethod
-    def load(cls, path: str | Path, *, columns: Mapping[str, str] | None = None) -> History:
-        """Read a file that `save` wrote, or any CSV with columns `t` and `theta` (SI units).
+    def load(cls, path: str | Path) -> History:
+        """Read a file that `save` wrote, or any CSV with columns of t and theta.
 
-        Other columns of `COLUMNS` are optional. `columns` maps the file's names of columns to those
-        of a history, where they differ. Raises `InputError` for a file that is missing, no CSV,
-        lacks those columns, is not numeric, not finite or not ordered in time.
+        Other columns of `COLUMNS` are optional. A name may say the unit: `t_s` or `time_ms`,
+        `theta_deg`, `x_mm`, `slip_rate_mm_s` (`UNITS`); a name without one is in SI units. Signs
+        are the scene's: theta counterclockwise positive, x of the box's centre relative to the
+        base. Raises `InputError` that names file and column for a file that is missing or no CSV,
+        lacks those columns or has one twice, is not numeric, not finite or not ordered in time.
         """
         import pandas as pd
 
         path = Path(path)
-        check_readable(path)
         shown = printable(path)
-        frame = read_table(path).rename(columns=str.strip).rename(columns=dict(columns or {}))
+        if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
+            raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
+        frame = read_table(path)
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()
         # pandas would take the first column for names of rows.
         if len(frame) and not isinstance(frame.index, pd.RangeIndex):
             raise InputError(f"{shown}: rows have more values than the heading has columns")
+        factors = _factors(frame.columns, shown)
+        frame.columns = list(factors)
         about, block = _about_of(frame, shown)
-        channels = _checked_channels(frame, shown)
+        channels = _checked_channels(frame, factors, shown)
+        said = about.outcome in OUTCOMES and {*factors.values()} == {1.0}
         try:
             event_list = tuple(
                 Event(
@@ -289,20 +315,12 @@ class History(Shown):
             model=printable(about.model, 200),
             channels=channels,
             event_list=event_list,
-            outcome=about.outcome if about.outcome in OUTCOMES else outcome_of(channels),
+            outcome=about.outcome if said else outcome_of(channels),
             cost=cost,
             settings=about.settings,
             notes=tuple(printable(note, 1000) for note in about.notes),
             uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
             block=block,
-        )
-
-
-def check_readable(path: Path) -> None:
-    """Raise `InputError` for a file of an ending that `save` writes and `load` does not read."""
-    if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
-        raise InputError(
-            f"{printable(path)}: a history is read from .csv or .csv.gz, not from {kind}"
         )
 
 
@@ -409,17 +427,41 @@ def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:
         raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
 
 
-def _checked_channels(frame: pd.DataFrame, shown: str) -> dict[str, NDArray[Any]]:
+def _factors(heading: Iterable[str], shown: str) -> dict[str, float]:
+    """The columns' names in a history, and the factors to SI units."""
+    factors: dict[str, float] = {}
+    for given in map(str.strip, heading):
+        plain = re.sub(r"^time(?=_|$)", "t", given)
+        known = (one for one in UNITS if plain.startswith(f"{one}_"))
+        if plain not in MEANINGS and (name := max(known, key=len, default="")):
+            raise InputError(
+                f"{shown}: column {printable(given)!r}: give a unit of {name}:"
+                f" {', '.join(UNITS[name])}"
+            )
+        name, factor = MEANINGS.get(plain, (given, 1.0))
+        # pandas numbers a name that is there twice
+        again, _ = MEANINGS.get(re.sub(r"\.\d+$", "", plain), (name, factor))
+        if again in factors:
+            raise InputError(
+                f"{shown}: column {printable(given)!r} gives {printable(again)} a second time"
+            )
+        factors[name] = factor
+    return factors
+
+
+def _checked_channels(
+    frame: pd.DataFrame, factors: Mapping[str, float], shown: str
+) -> dict[str, NDArray[Any]]:
     if missing := [name for name in ("t", "theta") if name not in frame.columns]:
         raise InputError(
             f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}"
         )
-    if doubled := [name for name in COLUMNS if list(frame.columns).count(name) > 1]:
-        raise InputError(f"{shown}: two columns {doubled[0]!r}")
     if len(frame) == 0:
         raise InputError(f"{shown}: no rows")
     channels = {
-        name: frame[name].astype(str).to_numpy() if name == "mode" else _numbers(frame[name], shown)
+        name: frame[name].astype(str).to_numpy()
+        if name == "mode"
+        else factors[name] * _numbers(frame[name], shown)
         for name in COLUMNS
         if name in frame.columns
     }

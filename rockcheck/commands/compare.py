@@ -81,7 +81,7 @@ def run(
         offset = 0.0 if align == BEST else float(align or 0.0)
     except ValueError:
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
-    given, other = measured.read_measured(reference), measured.read_measured(candidate)
+    given, other = History.load(reference), History.load(candidate)
     shift = measured.time_shift(given, other) if align == BEST else offset
     found = compare(given, measured.shifted(other, shift), until=until, scene=what)
     finding = _finding(found, {"reference": given, "candidate": other}, what, shift)

@@ -13,7 +13,6 @@ import pytest
 
 import rockcheck
 from rockcheck.scenes import History, errors, files, load_scene, reading, recordings, writing
-from rockcheck.validation.discrepancy import measured
 from rockcheck.validation.suite import results
 
 #: What may stand where a result is to be written, in a folder that somebody sent.
@@ -199,11 +198,10 @@ import pandas
 from rockcheck.scenes import History, InputError
 from rockcheck.scenes.files import read_toml
 from rockcheck.scenes.recordings import read_record
-from rockcheck.validation.discrepancy.measured import read_measured
 used = resource.getrusage(resource.RUSAGE_SELF).ru_utime
 resource.setrlimit(resource.RLIMIT_CPU, (int(used) + 10,) * 2)
 path = Path(sys.argv[1])
-for read in {".toml": [read_toml], ".csv": [read_record, History.load, read_measured]}\
+for read in {".toml": [read_toml], ".csv": [read_record, History.load]}\
 .get(path.suffix, [read_record]):
     try:
         read(path)
@@ -229,7 +227,6 @@ def test_any_file_of_a_megabyte_is_read_or_refused_within_ten_seconds(tmp_path, 
 
 READERS = (
     History.load,
-    measured.read_measured,
     recordings.read_record,
     load_scene,
     files.read_toml,

@@ -26,7 +26,6 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import History, InputError, Scene, load_scene, recordings
-from rockcheck.validation.discrepancy import measured
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, name_of
 from rockcheck.validation.suite import results, suites
@@ -187,7 +186,7 @@ READERS: dict[str, tuple[Callable[[bytes, Path], None], Callable[[], str]]] = {
         functools.partial(
             feed_file,
             name="h.csv",
-            reads=[History.load, measured.read_measured],
+            reads=[History.load],
             check=check_history,
         ),
         lambda: nasty.HISTORY,
@@ -349,7 +348,7 @@ def test_a_heading_in_quotes(written):
     """Found by fuzzing: a measured history whose heading is quoted, as some programs write it,
     ended in a traceback."""
     path = written("h.csv", '\ufeff"t_s","theta_deg" # a remark\n0.0,90.0\n0.5,0.0\n')
-    assert measured.read_measured(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
+    assert History.load(path).channels["theta"].tolist() == [math.pi / 2, 0.0]
 
 
 def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):

@@ -1,43 +1,22 @@
 """Measured histories: a CSV of a shake table or another program, played back as if by a model.
 
-Columns are named as in a history (`scenes.history.COLUMNS`), each with its unit: `t_s` or
-`time_ms`, `theta_deg`, `x_mm`, `slip_rate_mm_s` and so on; a name without unit is in SI units.
-Signs are the scene's: theta counterclockwise positive, x the centroid relative to the base.
+`History.load` says how its columns are named.
 """
 
 import dataclasses
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import scipy  # it loads its parts as they are used
 
-from rockcheck.scenes import Finite, Frozen, History, InputError, Scene, printable, reading
-from rockcheck.scenes.history import check_readable, outcome_of
+from rockcheck.scenes import Finite, Frozen, History, InputError, Scene, printable
+from rockcheck.scenes.history import outcome_of
 
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.
 AVERAGED = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate")
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-UNITS: Mapping[str, Mapping[str, float]] = {
-    "t": {"s": 1.0, "ms": 1e-3},
-    "theta": ANGLES,
-    "theta_dot": {f"{unit}_s": factor for unit, factor in ANGLES.items()},
-    **dict.fromkeys(("x", "y", "slip"), LENGTHS),
-    **{
-        name: {f"{unit}_s": factor for unit, factor in LENGTHS.items()}
-        for name in ("x_dot", "y_dot", "slip_rate")
-    },
-}
-
-MEANINGS = {name: (name, 1.0) for name in UNITS} | {
-    f"{name}_{unit}": (name, factor)
-    for name, units in UNITS.items()
-    for unit, factor in units.items()
-}
 
 
 class Measured(Frozen):
@@ -65,7 +44,7 @@ class Measured(Frozen):
         paths = (given,) if isinstance(given, str) else given
         if not paths:
             raise InputError("no file is given", "files")
-        tests = [read_measured(path, offset=self.offset) for path in paths]
+        tests = [shifted(History.load(path), self.offset) for path in paths]
         said: list[str] = []
         if self.align:
             offsets = [0.0, *(time_shift(tests[0], test) for test in tests[1:])]
@@ -94,54 +73,6 @@ class Measured(Frozen):
             notes=(*history.notes, *said),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
-
-
-def read_measured(path: str | Path, *, offset: float = 0.0) -> History:
-    """A history from a CSV whose columns name their units, or from one that rockcheck wrote.
-
-    `offset` (s) is added to its times. Raises `InputError`, naming file and column, for whatever is
-    missing, unknown, doubled or not finite.
-    """
-    check_readable(Path(path))
-    shown = printable(path)
-    # quotes and comments of the heading are read as in the rows
-    heading = reading.read_table(Path(path), header=None, nrows=1, dtype=str, keep_default_na=False)
-    if heading.empty:
-        raise InputError(f"{shown}: empty")
-    columns: dict[str, tuple[str, float]] = {}
-    for column in map(str.strip, heading.iloc[0]):
-        name, factor = _meaning(column, shown)
-        if name in (known for known, _ in columns.values()):
-            raise InputError(
-                f"{shown}: column {printable(column)!r} gives {printable(name)} a second time"
-            )
-        columns[column] = (name, factor)
-    history = History.load(path, columns={column: name for column, (name, _) in columns.items()})
-    channels: dict[str, Any] = {
-        name: history.channels[name] if factor == 1.0 else factor * history.channels[name]
-        for name, factor in columns.values()
-        if name in history.channels
-    }
-    si = all(factor == 1.0 for _, factor in columns.values())
-    outcome = history.outcome if si else outcome_of(channels)
-    return shifted(dataclasses.replace(history, channels=channels, outcome=outcome), offset)
-
-
-def _meaning(column: str, shown: str) -> tuple[str, float]:
-    """A column's name in a history, and the factor to SI units."""
-    plain = (
-        "t" + column.removeprefix("time")
-        if column == "time" or column.startswith("time_")
-        else column
-    )
-    if plain in MEANINGS:
-        return MEANINGS[plain]
-    if name := max((one for one in UNITS if plain.startswith(f"{one}_")), key=len, default=""):
-        raise InputError(
-            f"{shown}: column {printable(column)!r}: give a unit of {name}:"
-            f" {', '.join(UNITS[name])}"
-        )
-    return column, 1.0
 
 
 # Repeats of one test: their mean history, their scatter u_D, and their alignment in time.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rockcheck import Event, EventBasedModel, load_scene
+from rockcheck import Event, EventBasedModel, History, load_scene
 from rockcheck.scenes import observation
 from rockcheck.validation.discrepancy import measured
 from rockcheck.validation.execute import provenance
@@ -45,9 +45,9 @@ def write(path, head, *columns):
 
 def test_units_of_columns(tmp_path):
     t, head = np.arange(5.0), "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain"
-    history = measured.read_measured(write(tmp_path / "a.csv", head, *[t] * 6), offset=0.25)
+    history = History.load(write(tmp_path / "a.csv", head, *[t] * 6))
     expected = {"theta": np.deg2rad(t), "x": 1e-3 * t, "slip_rate": 1e-2 * t, "y": t}
-    expected["t"] = 1e-3 * t + 0.25
+    expected["t"] = 1e-3 * t
     assert (history.model, history.channels) == (
         "measured",
         {name: pytest.approx(values, rel=1e-7, abs=0.0) for name, values in expected.items()},
@@ -76,7 +76,7 @@ ROWS = "\n0,0,0\n1,1,1\n2,2,2\n"
 def test_faults_are_named(tmp_path, fault_of, written, name, content, fault):
     if content is not None:
         written(name, content)
-    assert fault in str(fault_of(measured.read_measured, tmp_path / name))
+    assert fault in str(fault_of(History.load, tmp_path / name))
 
 
 def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
@@ -128,10 +128,8 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     state[:, 2] = np.linspace(0.0, 1.5, 301)
     given = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
     observation.observe(scene, "measured", state, events=given).save(tmp_path / "a.csv")
-    assert [e.t for e in measured.read_measured(tmp_path / "a.csv", offset=-0.5).event_list] == [
-        -0.3,
-        2.495,
-    ]
+    later = measured.shifted(History.load(tmp_path / "a.csv"), -0.5)
+    assert [e.t for e in later.event_list] == [-0.3, 2.495]
     history = measured.Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
         scene.replace(duration=duration)
     )
