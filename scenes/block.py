@@ -17,7 +17,7 @@ from pydantic import (
 )
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import refuse
 
 #: Relative excess of the moment of inertia over its bound that is put down to rounding.
 ROUNDING = 1e-12
@@ -90,24 +90,22 @@ class Block(Frozen):
         if self.homogeneous:
             return self
         (x, z), b, h = self.offset, self.half_width, self.half_height
-        if not (abs(x) < b and abs(z) < h):
-            raise InputError(
+        most, mass = b * b + h * h - x * x - z * z, self.mass or 1.0
+        without = " (no mass is given: it is taken as that of 1 kg)" if self.mass is None else ""
+        refuse(
+            (
+                not (abs(x) < b and abs(z) < h),
                 f"({x:g}, {z:g}) is not allowed: must lie inside the box, x between -{b:g} and"
                 f" {b:g} m and z between -{h:g} and {h:g} m",
                 "centre_of_mass",
-            )
-        most = b * b + h * h - x * x - z * z
-        if self.gyration_squared > most * (1.0 + ROUNDING):
-            mass = 1.0 if self.mass is None else self.mass
-            without = (
-                " (no mass is given: it is taken as that of 1 kg)" if self.mass is None else ""
-            )
-            raise InputError(
+            ),
+            (
+                self.gyration_squared > most * (1.0 + ROUNDING),
                 f"{self.gyration_squared * mass:g} is not allowed{without}: a mass inside the box"
-                " with that centre has at most"
-                f" {most * mass:g} kg m^2",
+                f" with that centre has at most {most * mass:g} kg m^2",
                 "moment_of_inertia",
-            )
+            ),
+        )
         return self
 
     @model_serializer(mode="wrap")
@@ -145,8 +143,8 @@ class Block(Frozen):
     @property
     def gyration_squared(self) -> float:
         """Moment of inertia about the centre of mass per unit mass, m^2."""
-        moment, mass = self.moment_of_inertia, 1.0 if self.mass is None else self.mass
-        return self.half_diagonal**2 / 3.0 if moment is None else moment / mass
+        moment = self.moment_of_inertia
+        return self.half_diagonal**2 / 3.0 if moment is None else moment / (self.mass or 1.0)
 
     def pivot(self, side: Literal["left", "right"]) -> Pivot:
         """The lower corner on that side.

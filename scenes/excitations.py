@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import refuse
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 #: Largest peak acceleration that a record may be scaled to, g.
@@ -156,13 +156,16 @@ class Record(Motion):
     @classmethod
     def _read_file(cls, data: Any) -> Any:
         if isinstance(data, dict) and "file" in data:
-            if {"pga", "scale"} <= data.keys():
-                raise InputError("cannot be given together with scale", "pga")
-            if extra := {"unscaled", "source", "notes"} & data.keys():
-                raise InputError("cannot be given together with file", min(extra))
-            path = data["file"]
-            if not isinstance(path, str | Path):
-                raise InputError(f"{path!r} is not allowed: give the path of a record file", "file")
+            path, extra = data["file"], {"unscaled", "source", "notes"} & data.keys()
+            refuse(
+                ({"pga", "scale"} <= data.keys(), "cannot be given together with scale", "pga"),
+                (extra, "cannot be given together with file", min(extra, default="")),
+                (
+                    not isinstance(path, str | Path),
+                    f"{path!r} is not allowed: give the path of a record file",
+                    "file",
+                ),
+            )
             options = data.keys() & Reading.model_fields
             found = read_record(Path(path), Reading(**{name: data[name] for name in options}))
             data = {key: data[key] for key in data if key not in (*options, "file")} | {
@@ -218,10 +221,14 @@ def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
     """A record's fields with the `scale` that gives it a peak acceleration of `pga` (g)."""
     pga, largest = data["pga"], max(map(abs, data.get("unscaled", ())), default=0.0)
     number = isinstance(pga, int | float) and not isinstance(pga, bool)
-    if not number or not 0.0 < pga <= MOST_PGA:
-        raise InputError(f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}", "pga")
-    if not largest > 0.0:
-        raise InputError("the record does not move: no scale gives it a peak", "pga")
+    refuse(
+        (
+            not number or not 0.0 < pga <= MOST_PGA,
+            f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}",
+            "pga",
+        ),
+        (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
+    )
     return {name: value for name, value in data.items() if name != "pga"} | {
         "scale": pga * GRAVITY_OF_RECORDS / largest
     }

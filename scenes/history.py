@@ -20,7 +20,7 @@ from pydantic import ConfigDict
 
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.experience import Expected, expected, trust_of
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.writing import columns_text, json_text, write_together
@@ -329,16 +329,20 @@ def check_format(path: Path, more: str = "") -> None:
 
     The message ends with `more` that is allowed.
     """
-    kind = path.suffix.lower()
-    if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
-        raise InputError(
-            f"{printable(path)}: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
-            f" not as {printable(path.suffix)}{more}"
-        )
-    if kind == ".parquet" and not find_spec("pyarrow"):
-        raise InputError(
-            f"{printable(path)}: Parquet needs the package pyarrow: pip install pyarrow"
-        )
+    kind, shown = path.suffix.lower(), printable(path)
+    refuse(
+        (
+            kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")),
+            f"{shown}: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
+            f" not as {printable(path.suffix)}{more}",
+            "",
+        ),
+        (
+            kind == ".parquet" and not find_spec("pyarrow"),
+            f"{shown}: Parquet needs the package pyarrow: pip install pyarrow",
+            "",
+        ),
+    )
 
 
 def _mat(
@@ -452,12 +456,17 @@ def _factors(heading: Iterable[str], shown: str) -> dict[str, float]:
 def _checked_channels(
     frame: pd.DataFrame, factors: Mapping[str, float], shown: str
 ) -> dict[str, NDArray[Any]]:
-    if missing := [name for name in ("t", "theta") if name not in frame.columns]:
-        raise InputError(
-            f"{shown}: no column {missing[0]!r}; t and theta are needed, of {', '.join(COLUMNS)}"
-        )
-    if len(frame) == 0:
-        raise InputError(f"{shown}: no rows")
+    refuse(
+        *(
+            (
+                name not in frame.columns,
+                f"{shown}: no column {name!r}; t and theta are needed, of {', '.join(COLUMNS)}",
+                "",
+            )
+            for name in ("t", "theta")
+        ),
+        (len(frame) == 0, f"{shown}: no rows", ""),
+    )
     channels = {
         name: frame[name].astype(str).to_numpy()
         if name == "mode"

@@ -14,7 +14,7 @@ from pydantic import Field, StringConstraints, field_validator, model_validator
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block
-from rockcheck.scenes.errors import InputError
+from rockcheck.scenes.errors import InputError, refuse
 from rockcheck.scenes.excitations import Excitation, Rest
 
 __all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
@@ -38,20 +38,23 @@ class Floor(Frozen):
 
     @model_validator(mode="after")
     def _coulomb(self) -> Floor:
-        for key in ("friction", "static_friction"):
-            value = getattr(self, key)
-            if value is not None and value >= PAINLEVE_FRICTION:
-                raise InputError(
-                    f"{value:g} is not allowed: must be below 4/3, where a slipping pivot may jam"
+        refuse(
+            *(
+                (
+                    mu >= PAINLEVE_FRICTION,
+                    f"{mu:g} is not allowed: must be below 4/3, where a slipping pivot may jam"
                     " (Painleve)",
                     key,
                 )
-        if self.static_friction is not None and self.static_friction < self.friction:
-            raise InputError(
-                f"{self.static_friction:g} is not allowed: must be at least the kinetic friction"
+                for key, mu in (("friction", self.friction), ("static_friction", self.mu_s))
+            ),
+            (
+                self.mu_s < self.friction,
+                f"{self.mu_s:g} is not allowed: must be at least the kinetic friction"
                 f" {self.friction:g}",
                 "static_friction",
-            )
+            ),
+        )
         return self
 
     @property
@@ -108,28 +111,35 @@ class Scene(Shown, Frozen):
 
     @model_validator(mode="after")
     def _consistent(self) -> Scene:
-        if self.floor.mu_s >= self.block.least_painleve_friction:
-            raise InputError(
+        x, _, tilt, *_ = self.initial_state
+        clear = {
+            wall.side: kinematics.clearance(self.block, wall.side, wall.gap, x, tilt)
+            for wall in self.walls
+        }
+        refuse(
+            (
+                self.floor.mu_s >= self.block.least_painleve_friction,
                 f"{self.floor.mu_s:g} is not allowed: must be below"
                 f" {self.block.least_painleve_friction:.4g}, where a slipping pivot of"
                 " this block may jam (Painleve)",
                 "floor.friction" if self.floor.static_friction is None else "floor.static_friction",
-            )
-        if self.duration / self.output_step > MOST_SAMPLES:
-            raise InputError(
+            ),
+            (
+                self.duration / self.output_step > MOST_SAMPLES,
                 f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in"
                 f" {self.duration:g} s",
                 "output_step",
-            )
-        x, _, tilt, *_ = self.initial_state
-        for wall in self.walls:
-            clear = kinematics.clearance(self.block, wall.side, wall.gap, x, tilt)
-            if clear < -1e-12 * self.block.half_diagonal:
-                raise InputError(
-                    f"{tilt:g} is not allowed: the block would start {-clear:.3g} m inside the"
-                    f" {wall.side} wall",
+            ),
+            *(
+                (
+                    gap < -1e-12 * self.block.half_diagonal,
+                    f"{tilt:g} is not allowed: the block would start {-gap:.3g} m inside the"
+                    f" {side} wall",
                     "initial_rotation",
                 )
+                for side, gap in clear.items()
+            ),
+        )
         return self
 
     def wall(self, side: Literal["left", "right"]) -> Wall | None:
