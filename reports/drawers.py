@@ -10,11 +10,12 @@ from typing import Any, Literal
 import numpy as np
 
 from rockcheck.reports.show.spectrum import figure as spectra
-from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, figure_style, power_of_ten
+from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, new_figure, power_of_ten
 from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Axis, Panel, Plot
 
-#: Colours by day and by night of series without a look, in their order; grey for "thin" ones.
+#: Colours by day and by night of series without a look, in their order; grey for "thin" ones
+#: and levels.
 COLOURS = (
     ("#0072b2", "#3d9fdc"),
     ("#d55e00", "#e8762a"),
@@ -50,10 +51,8 @@ def lines(plot: Plot) -> Figure:
     """A panel beside the other, on common axes, with one legend below."""
     columns = min(COLUMNS, len(plot.panels))
     rows = math.ceil(len(plot.panels) / columns)
-    with figure_style() as new_figure:
-        figure = new_figure(
-            figsize=(PAGE, (3.4 if rows == 1 else 2.1 * rows) + 0.4), layout="constrained"
-        )
+    height = (3.4 if rows == 1 else 2.1 * rows) + 0.4
+    with new_figure(figsize=(PAGE, height), layout="constrained") as figure:
         grid = figure.subplots(rows, columns, sharex=True, sharey=plot.shared, squeeze=False)
         handles: dict[str, Any] = {}
         per = plot.data["per_unit"] if plot.data else 1.0
@@ -86,8 +85,7 @@ def stable_steps(plot: Plot) -> Figure:
     Each cell shows the step by its colour and as a number.
     """
     tried, models = plot.data["tried"], plot.data["models"]
-    with figure_style() as new_figure:
-        figure = new_figure(figsize=(PAGE, 5.6), layout="constrained")
+    with new_figure(figsize=(PAGE, 5.6), layout="constrained") as figure:
         for ax, (words, values, found) in zip(
             figure.subplots(2, 2).flat, plot.data["panels"], strict=True
         ):
@@ -123,10 +121,9 @@ def stable_steps(plot: Plot) -> Figure:
 
 def strips(plot: Plot) -> Figure:
     """A strip a figure: a point a run, a bar from the 16 to the 84 % quantile, and the median."""
-    with figure_style() as new_figure:
-        # Margins in inches: a layout engine would need longer than the drawing.
-        height = 0.5 * len(plot.data) + 0.1
-        figure = new_figure(figsize=(PAGE, height))
+    # Margins in inches: a layout engine would need longer than the drawing.
+    height = 0.5 * len(plot.data) + 0.1
+    with new_figure(figsize=(PAGE, height)) as figure:
         rows = figure.subplots(len(plot.data), 1, squeeze=False)[:, 0]
         figure.subplots_adjust(
             1.25 / PAGE,
@@ -152,7 +149,7 @@ def strips(plot: Plot) -> Figure:
 def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
     """One axis: limits, ticks, and where it is logarithmic at most seven powers of ten.
 
-    `figure_style` leaves the $ of matplotlib's own labels of powers as it is.
+    The common style leaves the $ of matplotlib's own labels of powers as it is.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
@@ -172,11 +169,11 @@ def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
 def _draw(ax: Any, panel: Panel, handles: dict[str, Any]) -> None:
     for series, colour in zip(panel.series, colours(panel), strict=True):
         low, y, high = (np.array(one, float) for one in (series.low, series.y, series.high))
+        if series.high:
+            ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
         if series.style == "level":
             drawn = ax.axhline(y[0], color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
         else:
-            if series.high:
-                ax.fill_between(series.x, low, high, color=colour[0], alpha=0.15, linewidth=0)
             look = STYLES[series.style] | (
                 {"marker": LOOKS[series.look].marker}
                 if series.look in LOOKS and series.style == "line"
@@ -199,7 +196,7 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
         (BY_KEY[series.look].light, BY_KEY[series.look].dark)
         if series.look in BY_KEY
         else GREY
-        if series.style == "thin"
+        if series.style in ("thin", "level")
         else own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)])
         for series in panel.series
     ]

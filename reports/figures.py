@@ -1,7 +1,7 @@
-"""What is drawn of one scene: its figures for a paper, and the data of its page.
+"""What is drawn of a scene, figures for a paper and the data of its page, and of an ensemble.
 
-Figures show the quantities of the paper's Figs. 4 and 5 for all models, and their differences below
-each.
+A scene's figures show the quantities of the paper's Figs. 4 and 5 for all models, and their
+differences below each.
 
 A page's data (`payload`) are a script, since a page opened from the file system cannot fetch data.
 Their values are float32 (rounded to 6e-8 of their size), a line of `rows` values for the ground,
@@ -13,16 +13,42 @@ import base64
 import math
 import zlib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rockcheck.reports.show.words import number
-from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, figure_style
-from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, Band, Channel, SceneView
+from rockcheck.reports.show.words import number, scene_facts
+from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, new_figure
+from rockcheck.reports.tables import checks_table, formula, runs_table, verdict_mark
+from rockcheck.reports.view import (
+    CHANNELS,
+    PAPER_CHANNELS,
+    Band,
+    Channel,
+    SceneView,
+    View,
+    slugs_of,
+)
+from rockcheck.scenes import Scene
 from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
-from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.discrepancy import figures, measures
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Finding,
+    Mark,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    Text,
+    text,
+)
+from rockcheck.validation.suite import motions, results
 
 #: How an event is drawn on a model's track: kind, marker, size.
 TRACKED = (("floor impact", "|", 5.0), ("wall impact", "D", 2.6))
@@ -39,6 +65,18 @@ LIMIT: dict[str, Any] = {
     "markersize": 7.0,
     "markeredgewidth": 1.4,
 }
+#: Ends of the axes of peaks, alpha, and where an overturned block is drawn beyond.
+LOWEST, MOST, FALLEN = 1e-3, 1.0, 3.2
+#: Columns of an ensemble's table: measure and title.
+STATISTICS_SHOWN = {
+    "overturning_accuracy": "agreement",
+    "overturning_precision": "precision",
+    "overturning_recall": "recall",
+    "ks_distance": "KS distance",
+    "peak_bias": "bias",
+    "peak_scatter": "scatter",
+}
+PEAK = "peak |θ|/α"
 
 
 def histories_figure(view: SceneView, against: str | None = None) -> Figure:
@@ -50,19 +88,18 @@ def histories_figure(view: SceneView, against: str | None = None) -> Figure:
     out.
     """
     against = against or view.figure_references[0]
-    with figure_style() as new_figure:
-        heights = (
-            [0.55]
-            + ([1.0, 0.62] if against else [1.0]) * len(PAPER_CHANNELS)
-            + [0.16 * len(view.histories) + 0.15]
-        )
-        beyond = view.horizon is not None and view.horizon < view.t[-1]
-        shades = _shades(view, against, beyond)
-        legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
-        # Margins in inches: a layout engine would need several times the drawing's own time.
-        top, bottom, space = 0.25 + 0.16 * legend_rows, 0.42, 0.09
-        height = top + bottom + 0.92 * sum(heights) + space * len(heights)
-        figure = new_figure(figsize=(PAGE, height))
+    heights = (
+        [0.55]
+        + ([1.0, 0.62] if against else [1.0]) * len(PAPER_CHANNELS)
+        + [0.16 * len(view.histories) + 0.15]
+    )
+    beyond = view.horizon is not None and view.horizon < view.t[-1]
+    shades = _shades(view, against, beyond)
+    legend_rows = -(-(len(view.histories) + len(shades)) // LEGEND_COLUMNS)
+    # Margins in inches: a layout engine would need several times the drawing's own time.
+    top, bottom, space = 0.25 + 0.16 * legend_rows, 0.42, 0.09
+    height = top + bottom + 0.92 * sum(heights) + space * len(heights)
+    with new_figure(figsize=(PAGE, height)) as figure:
         axes = list(figure.subplots(len(heights), 1, sharex=True, height_ratios=heights))
         figure.subplots_adjust(
             0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7
@@ -117,8 +154,7 @@ def histories_figure(view: SceneView, against: str | None = None) -> Figure:
 
 def thumbnail(curves: Iterable[tuple[Any, Any, Look]], *, step: bool = False) -> Figure:
     """Some curves (x, y, and whose) over each other, small and without words."""
-    with figure_style() as new_figure:
-        figure = new_figure(figsize=(3.4, 0.9))
+    with new_figure(figsize=(3.4, 0.9)) as figure:
         ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
         for x, y, look in curves:
             ax.plot(
@@ -401,3 +437,252 @@ def _shades(view: SceneView, against: str | None, beyond: bool) -> list[Any]:
         (beyond, Patch(color="#000000", alpha=0.08, label="beyond the horizon")),
     ]
     return [handle for shown, handle in entries if shown]
+
+
+@dataclass(frozen=True)
+class EnsembleView(View):
+    """One ensemble of a finished run, ready to be shown."""
+
+    record: results.EnsembleRecord
+    #: Its figures are for a paper, too.
+    printed: ClassVar[bool] = True
+
+    @cached_property
+    def references(self) -> tuple[str, ...]:
+        """Models that others are held against here; the run's own reference first."""
+        named = dict.fromkeys(
+            [
+                self.run.reference,
+                self.run.model_form,
+                *(figure.against for cell in self.cells for figure in cell.figures),
+            ]
+        )
+        return tuple(model for model in named if model in self.record.samples)
+
+    @cached_property
+    def curves(self) -> dict[str, tuple[list[float], list[float]]]:
+        """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
+        known = {
+            model: np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
+            for model, sample in self.record.samples.items()
+        }
+        return {
+            model: (
+                peaks.tolist(),
+                (np.arange(1, len(peaks) + 1) / len(self.record.samples[model].peaks)).tolist(),
+            )
+            for model, peaks in known.items()
+        }
+
+    def page(self) -> Finding:
+        """All that its page shows."""
+        blocks: list[Block] = [
+            Text(self.record.description, facts=self.facts()),
+            Text(
+                "Rocking is chaotic: what one block does in one motion cannot be predicted beyond"
+                " a few impacts, by any model. How many of many blocks rock how far, and how many"
+                " fall, can. So here models are held against each other by their distributions,"
+                " not by histories."
+            ),
+            Table(
+                "verdicts",
+                [Column("model", kind="model"), text("verdict"), text("outcome")],
+                [
+                    [cell.model, verdict_mark(cell), cell.outcome or cell.reason]
+                    for cell in self.cells
+                ],
+            ),
+            self.distributions(),
+            *([self.by_scene()] if len(self.record.samples) > 1 else []),
+            *(table for against in self.references if (table := self.agreement(against)).rows),
+            Text(
+                "Intervals are for 95 % confidence: Wilson's for shares, Student's for the bias"
+                " (mean of ln ratio of the peaks where both rock and neither falls), chi-squared"
+                " for the scatter (its standard deviation). p is the probability of such a"
+                " distance between two samples of one distribution."
+            ),
+            replace(checks_table(self.cells), title="Checks"),
+            runs_table(self.run, self.cells),
+            self.peaks(),
+        ]
+        return Finding(
+            "ensemble",
+            self.name,
+            "",
+            [
+                replace(one, name=f"data/{self.slug}-{one.name}".rstrip("-"))
+                if isinstance(one, Table)
+                else one
+                for one in blocks
+            ],
+        )
+
+    def facts(self) -> list[tuple[str, str]]:
+        """The ensemble in a few words: what is drawn, and the scene that it is drawn from."""
+        drawn = motions.Ensemble(**self.record.definition)
+        pulse, noise, motion = drawn.pulse, drawn.noise, drawn.pulse or drawn.noise
+        facts = {
+            "scenes": f"{drawn.count}, seed {drawn.seed}",
+            "friction": _distribution(drawn.friction),
+            "gap (m)": _distribution(drawn.gap),
+            "pulse": pulse and "Ricker, of random phase",
+            "its period (s)": pulse and _distribution(pulse.period),
+            "noise": noise
+            and f"Kanai-Tajimi, {number(noise.frequency)} Hz, damping {number(noise.damping)},"
+            f" {number(noise.strong)} s",
+            "its peak (m/s²)": motion and _distribution(motion.amplitude),
+        }
+        known = [(name, said) for name, said in facts.items() if said]
+        if "excitation" in drawn.scene:
+            return known
+        instead = {"floor": drawn.friction, "wall": drawn.gap, "base": motion}
+        base = Scene(**{"name": self.name, **drawn.scene})
+        return known + [fact for fact in scene_facts(base) if not instead.get(fact[0])]
+
+    def distributions(self) -> Plot:
+        """Share of scenes with a peak below each value, by model; difference from the reference.
+
+        Shaded: where the Kolmogorov-Smirnov test finds no difference at its level.
+        """
+        from scipy.stats import kstwobign
+
+        grid = np.unique(
+            np.concatenate([[0.0, MOST * 1.05], *(x for x, _ in self.curves.values())])
+        )
+        counts = {model: len(peaks) for model, peaks in self.record.peaks.items()}
+        shares = {
+            model: np.searchsorted(peaks, grid, side="right") / counts[model]
+            for model, (peaks, _) in self.curves.items()
+        }
+        known, reference = self.looks, self.references[0]
+        same = float(kstwobign.ppf(measures.CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
+        ends = (0.0, float(grid[-1]))
+        band = Series(
+            f"no difference at the {measures.CONFIDENCE:.0%} level",
+            ends,
+            (0.0,),
+            (-same, -same),
+            (same, same),
+            style="level",
+        )
+
+        def steps(values: dict[str, Any]) -> list[Series]:
+            return [
+                Series(known[m].label, grid.tolist(), list(share), look=known[m].key, style="step")
+                for m, share in values.items()
+            ]
+
+        others = {m: share - shares[reference] for m, share in shares.items() if m != reference}
+        return Plot(
+            self.slug,
+            f"Peak rotation in {max(counts.values())} scenes",
+            panels=[
+                Panel("share of scenes below the peak", steps(shares)),
+                Panel(f"difference from {known[reference].label}", [*steps(others), band]),
+            ],
+            x=Axis(f"{PEAK} of blocks that stay", limits=(0.0, min(ends[1], MOST * 1.5))),
+            note="An overturned block lies beyond every peak, so a curve ends at the share that"
+            " stays. The largest difference of two curves is their Kolmogorov-Smirnov distance;"
+            " within the shaded band the test sees no difference.",
+            shared=False,
+        )
+
+    def by_scene(self) -> Plot:
+        """Peak rotation of each scene by each model against the reference's."""
+        reference, known, panels = self.references[0], self.looks, []
+        for model in [one for one in self.record.samples if one != reference]:
+            pair = measures.Samples(self.record.samples[reference], self.record.samples[model])
+            x, y = (
+                np.where(one.fallen, FALLEN, np.clip(one.peaks, LOWEST, MOST * 1.6))
+                for one in (pair.reference, pair.candidate)
+            )
+            odd = pair.reference.fallen != pair.candidate.fallen
+            same, apart = ((x[rows].tolist(), y[rows].tolist()) for rows in (~odd, odd))
+            panels.append(
+                Panel(
+                    known[model].label,
+                    [
+                        Series("", (LOWEST, MOST), (LOWEST, MOST), style="thin"),
+                        Series("", *same, look=known[model].key, style="points"),
+                        Series("one falls", *apart, look=known[model].key, style="cross"),
+                    ],
+                )
+            )
+        ticks = {LOWEST: f"{LOWEST:g}", 0.01: "0.01", 0.1: "0.1", MOST: "1", FALLEN: "fell"}
+        x_axis, y_axis = (
+            Axis(f"{PEAK} by {of}", log=True, limits=(LOWEST * 0.8, FALLEN * 1.5), ticks=ticks)
+            for of in (known[reference].label, "the model")
+        )
+        return Plot(
+            f"{self.slug}-scenes",
+            "Scene by scene",
+            panels=panels,
+            x=x_axis,
+            y=y_axis,
+            note="A point a scene. Dots off the diagonal: chaos and numerical error; crosses: one"
+            " falls, the other stays.",
+        )
+
+    def agreement(self, against: str) -> Table:
+        """Who falls in how many scenes beside a reference, and the statistics of the peaks."""
+        rows = []
+        for cell in self.cells:
+            figures = {f.measure: f for f in cell.figures if f.against == against}
+            if figures:
+                theirs, own = (
+                    self.record.samples[against].fallen,
+                    self.record.samples[cell.model].fallen,
+                )
+                counts = (theirs & own, theirs & ~own, ~theirs & own, ~theirs & ~own)
+                rows.append(
+                    [
+                        cell.model,
+                        *(int(np.sum(count)) for count in counts),
+                        *(
+                            Mark(figures[name].value, more=figures[name].note.replace("], ", "]\n"))
+                            for name in STATISTICS_SHOWN
+                        ),
+                    ]
+                )
+        return Table(
+            f"against-{slugs_of([against])[against]}",
+            [
+                Column("model", kind="model"),
+                Column("both fall"),
+                Column("only the reference falls"),
+                Column("only the model falls"),
+                Column("both stay"),
+                *(
+                    Column(name, title, help=formula(name))
+                    for name, title in STATISTICS_SHOWN.items()
+                ),
+            ],
+            rows,
+            f"Agreement with {self.looks[against].label}",
+        )
+
+    def peaks(self) -> Table:
+        """Peak rotation (alpha) and outcome of every scene by every model."""
+        values = {
+            f"{what} {model}": column
+            for model, sample in self.record.samples.items()
+            for what, column in (
+                ("peak_rotation_alpha", sample.peaks.tolist()),
+                ("outcome", sample.outcomes),
+            )
+        }
+        return Table(
+            "",
+            list(map(Column, ["scene", *values])),
+            [[n, *row] for n, row in enumerate(zip(*values.values(), strict=True), 1)],
+            on="file",
+        )
+
+
+def _distribution(of: motions.Distribution | None) -> str:
+    match of:
+        case motions.Distribution(uniform=(low, high)):
+            return f"uniform {number(low)} to {number(high)}"
+        case motions.Distribution(lognormal=(median, sigma)):
+            return f"lognormal, median {number(median)}, σ {number(sigma)}"
+    return ""

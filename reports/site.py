@@ -16,10 +16,19 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from rockcheck.reports import tables
-from rockcheck.reports.document import FIGURES, PAGES, csv, row_cells, write_assets, write_page
+from rockcheck.reports.document import (
+    FIGURES,
+    PAGES,
+    belongings,
+    csv,
+    remove,
+    row_cells,
+    write_assets,
+    write_page,
+)
 from rockcheck.reports.drawers import figure_of, side_by_side
-from rockcheck.reports.ensembles import EnsembleView
 from rockcheck.reports.figures import (
+    EnsembleView,
     histories_figure,
     payload,
     summary,
@@ -176,9 +185,8 @@ def _remove(folder: Path, kept: Collection[str] = ()) -> None:
     """Remove pages with their figures and data, by their stamps; addresses that are `kept` stay."""
     for page in (folder / INDEX, *(folder / PAGES).glob("*.html")):
         if page.relative_to(folder).as_posix() not in kept and stamp_in(page):
-            for name in _belongings(page):
-                (folder / PAGES / name).unlink(missing_ok=True)
-            page.unlink()
+            # the tables beside the index are those of the run
+            remove(page.parent, [page.name, *(one for one in belongings(page) if "/" in one)])
 
 
 class _Pages:
@@ -224,9 +232,8 @@ class _Pages:
         if name == INDEX:
             self._write_index()
             return
-        view = self.views[name]
-        page = self.folder / self.links[name]
-        before = _belongings(page)
+        view, page = self.views[name], self.folder / self.links[name]
+        before = belongings(page)
         if isinstance(view, EnsembleView):
             template, shown = "finding.html", self._write_ensemble(view)
         else:
@@ -234,8 +241,7 @@ class _Pages:
         write_page(
             self.folder, self.links[name], template, view=view, stamp=stamp, **shown, **self.common
         )
-        for old in before - _belongings(page):
-            (self.folder / PAGES / old).unlink(missing_ok=True)
+        remove(page.parent, before - belongings(page))
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
         """Write a scene's figures and data; returns what its page shows beside the view.
@@ -354,17 +360,6 @@ _pages_of = cache(_Pages)
 
 def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
     _pages_of(folder, wanted).write(name, stamp)
-
-
-def _belongings(page: Path) -> set[str]:
-    """The files of a scene's page, relative to the folder of pages."""
-    return {
-        *re.findall(
-            r'(?:href|src)="(?:pages/)?((?:figures|data|scene-files)/[A-Za-z0-9._-]+)"',
-            reading.head_of(page, reading.MOST_BYTES),
-        ),
-        f"figures/{page.stem}-small.svg",
-    }
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

@@ -108,53 +108,53 @@ def label_of(model: str) -> str:
     return LOOKS[model].label if model in LOOKS else model
 
 
+#: The common style of all figures: sizes for a journal's page, a light grid, reproducible SVG.
+STYLE: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 7.5,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 7.5,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-4, 5),
+    "text.parse_math": False,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 0.9,
+    "lines.markersize": 4.0,
+    "xtick.direction": "out",
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "legend.handlelength": 2.6,
+    "path.simplify": True,
+    "path.simplify_threshold": 0.5,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "rockcheck",
+    "pdf.fonttype": 42,
+    "savefig.dpi": 150,
+    "figure.dpi": 100,
+}
+
+
 @contextmanager
-def figure_style() -> Iterator[type[Figure]]:
-    """The common style of all figures, for a `with` block.
+def new_figure(**how: Any) -> Iterator[Figure]:
+    """A figure of the common style (`STYLE`), which a `with` block draws; it needs no display.
 
-    Sizes for a journal's page, a light grid, reproducible SVG.
-
-    Figures made inside need no display: build them with the class that the block is given,
-    `matplotlib.figure.Figure`.
+    `how` are the arguments of `matplotlib.figure.Figure`.
     """
     import matplotlib as mpl
     from matplotlib.figure import Figure as NewFigure
 
-    settings: dict[Any, Any] = {
-        "font.family": "sans-serif",
-        "font.sans-serif": ["DejaVu Sans"],
-        "font.size": 7.5,
-        "axes.titlesize": 8.5,
-        "axes.titleweight": "bold",
-        "axes.titlelocation": "left",
-        "axes.labelsize": 7.5,
-        "axes.linewidth": 0.6,
-        "axes.spines.top": False,
-        "axes.spines.right": False,
-        "axes.grid": True,
-        "axes.axisbelow": True,
-        "axes.formatter.limits": (-4, 5),
-        "text.parse_math": False,
-        "grid.color": "#e4e4e4",
-        "grid.linewidth": 0.5,
-        "lines.linewidth": 0.9,
-        "lines.markersize": 4.0,
-        "xtick.direction": "out",
-        "xtick.major.width": 0.6,
-        "ytick.major.width": 0.6,
-        "legend.frameon": False,
-        "legend.fontsize": 7.5,
-        "legend.handlelength": 2.6,
-        "path.simplify": True,
-        "path.simplify_threshold": 0.5,
-        "svg.fonttype": "path",
-        "svg.hashsalt": "rockcheck",
-        "pdf.fonttype": 42,
-        "savefig.dpi": 150,
-        "figure.dpi": 100,
-    }
-    with mpl.rc_context(settings):
-        yield NewFigure
+    with mpl.rc_context(STYLE):
+        yield NewFigure(**how)
 
 
 def power_of_ten(value: float) -> str:
@@ -174,39 +174,33 @@ def kind_of(path: Path) -> str:
     return kind
 
 
-def save_as(figure: Figure, path: Path) -> Path:
-    """Write a figure into the file that the user chose; returns it."""
-    return save(figure, path.with_suffix(""), [kind_of(path)], named=True)[0]
+def save_as(figure: Figure, path: Path, *, stamp: str = "", named: bool = True) -> Path:
+    """Write a figure into a file, in the format of its ending; returns it.
 
-
-def save(
-    figure: Figure,
-    stem: Path,
-    formats: Iterable[str] = FORMATS,
-    *,
-    stamp: str = "",
-    named: bool = False,
-) -> list[Path]:
-    """Write a figure as `<stem>.svg`, `.png` and `.pdf`.
-
-    The same figure gives the same bytes, for no date is written.
-
-    `stamp` says what an SVG shows, see `stamp_of`; `named` that the user chose these very files.
+    The same figure gives the same bytes, for no date is written. `stamp` says what an SVG shows,
+    see `stamp_of`; `named` that the user chose this very file.
     """
+    import matplotlib as mpl
+
+    kind, content = kind_of(path), io.BytesIO()
     undated: dict[str, dict[str, Any]] = {
         "svg": {"Date": None, "Creator": "rockcheck"} | ({"Identifier": stamp} if stamp else {}),
         "pdf": {"CreationDate": None, "Creator": "rockcheck"},
         "png": {"Software": "rockcheck"},
     }
-    written = []
-    with figure_style():
-        for kind in formats:
-            path = writing.made(stem.parent) / f"{stem.name}.{kind}"
-            content = io.BytesIO()
-            figure.savefig(content, format=kind, metadata=undated[kind])
-            written.append(writing.write_whole(path, content.getvalue(), named=named))
-            figure.set_layout_engine(None)  # the other formats are laid out alike
-    return written
+    with mpl.rc_context(STYLE):
+        figure.savefig(content, format=kind, metadata=undated[kind])
+    figure.set_layout_engine(None)  # other formats are laid out alike
+    writing.made(path.parent)
+    return writing.write_whole(path, content.getvalue(), named=named)
+
+
+def save(
+    figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = ""
+) -> list[Path]:
+    """Write a figure as `<stem>.svg`, `.png` and `.pdf` (see `save_as`)."""
+    paths = (stem.with_name(f"{stem.name}.{kind}") for kind in formats)
+    return [save_as(figure, path, stamp=stamp, named=False) for path in paths]
 
 
 def stamp_of(shown: object) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from rockcheck.cm import ContinuousModel
@@ -15,7 +16,7 @@ from rockcheck.ebm import EventBasedModel, overturning_spectrum
 from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.reports.show.drawing import draw_block
 from rockcheck.reports.show.spectrum import draw
-from rockcheck.reports.style import PAGE, figure_style, looks, save
+from rockcheck.reports.style import PAGE, STYLE, looks, save
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height
 
@@ -221,7 +222,7 @@ def make(folder: Path) -> list[Path]:
     """All pictures, as PNG; the same code makes the same bytes."""
     written = []
     for picture in PICTURES:
-        with figure_style():
+        with rc_context(STYLE):
             written += save(picture(), folder / picture.__name__, ["png"])
     return written
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
-from rockcheck.reports.style import LOOKS, PAGE, Figure, figure_style
+from rockcheck.reports.style import LOOKS, PAGE, Figure, new_figure
 from rockcheck.scenes import writing
 from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
 from rockcheck.validation.finding import Plot
@@ -128,8 +128,7 @@ def figure(plot: Plot) -> Figure:
         units=0.4 if pulse else 0.0,
         below=0.5 + 0.15 * -(-len(handles) // columns),
     )
-    with figure_style() as new_figure:
-        figure = new_figure(figsize=(width, data["height"]))
+    with new_figure(figsize=(width, data["height"])) as figure:
         x, y = data["frequencies"], data["amplitudes"]
         for panel, place in zip(panels, places, strict=True):
             row, high, column = panel["place"]

@@ -152,7 +152,7 @@ def study(tmp_path_factory):
 def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, typed, name):
     assert {path.suffix for path in (study / FIGURES).iterdir()} == {".svg", ".json"}
     assert b"only the page" not in (study / FIGURES / f"{name}.json").read_bytes()
-    for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
+    for ending, begins in ((".svg", b"<?xml"), (".png", b"\x89PNG"), (".PDF", b"%PDF")):
         path = tmp_path / f"one{ending}"
         typed("report", str(study), "--scene", name, "-o", str(path))
         assert path.read_bytes().startswith(begins)
@@ -206,19 +206,14 @@ def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
 
 
 def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
-    """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
+    """As nobody but a stranger writes such a page, or a user keeps figures of his own."""
     folder = tmp_path / "sub"
     (folder / FIGURES).mkdir(parents=True)
-    rows = [{"a": 1.0}]
-    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
-    (folder / "run.json").write_text(json.dumps(said), "utf-8")
-    mine = [
-        tmp_path / "mine.csv",
-        *(folder / f"{name}.csv" for name in ("empty", "odd")),
-        *(folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")),
-    ]
-    for path in mine:
+    links = ("../mine.csv", "figures/../../mine.csv", "figures/..", "notes.txt", "old.csv")
+    (folder / "index.html").write_text(" ".join(f'href="{link}"' for link in links), "utf-8")
+    names = ("own.csv", "notes.txt", "figures/a.json", "figures/a.svg")
+    mine = [tmp_path / "mine.csv", *(folder / name for name in names)]
+    for path in (*mine, folder / "old.csv"):
         path.write_text("a\n", "utf-8")
-    (folder / "own.csv").write_text("b,a\n", "utf-8")
     publish(Finding("made", "Made up", ""), folder)
-    assert all(path.exists() for path in (*mine, folder / "own.csv"))
+    assert [path.exists() for path in (*mine, folder / "old.csv")] == [True] * len(mine) + [False]

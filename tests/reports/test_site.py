@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from rockcheck.commands import OUT, studies
-from rockcheck.reports.ensembles import EnsembleView
+from rockcheck.reports.figures import EnsembleView
 from rockcheck.reports.show.words import number
 from rockcheck.reports.site import PAGES, STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
