@@ -299,7 +299,7 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
     while step > 1:
         half = step // 2
         corners = outcomes[np.ix_(lattice.any(axis=1), lattice.any(axis=0))]
-        differs = _vary(corners, 2)[1:, 1:]  # in the cells that end at these corners
+        differs = vary(corners, 2)[1:, 1:]  # in the cells that end at these corners
         near = ndimage.binary_dilation(differs, np.ones((3, 3)))  # and a ring of cells around each
         wanted = np.zeros(outcomes.shape, dtype=bool)
         for i, j in zip(*np.nonzero(near), strict=True):
@@ -315,13 +315,13 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
         outcomes[i, j] = outcomes[i // step * step, j // step * step]
         inferred |= open_nodes
         step = half
-    while (doubtful := inferred & _vary(outcomes, 2 * FOLLOWED + 1)).any():
+    while (doubtful := inferred & vary(outcomes, 2 * FOLLOWED + 1)).any():
         inferred &= ~doubtful
         outcomes[doubtful] = _UNKNOWN
         run(doubtful)
 
 
-def _vary(outcomes: NDArray[np.int8], width: int) -> NDArray[np.bool_]:
+def vary(outcomes: NDArray[np.int8], width: int) -> NDArray[np.bool_]:
     """Where the outcomes are not all the same in the square of `width` nodes around a node.
 
     A square of two nodes ends at the node.

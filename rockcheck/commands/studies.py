@@ -37,7 +37,7 @@ from rockcheck.scenes import Scene, errors, files, printable
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models, store
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
-from rockcheck.validation.studies.population import answers, runs, study
+from rockcheck.validation.studies.population import answers, runs
 from rockcheck.validation.suite import motions
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
@@ -202,7 +202,7 @@ def check_tried(
 
 def population_of(
     tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]
-) -> study.Population:
+) -> runs.Population:
     """What --levels asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
 
     An incremental dynamic analysis of the `cases` under records; without any, the fragility under
@@ -230,13 +230,13 @@ def population_of(
             raise errors.InputError(
                 f"{measure} needs records; of pulses it is pga-ratio", "--levels"
             )
-        return study.fragility(scene, values, PULSES)
-    return study.ida(
+        return runs.fragility(scene, values, PULSES)
+    return runs.ida(
         scene,
         [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],
         values,
         measure=measure or "pga",
-        capacities=tried.capacity or study.CAPACITIES,
+        capacities=tried.capacity or runs.CAPACITIES,
         upward={
             name: one.scene.vertical
             for name, one in cases.items()

@@ -26,7 +26,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.paper import Panel, paper_panels
-from rockcheck.validation.studies.population.study import blocks_of, lines_of
+from rockcheck.validation.studies.population.runs import blocks_of, lines_of
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play

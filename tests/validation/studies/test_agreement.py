@@ -9,7 +9,7 @@ import pytest
 
 from rockcheck import Floor, Spectrum
 from rockcheck.validation.paper import paper_panels
-from rockcheck.validation.studies.spectrum import agreement
+from rockcheck.validation.studies.spectrum import study as agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
 
 
@@ -92,7 +92,7 @@ def test_agreement_counts_equal_outcomes(agree):
         ("cm", True): (19, 20, 0),
         ("cm", False): (19, 20, 1),
     }
-    _, table, by_spectrum, plot = agreement.blocks(found, [panel], came=False)
+    _, table, by_spectrum, plot = agreement.agreement_blocks(found, [panel], came=False)
     assert table.rows[:2] == [
         ["ebm-unilateral", 1.0, 1.0, None, None, 40, 0],
         ["cm", 0.95, 0.95, 0.95, 0.95, 40, 1],
@@ -124,7 +124,7 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):
     assert set(played[flat, "dart"]) == set(played[flat, "drake"]) < set(played[flat, "cm"])
     assert (bouncing, "drake") not in played
     assert {one["model"] for one in found["maps"]} == {"ebm", "ebm-unilateral", "cm"}
-    _, table, *_ = agreement.blocks(found, list(spectra), came=False)
+    _, table, *_ = agreement.agreement_blocks(found, list(spectra), came=False)
     assert [row["nodes"] for row in table.records()] == [80, 80, 16, 8]
 
 

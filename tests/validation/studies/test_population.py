@@ -24,7 +24,7 @@ from rockcheck.scenes import files, recordings
 from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.population.answers import Assessment
-from rockcheck.validation.studies.population.study import (
+from rockcheck.validation.studies.population.runs import (
     A_RUN,
     MEASURES,
     PULSES,

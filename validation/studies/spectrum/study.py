@@ -1,10 +1,16 @@
-"""`rockcheck spectrum`: overturning spectra, the paper's and one's own, as a study."""
+"""`rockcheck spectrum`: overturning spectra, the paper's and one's own, as a study.
+
+At some nodes of each spectrum the outcomes of the other models are compared with those of the
+event-based ones; of one figure every model draws a coarse map.
+"""
 
 import io
 import json
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -12,7 +18,8 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.horizon import may_fly, other_laws
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse
+from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse, vary
+from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Ricker, Scene, Sine, reading, writing
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
@@ -24,7 +31,8 @@ from rockcheck.validation.paper import (
     paper_panels,
     title_of,
 )
-from rockcheck.validation.studies.spectrum import agreement, tiles
+from rockcheck.validation.studies.spectrum import tiles
+from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
 from rockcheck.validation.study import Study
 
 Indices = NDArray[np.int64]
@@ -46,14 +54,25 @@ LAWS = (
     " these laws."
 )
 
-
+CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
+#: The share of the nodes that a model plays, where it is not all. These engines draw no map: fewer
+#: nodes show whether they agree; a run of DART costs four times, one of Drake twice the others'.
+PLAYED_SHARE = {"pymunk": 0.3, "dart": 0.1, "drake": 0.2}
+REFERENCES = {"ebm": "bilateral", "ebm-unilateral": "unilateral"}
+#: A node is near the boundary if a node of another outcome is among those at most this many nodes
+#: away, diagonals included.
+NEAR = 2
+#: The paper's figure of which every model draws a map, and the map's nodes an axis.
+MAPPED, MAP_SIZE = 8, 25
+#: All shares and maps, as JSON keeps them (`agree`).
+Agreement = Mapping[str, Any]
 #: Of a book's nodes: spectra and motions by panel, what the paper's sentences ask for, and the
 #: agreement of the other models.
 _Found = tuple[
     dict[Panel, Spectrum],
     dict[Panel, tiles.Played],
     measures.Paper | None,
-    agreement.Agreement | None,
+    Agreement | None,
 ]
 
 
@@ -66,7 +85,7 @@ class Spectra(Study):
     """
 
     panels: tuple[Panel, ...]
-    request: tiles.Request = field(default_factory=tiles.Request)
+    request: Request = field(default_factory=Request)
     compared: int = 0
     name = "spectrum"
     record = tiles.Played
@@ -78,13 +97,13 @@ class Spectra(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
         """The nodes that are still to be played."""
-        book = tiles.Book(done)
+        book = Book(done)
         self._found(book)
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The complete spectra, and the findings from them."""
-        by_panel, motions, paper, compared = self._found(tiles.Book(done))
+        by_panel, motions, paper, compared = self._found(Book(done))
         panels, spectra = list(by_panel), list(by_panel.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
         answer = (
@@ -92,13 +111,7 @@ class Spectra(Study):
             if len(self.panels) == len(spectra) == 1
             else f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
         )
-        laws = any(one.depends_on_law is not None for one in spectra)
-        blocks: list[Block] = [
-            Text(ABOUT, on="page"),
-            *self._figures(by_panel, motions),
-            self._shares(by_panel, laws),
-            *([Text(LAWS, on="page")] if laws else ()),
-        ]
+        blocks: list[Block] = [*self._blocks(by_panel, motions)]
         if paper:
             claims = measures.claims_of(paper)
             tally = Counter(claim.verdict for claim in claims)
@@ -110,7 +123,7 @@ class Spectra(Study):
         if self._papers and not self.compared:
             compared, panels = reading.read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
-            blocks += agreement.blocks(compared, agreement.mapped(panels), came=not self.compared)
+            blocks += agreement_blocks(compared, mapped(panels), came=not self.compared)
         return Finding(
             self.name,
             "Overturning spectra" if len(self.panels) > 1 else self.panels[0].title,
@@ -139,7 +152,7 @@ class Spectra(Study):
         """The name of a spectrum's files: the panel's, and the model's unless it is the paper's."""
         return panel.name + ("" if self.request.model == "ebm" else f"--{self.request.model}")
 
-    def _found(self, book: tiles.Book) -> _Found:
+    def _found(self, book: Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
         found = {panel: self._spectrum(book, panel) for panel in self.panels}
         spectra = {panel: one for panel, one in found.items() if one is not None}
@@ -156,12 +169,10 @@ class Spectra(Study):
             spectra,
             motions,
             self._paper(book, list(spectra.values())) if whole and self._papers else None,
-            agreement.agree(book, spectra, self.request, self.compared)
-            if whole and self.compared
-            else None,
+            agree(book, spectra, self.request, self.compared) if whole and self.compared else None,
         )
 
-    def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
+    def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
         request, walls = self.request, panel.scene.walls
         player = models.build(request.model, request.settings)
@@ -189,7 +200,7 @@ class Spectra(Study):
             scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings, what
         )
 
-    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
         scanned = {
             measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
                 one.scene,
@@ -219,8 +230,16 @@ class Spectra(Study):
             tongues,
         )
 
-    def _shares(self, spectra: Mapping[Panel, Spectrum], laws: bool) -> Table:
-        return Table(
+    def _blocks(
+        self, spectra: Mapping[Panel, Spectrum], motions: Mapping[Panel, tiles.Played]
+    ) -> Iterator[Block]:
+        """The figures, and the shares of outcomes."""
+        yield Text(ABOUT, on="page")
+        for number in dict.fromkeys(panel.figure for panel in spectra):
+            mine = {panel: one for panel, one in spectra.items() if panel.figure == number}
+            yield self._figure(mine, motions)
+        laws = any(one.depends_on_law is not None for one in spectra.values())
+        yield Table(
             "spectra",
             [
                 text("spectrum"),
@@ -255,52 +274,53 @@ class Spectra(Study):
             ],
             "Shares of outcomes",
         )
+        if laws:
+            yield Text(LAWS, on="page")
 
-    def _figures(
+    def _figure(
         self, spectra: Mapping[Panel, Spectrum], motions: Mapping[Panel, tiles.Played]
-    ) -> Iterator[Plot]:
-        request = self.request
-        for number in dict.fromkeys(panel.figure for panel in spectra):
-            mine = [panel for panel in spectra if panel.figure == number]
-            first = mine[0]
-            pulses, pulse = None, first.scene.excitation
-            if isinstance(pulse, Ricker | Sine):
-                # amplitude (m/s^2) and period (s) along the axes, and where the user's own one is
-                f, a = request.frequencies, request.amplitudes
-                amplitudes, periods = (some.tolist() for some in node_pulse(first.scene, a, f))
-                own = f[0] * periods[0] / pulse.period, a[0] * pulse.amplitude / amplitudes[0]
-                pulses = {
-                    "amplitude": amplitudes,
-                    "period": periods,
-                    "own": [*map(float, own)] if number is None else None,
-                }
-            yield Plot(
-                self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
-                (title_of(number) if number else first.title)
-                + ("" if request.model == "ebm" else f", by {request.model}"),
-                kind="spectra",
-                live=True,
-                note=f"{request.size} x {request.size} nodes, {request.model}"
-                + (", refined along boundaries." if request.refine else "."),
-                data={
-                    "frequencies": request.frequencies.tolist(),
-                    "amplitudes": request.amplitudes.tolist(),
-                    "record": first.scene.excitation.kind == "record",
-                    "pulse": pulses,
-                    "panels": [self._panel(one, spectra[one], motions[one]) for one in mine],
-                    "height": 4.0,
-                },
-                played=[
-                    {
-                        "block": [panel.scene.block.half_width, panel.scene.block.half_height],
-                        "alpha": panel.scene.block.alpha,
-                        "walls": [{"side": w.side, "gap": w.gap} for w in panel.scene.walls],
-                        "ends": motions[panel].ends,
-                        "rows": motions[panel].rows,
-                    }
-                    for panel in mine
+    ) -> Plot:
+        request, first, pulses = self.request, next(iter(spectra)), None
+        number, pulse = first.figure, first.scene.excitation
+        if isinstance(pulse, Ricker | Sine):
+            # amplitude (m/s^2) and period (s) along the axes, and where the user's own one is
+            f, a = request.frequencies, request.amplitudes
+            amplitudes, periods = (some.tolist() for some in node_pulse(first.scene, a, f))
+            own = f[0] * periods[0] / pulse.period, a[0] * pulse.amplitude / amplitudes[0]
+            pulses = {
+                "amplitude": amplitudes,
+                "period": periods,
+                "own": [*map(float, own)] if number is None else None,
+            }
+        return Plot(
+            self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
+            (title_of(number) if number else first.title)
+            + ("" if request.model == "ebm" else f", by {request.model}"),
+            kind="spectra",
+            live=True,
+            note=f"{request.size} x {request.size} nodes, {request.model}"
+            + (", refined along boundaries." if request.refine else "."),
+            data={
+                "frequencies": request.frequencies.tolist(),
+                "amplitudes": request.amplitudes.tolist(),
+                "record": pulse.kind == "record",
+                "pulse": pulses,
+                "panels": [
+                    self._panel(panel, one, motions[panel]) for panel, one in spectra.items()
                 ],
-            )
+                "height": 4.0,
+            },
+            played=[
+                {
+                    "block": [panel.scene.block.half_width, panel.scene.block.half_height],
+                    "alpha": panel.scene.block.alpha,
+                    "walls": [{"side": w.side, "gap": w.gap} for w in panel.scene.walls],
+                    "ends": motions[panel].ends,
+                    "rows": motions[panel].rows,
+                }
+                for panel in spectra
+            ],
+        )
 
     def _panel(self, panel: Panel, one: Spectrum, motions: tiles.Played) -> dict[str, Any]:
         wall, spread = panel.wall, _spread(self.request.size)
@@ -310,7 +330,7 @@ class Spectra(Study):
         return {
             "title": panel.title,
             "free": wall is None,
-            "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
+            "outcomes": "".join(letters_of(one.outcomes, one.undecided).ravel()),
             "law": [] if one.depends_on_law is None else one.depends_on_law.tolist(),
             "place": place,
             "nodes": [
@@ -341,10 +361,14 @@ class Spectra(Study):
                 "versions": provenance.versions(),
             }
         )
-        rows = zip(one.amplitude_ratios.tolist(), one.outcomes.tolist(), strict=True)
         table = writing.table_text(
             ["amplitude_ratio\\frequency_ratio", *map(repr, one.frequency_ratios.tolist())],
-            ([amplitude, *row] for amplitude, row in rows),
+            (
+                [amplitude, *row]
+                for amplitude, row in zip(
+                    one.amplitude_ratios.tolist(), one.outcomes.tolist(), strict=True
+                )
+            ),
         )
         arrays = io.BytesIO()
         law: Any = one.depends_on_law
@@ -365,3 +389,243 @@ class Spectra(Study):
 
 def _spread(size: int) -> NDArray[np.int64]:
     return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
+
+
+def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.int64]]:
+    """`count` nodes (i, j) of a spectrum: those near the boundary, and those away from it.
+
+    Half of them are near it, where there are enough. The choice is random but depends only on
+    `name`. Nodes that the reference could not decide are left out.
+    """
+    near = vary(spectrum.outcomes, 2 * NEAR + 1)
+    random = np.random.default_rng(zlib.crc32(name.encode()))
+    decided = letters_of(spectrum.outcomes, spectrum.undecided) != tiles.UNDECIDED
+    inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
+    wanted = max(min(count // 2, len(inside)), min(count - len(outside), len(inside)))
+    return [
+        side[random.permutation(len(side))[:number]]
+        for side, number in ((inside, wanted), (outside, count - wanted))
+    ]
+
+
+def plays(request: Request, panel: Panel) -> bool:
+    """Whether the model can play the contacts of the panel.
+
+    An engine without restitution does not play walls or a floor that bounce.
+    """
+    model = models.build(request.model, request.settings)
+    bounces = any(one.restitution for one in (panel.scene.floor, *panel.scene.walls))
+    return not (bounces and isinstance(model, Engine) and "restitution" in model.lacks())
+
+
+def agree(
+    book: Book, spectra: Mapping[Panel, Spectrum], request: Request, count: int
+) -> Agreement | None:
+    """Equal outcomes of the other models at nodes of each spectrum, and their maps.
+
+    Up to `count` nodes of each spectrum are played; the maps are of one figure. None where nodes
+    are still to be played.
+
+    `shares` are those of one model at the nodes of one spectrum, near the boundary or away from it:
+    `equal` counts nodes against each of `REFERENCES`; `failed` are nodes that the model could not
+    finish, counted as unequal. A map has rows of letters by panel, lowest amplitude first; `equal`
+    of its `nodes` have the unilateral event-based model's outcome.
+    """
+    others = [
+        replace(request, model=model, settings={})
+        for model in CANDIDATES
+        if not models.not_installed(model)
+    ]
+    requests = {one.model: one for one in (request, *others)}
+    shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
+    coarse = {
+        model: replace(one, size=MAP_SIZE, refine=False)
+        for model, one in requests.items()
+        if model not in PLAYED_SHARE
+    }
+    maps = list(_maps(book, list(spectra), coarse))
+    if book.wanted:
+        return None
+    fewer = [one.model for one in others if one.model in PLAYED_SHARE]
+    return {
+        "about": f"Share of equal outcomes at {count} nodes of each spectrum of {request.size} x"
+        f" {request.size} nodes. Half of them are at most {NEAR} nodes from a boundary (near), the"
+        " others further away. Models are held against the paper's bilateral event-based model and"
+        " against the unilateral one, which lets the block hop as the other models do. Runs of the"
+        " other models end with the pulse where the block then lacks the energy to tip over,"
+        f" otherwise {tiles.SETTLE:g} s later. A block that then stands counts as safe."
+        + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
+        "date": datetime.now(UTC).date().isoformat(),
+        "versions": provenance.versions(),
+        "settings": {model: dict(one.settings) for model, one in requests.items()},
+        "shares": [share for some in shares for share in some],
+        "map_frequencies": coarse["ebm"].frequencies.tolist(),
+        "map_amplitudes": coarse["ebm"].amplitudes.tolist(),
+        "maps": maps,
+    }
+
+
+def _shares(
+    book: Book, panel: Panel, spectrum: Spectrum, others: Sequence[Request], count: int
+) -> Iterator[dict[str, Any]]:
+    chosen = choose_nodes(spectrum, count, panel.name)
+    sides = {"ebm": [spectrum.outcomes[tuple(part.T)] for part in chosen]}
+    for one in others:
+        # at least two, one on each side
+        number = max(2, round(PLAYED_SHARE.get(one.model, 1.0) * count))
+        halves = (
+            [number // 2, number - number // 2]
+            if number < sum(map(len, chosen))
+            else [*map(len, chosen)]
+        )
+        i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
+        how = panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
+        if not plays(one, panel):
+            continue
+        outcomes, failed = book.outcomes(*how)
+        ends = [len(chosen[0][: halves[0]])]
+        mine, fine = np.split(outcomes, ends), np.split(~failed, ends)
+        sides.setdefault(one.model, mine)
+        for part in (0, 1):
+            yield {
+                "spectrum": panel.name,
+                "figure": panel.figure,
+                "model": one.model,
+                "near": part == 0,
+                "nodes": len(mine[part]),
+                "failed": len(mine[part]) - int(fine[part].sum()),
+                "equal": {
+                    other: int(
+                        np.sum(fine[part] & (mine[part] == sides[other][part][: len(mine[part])]))
+                    )
+                    for other in REFERENCES
+                    if other != one.model and other in sides
+                },
+            }
+
+
+def mapped(panels: Sequence[Panel]) -> list[Panel]:
+    """The panels of the figure of which every model draws a map."""
+    figures = [panel.figure for panel in panels]
+    return [p for p in panels if p.figure == (MAPPED if MAPPED in figures else figures[0])]
+
+
+def _maps(
+    book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]
+) -> Iterator[dict[str, Any]]:
+    chosen = mapped(panels)
+    drawn = {
+        model: [book.spectrum(panel, one) for panel in chosen] for model, one in requests.items()
+    }
+    if book.wanted:
+        return
+    letters = {
+        model: np.array([letters_of(one.outcomes, one.undecided) for one in some if one])
+        for model, some in drawn.items()
+    }
+    for model, mine in letters.items():
+        yield {
+            "model": model,
+            "nodes": mine.size,
+            "equal": int(np.sum(mine == letters["ebm-unilateral"])),
+            "outcomes": {
+                panel.name: ["".join(row) for row in grid]
+                for panel, grid in zip(chosen, mine, strict=True)
+            },
+        }
+
+
+def agreement_blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> Iterator[Block]:
+    """The agreement as text, tables and maps; `came`: whether it came with the package."""
+    origin = (
+        f"Not computed in this run: it came with the package, from a run on {found['date']} by"
+        f" rockcheck {found['versions'].get('rockcheck', '')}. --agreement 200 computes it anew"
+        if came
+        else f"Computed on {found['date']}"
+    )
+    settings = "; ".join(
+        f"{model} {', '.join(f'{key} {value}' for key, value in chosen.items()) or 'as it comes'}"
+        for model, chosen in found["settings"].items()
+    )
+    versions = ", ".join(
+        f"{name} {found['versions'][name]}"
+        for name in ("dartpy", "drake", "mujoco", "pybullet", "pymunk")
+        if name in found["versions"]
+    )
+    yield Text(
+        f"{found['about']} {origin}. Settings: {settings}. {versions}.",
+        "The same spectra by the other models",
+        on="page",
+    )
+    model = Column("model", kind="model")
+    yield _table("agreement", found["shares"], [model])
+    yield _table(
+        "agreement-by-spectrum",
+        found["shares"],
+        [text("spectrum"), model],
+        title="Spectrum by spectrum",
+        on="page",
+        folded=True,
+    )
+    if found["maps"]:
+        equal = ", ".join(
+            f"{one['model']} {one['equal']} of {one['nodes']}"
+            for one in found["maps"]
+            if one["model"] != "ebm-unilateral"
+        )
+        size = len(found["map_frequencies"])
+        yield Plot(
+            "models",
+            f"Fig. {panels[0].figure} by every model" if panels[0].figure else "By every model",
+            kind="spectra",
+            note=f"{size} x {size} nodes a spectrum; equal to the unilateral event-based model's:"
+            f" {equal}.",
+            data={
+                "frequencies": found["map_frequencies"],
+                "amplitudes": found["map_amplitudes"],
+                "record": False,
+                "panels": [
+                    {
+                        "title": panel.title.replace(", ", "\n") if row == 0 else "",
+                        "free": panel.wall is None,
+                        "outcomes": "".join(one["outcomes"][panel.name]),
+                        "place": [row, 1, column],
+                        "row": one["model"],
+                    }
+                    for row, one in enumerate(found["maps"])
+                    for column, panel in enumerate(panels)
+                ],
+                "height": 0.4 + 0.92 * len(found["maps"]),
+            },
+        )
+
+
+def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
+    """The shares of equal outcomes, summed up by some columns."""
+    columns = [
+        Column(f"{side}_{short}", f"{side}, {short}", kind="percent")
+        for short in REFERENCES.values()
+        for side in ("near", "away")
+    ]
+    groups: dict[tuple[str, ...], list[Any]] = {}
+    for one in shares:
+        groups.setdefault(tuple(one[column.name] for column in by), []).append(one)
+    return Table(
+        name,
+        [*by, *columns, Column("nodes"), Column("failed")],
+        [
+            [
+                *at,
+                *(_equal(some, near, one) for one in REFERENCES for near in (True, False)),
+                *(sum(one[count] for one in some) for count in ("nodes", "failed")),
+            ]
+            for at, some in groups.items()
+        ],
+        **more,
+    )
+
+
+def _equal(shares: Sequence[Any], near: bool, reference: str) -> float | None:
+    mine = [share for share in shares if share["near"] == near and reference in share["equal"]]
+    nodes = sum(share["nodes"] for share in mine)
+    return sum(share["equal"][reference] for share in mine) / nodes if nodes else None

@@ -146,25 +146,24 @@ def nodes_of(
     base = provenance.cell_key(neutral, model, settings) + what + how
     size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
     one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
-    found = []
-    for first in range(0, len(amplitudes), max(size, 1)):
-        a, f = (
-            np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)
+    parts = (
+        [np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)]
+        for first in range(0, len(amplitudes), max(size, 1))
+    )
+    return [
+        Nodes(
+            provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
+            what,
+            scene,
+            a,
+            f,
+            model,
+            settings,
+            expected=one * len(a),
+            where="here" if fast else "worker",
         )
-        found.append(
-            Nodes(
-                provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
-                what,
-                scene,
-                a,
-                f,
-                model,
-                settings,
-                expected=one * len(a),
-                where="here" if fast else "worker",
-            )
-        )
-    return found
+        for a, f in parts
+    ]
 
 
 def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray[np.str_]:
