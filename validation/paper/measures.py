@@ -158,7 +158,12 @@ def against_none(
     compared = [
         (part, place, float(areas[place]), float(alone[place[1]]))
         for part in parts
-        for place in _walls_of(part)
+        for place in product(  # the walls that have the parameters which the part names
+            *(
+                [axis.index(part[name])] if name in part else range(len(axis))
+                for name, axis in AXES.items()
+            )
+        )
     ]
     rows = [
         Row(
@@ -190,16 +195,6 @@ def against_none(
         "most_loss": share(1.0 - min(ratios)),
         "gain": share(max(ratios) - 1.0),
     }
-
-
-def _walls_of(part: Mapping[str, Any]) -> Iterator[Place]:
-    """The places of the walls that have the parameters which a part names."""
-    return product(
-        *(
-            [axis.index(part[name])] if name in part else range(len(axis))
-            for name, axis in AXES.items()
-        )
-    )
 
 
 def _within(part: Mapping[str, Any], wall: float, none: float) -> bool | None:
@@ -385,9 +380,10 @@ def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
 
 def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The nodes (i, j) at omega_p/p from `ONE_IMPACT` to one more that overturn clockwise."""
-    f = spectrum.frequency_ratios
-    near = (f >= ONE_IMPACT[0]) & (f <= ONE_IMPACT[1] + 1.0)
-    return np.nonzero((spectrum.outcomes == RIGHT) & near)  # type: ignore[return-value]
+    (low, high), f = ONE_IMPACT, spectrum.frequency_ratios
+    return np.nonzero(  # type: ignore[return-value]
+        (spectrum.outcomes == RIGHT) & (f >= low) & (f <= high + 1.0)
+    )
 
 
 # Findings beyond the paper: nodes that are gained, lost and otherwise safe, by place.
@@ -419,8 +415,8 @@ class Beyond:
 
 
 def _figure(side: int, mu: int) -> int:
-    figures = {shown: figure for figure, shown in FIGURES.items()}
-    return figures[AXES["side"][side], AXES["friction"][mu]]
+    shown = AXES["side"][side], AXES["friction"][mu]
+    return next(figure for figure, one in FIGURES.items() if one == shown)
 
 
 def _case(place: Place) -> str:
@@ -654,21 +650,25 @@ def _rows(name: str, title: str, of: Mapping[str, Sequence[Row]]) -> Table:
 def _areas(paper: Paper) -> Plot:
     gaps = AXES["gap"]
     areas, alone = (100.0 * safe.mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
-    panels = []
-    for side, of_side in zip(AXES["side"], areas, strict=True):
-        series = []
-        for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True):
-            series += [
-                *(
-                    Series(f"μ {mu:g}, e {e:g}", gaps, line)
-                    for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
-                ),
-                Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
-            ]
-        panels.append(Panel(f"Wall on the {side}", series))
     return Plot(
         "safe-areas",
-        panels=panels,
+        panels=[
+            Panel(
+                f"Wall on the {side}",
+                [
+                    series
+                    for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True)
+                    for series in (
+                        *(
+                            Series(f"μ {mu:g}, e {e:g}", gaps, line)
+                            for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
+                        ),
+                        Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
+                    )
+                ],
+            )
+            for side, of_side in zip(AXES["side"], areas, strict=True)
+        ],
         x=Axis("gap, mm"),
         y=Axis("safe nodes, %"),
         note="Safe areas of all spectra.",

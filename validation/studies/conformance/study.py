@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -231,6 +232,19 @@ class Conformance(Study):
         ]
         wrong = [card["counts"]["fail"] + card["counts"]["error"] for card in cards]
         failing = sum(count > 0 for count in wrong)
+        suites = [
+            (
+                card["title"],
+                [
+                    (
+                        *(card["title"], f"{row['id']} {row['name']}"),
+                        *(VERDICTS[row["verdict"]][2], row["reason"], "", None),
+                    )
+                    for row in card["phenomena"]
+                ],
+            )
+            for card in cards
+        ]
         return Finding(
             self.name,
             "Conformance: phenomena with a certain answer",
@@ -240,17 +254,8 @@ class Conformance(Study):
             {"cards": cards},
             "fail" if failing else "pass",
             int(failing > 0),
-            files={"junit.xml": writing.junit_text("rockcheck conformance", map(_cases, cards))},
+            files={"junit.xml": writing.junit_text("rockcheck conformance", suites)},
         )
-
-
-def _cases(card: Card) -> tuple[str, Iterator[writing.Case]]:
-    """A suite of JUnit: a case a phenomenon."""
-    title = card["title"]
-    return title, (
-        (title, f"{row['id']} {row['name']}", VERDICTS[row["verdict"]][2], row["reason"], "", None)
-        for row in card["phenomena"]
-    )
 
 
 def _in_units(scene: Scene, history: History) -> None:
@@ -259,16 +264,23 @@ def _in_units(scene: Scene, history: History) -> None:
     As a rule a column is then in other units than its name says.
     """
     t, size = history.channels["t"], scene.block.radius
-    for name, value in zip(("x", "y", "theta"), scene.initial_state, strict=False):
-        first = float(history.channels.get(name, [value])[0])
-        if not abs(first - value) <= 0.02 * (1.0 if name == "theta" else size):
-            raise errors.ModelFailure(
-                f"unit? {name} begins at {first:.4g}, and the scene at {value:.4g}: columns are in"
-                " SI units unless their names say otherwise, such as x_mm, theta_deg"
-            )
+    begins = (
+        (name, float(history.channels.get(name, [value])[0]), value, unit)
+        for name, value, unit in zip(
+            ("x", "y", "theta"), scene.initial_state, (size, size, 1.0), strict=False
+        )
+    )
     turned = float(np.max(np.abs(history.channels["theta"])))
     early = turned < 1.0 and t[-1] < 0.9 * scene.duration - scene.output_step
     for wrong, said in (
+        *(
+            (
+                not abs(first - value) <= 0.02 * unit,
+                f"{name} begins at {first:.4g}, and the scene at {value:.4g}: columns are in SI"
+                " units unless their names say otherwise, such as x_mm, theta_deg",
+            )
+            for name, first, value, unit in begins
+        ),
         (turned > math.pi, f"theta reaches {turned:.4g} rad: degrees are called theta_deg"),
         (
             early,
@@ -289,16 +301,7 @@ def _card(player: Player, found: Mapping[str, Seen | pool.Failure]) -> Card:
         for id, one in found.items()
     }
     rows = [
-        {
-            "id": id,
-            "name": (what := PHENOMENA[id]).name,
-            "target": what.target,
-            "value": one.value,
-            "limit": what.limit,
-            "unit": what.unit,
-            "verdict": one.verdict,
-            "reason": one.reason,
-        }
+        dict(zip(ROW, itemgetter(*ROW)(vars(PHENOMENA[id]) | vars(one)), strict=True))
         for id, one in seen.items()
     ]
     counts = Counter(row["verdict"] for row in rows)

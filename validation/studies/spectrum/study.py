@@ -154,8 +154,9 @@ class Spectra(Study):
 
     def _found(self, book: Book) -> _Found:
         """All that follows from the nodes played; the book lists those still to be played."""
-        found = {panel: self._spectrum(book, panel) for panel in self.panels}
-        spectra = {panel: one for panel, one in found.items() if one is not None}
+        spectra = {
+            panel: one for panel in self.panels if (one := self._spectrum(book, panel)) is not None
+        }
         fast = tiles.compiled(models.build(self.request.model, self.request.settings))
         i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
         motions = {
@@ -186,10 +187,11 @@ class Spectra(Study):
             else ()
         )
         one = book.spectrum(panel, request)
-        played = (
-            book.spectrum(panel, request, {**request.settings, "impacts": law}) for law in others
-        )
-        laws = [law for law in played if law is not None]
+        laws = [
+            played
+            for law in others
+            if (played := book.spectrum(panel, request, {**request.settings, "impacts": law}))
+        ]
         if one is None or not laws or len(laws) < len(others):
             return one
         return replace(one, depends_on_law=tiles.differing(one, laws))
@@ -414,7 +416,7 @@ def plays(request: Request, panel: Panel) -> bool:
     An engine without restitution does not play walls or a floor that bounce.
     """
     model = models.build(request.model, request.settings)
-    bounces = any(one.restitution for one in (panel.scene.floor, *panel.scene.walls))
+    bounces = panel.scene.floor.restitution or any(wall.restitution for wall in panel.scene.walls)
     return not (bounces and isinstance(model, Engine) and "restitution" in model.lacks())
 
 
@@ -437,7 +439,10 @@ def agree(
         if not models.not_installed(model)
     ]
     requests = {one.model: one for one in (request, *others)}
-    shares = [list(_shares(book, panel, one, others, count)) for panel, one in spectra.items()]
+    shares = [
+        list(_shares(book, panel, one, [other for other in others if plays(other, panel)], count))
+        for panel, one in spectra.items()
+    ]
     coarse = {
         model: replace(one, size=MAP_SIZE, refine=False)
         for model, one in requests.items()
@@ -479,10 +484,9 @@ def _shares(
             else [*map(len, chosen)]
         )
         i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
-        how = panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
-        if not plays(one, panel):
-            continue
-        outcomes, failed = book.outcomes(*how)
+        outcomes, failed = book.outcomes(
+            panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
+        )
         ends = [len(chosen[0][: halves[0]])]
         mine, fine = np.split(outcomes, ends), np.split(~failed, ends)
         sides.setdefault(one.model, mine)

@@ -255,8 +255,9 @@ class Request:
 
     def __post_init__(self) -> None:
         if not 2 <= self.size <= MOST_SIZE:
-            said = f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis"
-            raise InputError(said, "--size")
+            raise InputError(
+                f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis", "--size"
+            )
         settings = {**SETTINGS.get(self.model, {}), **self.settings}
         object.__setattr__(self, "settings", settings)
         models.build(self.model, settings)
