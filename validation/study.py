@@ -260,5 +260,7 @@ class _Run:
             task.expected / (max(1, self.jobs) if task.where == "worker" else 1) for task in waiting
         )
         if seconds >= LONG:
-            long = f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
-            progress.announce(f"{self.study.name}: {len(waiting)} tasks, about {long}")
+            progress.announce(
+                f"{self.study.name}: {len(waiting)} tasks, about "
+                + (f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min")
+            )

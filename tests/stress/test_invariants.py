@@ -24,17 +24,15 @@ from rockcheck import (
 from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.studies.stress import invariants, runs
 from rockcheck.validation.studies.stress.invariants import (
+    BOOLE,
     INVARIANTS,
+    Motion,
     audited,
     check_run,
     energy_error,
     energy_without_source,
-    similar,
-)
-from rockcheck.validation.studies.stress.mechanics import (
-    BOOLE,
-    Motion,
     integrals,
+    similar,
     tilted_forces,
 )
 from rockcheck.validation.studies.stress.runs import PLAYERS, Chunk

@@ -13,6 +13,10 @@ FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
     8: ("right", 0.3),
     9: ("right", 0.6),
 }
+TITLES: dict[int | None, str] = {
+    figure: f"Fig. {figure}: Wall on the {side}, μ = {friction:g}"
+    for figure, (side, friction) in FIGURES.items()
+}
 GAPS, RESTITUTIONS = (0.003, 0.053, 0.103), (0.0, 1.0)
 FREQUENCIES, AMPLITUDES = (0.5, 8.0), (1.0, 12.0)
 #: Results of long runs, as they come with the package.
@@ -32,12 +36,6 @@ class Panel:
     def wall(self) -> Wall | None:
         """The wall, or None."""
         return self.scene.walls[0] if self.scene.walls else None
-
-
-def title_of(figure: int) -> str:
-    """Title of the paper's figure: the wall's side and the friction."""
-    side, friction = FIGURES[figure]
-    return f"Fig. {figure}: Wall on the {side}, μ = {friction:g}"
 
 
 def paper_panels(*figures: int) -> tuple[Panel, ...]:

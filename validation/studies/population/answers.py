@@ -370,10 +370,11 @@ def gaps_of(found: Found) -> dict[str, Any]:
         )
     fallen = [row["overturned"] for row in rows]
     safe = itertools.takewhile(lambda row: not row["overturned"], rows)
-    reaches = (run.reach[side] for run in found.free for side in found.study.sides)
     return {
         "gaps": rows,
-        "clearance": max(reaches, default=None),
+        "clearance": max(
+            (run.reach[side] for run in found.free for side in found.study.sides), default=None
+        ),
         "free_overturned": sum(run.fell for run in found.free),
         "none_overturns_up_to": max((row["gap"] for row in safe), default=None),
         "monotonic": fallen == sorted(fallen),
@@ -527,8 +528,8 @@ def _leading(found: Found) -> str:
     peaks -= peaks.mean(axis=1, keepdims=True)
     numbers = np.array([[value for _, value in draw] for draw in found.study.draws])
     numbers -= numbers.mean(axis=0)
-    covariances = np.abs(peaks.sum(axis=0) @ numbers)
-    return found.study.draws[0][np.argmax(covariances / np.linalg.norm(numbers, axis=0))][0]
+    matters = np.abs(peaks.sum(axis=0) @ numbers) / np.linalg.norm(numbers, axis=0)
+    return found.study.draws[0][np.argmax(matters)][0]
 
 
 def numerical_of(found: Found) -> dict[str, Any]:

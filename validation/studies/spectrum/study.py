@@ -26,10 +26,10 @@ from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Tab
 from rockcheck.validation.paper import (
     GAPS,
     KEPT,
+    TITLES,
     Panel,
     measures,
     paper_panels,
-    title_of,
 )
 from rockcheck.validation.studies.spectrum import tiles
 from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
@@ -296,7 +296,7 @@ class Spectra(Study):
             }
         return Plot(
             self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
-            (title_of(number) if number else first.title)
+            TITLES.get(number, first.title)
             + ("" if request.model == "ebm" else f", by {request.model}"),
             kind="spectra",
             live=True,

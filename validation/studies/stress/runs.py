@@ -27,10 +27,11 @@ from rockcheck.validation.studies.stress.generator import Kind, exact_scene, ran
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
     CheckedRun,
+    Motion,
     check_run,
     energy_without_source,
+    not_finite,
 )
-from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.study import Task
 
 #: Caps of an event-based run: the Zeno rule ends endless bouncing after some 1e5 impacts, each of

@@ -34,9 +34,10 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, tex
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
     CheckedRun,
+    Motion,
     energy_without_source,
+    not_finite,
 )
-from rockcheck.validation.studies.stress.mechanics import Motion, not_finite
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
     MOST_TRIALS,
