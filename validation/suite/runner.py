@@ -1,26 +1,307 @@
-"""Run a suite: play the cells that are not up to date, compare, judge, return the `Run`."""
+"""Run a suite: play the cells that are not up to date, compare, judge, return the `Run`.
 
+Figures are taken against references under any law of impacts. Computed once and kept: the horizon,
+the landing at which laws part, and the effect of a spread of inputs on figures. The uncertainty
+sets a cell's difference from each reference against u_num, u_input and u_D (ASME V&V 20).
+"""
+
+import json
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from pydantic import TypeAdapter
 
-from rockcheck.scenes import Scene, progress
-from rockcheck.validation.discrepancy import measures
-from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord
+from rockcheck.ebm import EventBasedModel, predictability_horizon
+from rockcheck.ebm.horizon import may_fly, other_laws
+from rockcheck.scenes import History, InputError, ModelFailure, NonNegative, Scene, progress
+from rockcheck.validation.discrepancy import impact_laws, measures
+from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
+from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord, Stored
 from rockcheck.validation.execute import models, pool, provenance
-from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store
+from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
-from rockcheck.validation.study import FAULTS, Study, run
-from rockcheck.validation.suite import comparing, motions, results, suites, tolerances
+from rockcheck.validation.study import FAULTS, Study, Task, run
+from rockcheck.validation.suite import motions, results, suites, tolerances
 from rockcheck.validation.uncertainty import numerical, population
+
+T = TypeVar("T")
+#: Measures judged by the nearest law. Histories are judged up to the horizon, which ends where the
+#: laws part.
+BY_ANY = ("outcome_agrees", "peak_ratio")
+
+
+@dataclass(frozen=True)
+class Planned(Task):
+    """A cell to be played: a scene, or the scenes `numbers` of an `ensemble`, by a model.
+
+    An ensemble's scenes are drawn from `scene`. `place` is the name of the scene, or of the
+    ensemble. `key` is the hash of all that the result depends on.
+    """
+
+    place: str = field(compare=False)
+    scene: Scene = field(compare=False)
+    variant: models.Work = field(compare=False)
+    model: str
+    key: str
+    uncertainty: bool = field(default=False, compare=False)
+    ensemble: motions.Ensemble | None = field(default=None, compare=False)
+    numbers: range = field(default=range(0), compare=False)
+
+    @property
+    def name(self) -> str:
+        """Name of its files."""
+        part = [f"{self.numbers.start}"] if self.ensemble else []
+        return name_of(self.place, self.variant.label, *part, self.key)
+
+    @property
+    def label(self) -> str:
+        """Scene and model; of an ensemble the first scene, too."""
+        part = f", from {self.numbers.start}" if self.ensemble else ""
+        return f"{self.place}, {self.variant.label}{part}"
+
+    def play(self) -> models.Played:
+        """The history, or the peaks of a batch."""
+        if self.ensemble is None:
+            played = models.play(self.variant, self.scene, uncertainty=self.uncertainty)
+        else:
+            played = models.play_batch(
+                self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
+            )
+        self.record(played.record)  # a user-defined model's history may say nonsense
+        return played
+
+    def record(self, given: Mapping[str, Any]) -> "CellRecord | BatchRecord":
+        """The record of what was played or kept; raises `InputError` where it is none."""
+        return BatchRecord(**given) if self.ensemble else CellRecord(**given)
+
+
+class CellRecord(Stored):
+    """The kept record of a cell, beside its history."""
+
+    outcome: str
+    notes: tuple[str, ...]
+    settings: dict[str, Any]
+    uncertainty: dict[str, NonNegative]
+    numerical: numerical.Numerical | None
+    cost: results.CostRecord
+
+
+class BatchRecord(Stored):
+    """The kept record of a batch: peak |theta| in alpha and outcome of each scene.
+
+    None and the reason where the model failed.
+    """
+
+    peaks: tuple[float | None, ...]
+    outcomes: tuple[str, ...]
+    cost: results.CostRecord
+
+
+class Compared(NamedTuple):
+    """A figure, and what of its window could not be compared: `fall` if because one block fell."""
+
+    figure: Figure
+    gap: str = ""
+    fall: bool = False
+
+
+class ComparisonRecord(Stored):
+    """All figures of a cell, its own and those against each reference."""
+
+    figures: tuple[Compared, ...]
+    impact_law: impact_laws.LawFollowed | None = None
+    overturned_at: float | None = None
+
+
+def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
+    """The store's value of type `kind` under that name; computed and kept if missing or invalid."""
+    adapter: TypeAdapter[T] = TypeAdapter(kind)
+    with suppress(KeyError, TypeError, ValueError):
+        return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
+    found = compute()
+    store.put_record(COMPARISONS, name, {"kept": adapter.dump_python(found, mode="json")})
+    return found
+
+
+def _of_scene(
+    store: Store,
+    scene: Scene,
+    what: str,
+    module: str,
+    kind: Any,
+    compute: Callable[[], T],
+    **more: Any,
+) -> T:
+    """A result of type `kind` on a scene, by the code of a module; kept in the store."""
+    depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
+    key = provenance.cell_key(scene, models.REFERENCE, depends)
+    return kept(store, name_of(scene.name, what, key), kind, compute)
+
+
+def landing_of(store: Store, scene: Scene) -> impact_laws.Landing | None:
+    """The first landing of a scene at which the laws part, None without one; kept in the store."""
+
+    def landing() -> impact_laws.Landing | None:
+        with suppress(InputError, ModelFailure):  # it is not a scene for that model
+            return impact_laws.parting_landing(scene)
+        return None
+
+    if not may_fly(scene):
+        return None
+    return _of_scene(
+        store,
+        scene,
+        "impact-laws",
+        "validation.discrepancy.impact_laws",
+        impact_laws.Landing | None,
+        landing,
+    )
+
+
+def under_other_laws(scene: Scene, variant: models.Work) -> dict[str, History]:
+    """A reference's histories under the other laws of impacts, by law.
+
+    Laws under which it fails are left out. Empty for a model without a choice of law.
+    """
+    model = (
+        None if models.is_own(variant.family) else models.build(variant.family, variant.settings)
+    )
+    found: dict[str, History] = {}
+    if isinstance(model, EventBasedModel):
+        for law in other_laws(model, walls=bool(scene.walls), flat=True):
+            with suppress(ModelFailure):
+                found[law] = model.model_copy(update={"impacts": law}).simulate(scene)
+    return found
+
+
+def by_any(
+    candidate: History,
+    reference: History | None,
+    others: Mapping[str, History],
+    scene: Scene,
+    measures: Sequence[str],
+    window: str = "",
+    until: float | None = None,
+) -> Iterator[Compared]:
+    """A history's figures against `reference`, those of BY_ANY against it under the nearest law.
+
+    `others` are the reference's histories under other laws. The note of a figure names the law if
+    it is another one. Without a reference, the history's own figures. Of a window, as tolerances
+    name it, that ends at `until` (s; None: the whole time).
+    """
+    if reference is None:
+        gap = too_short(candidate, until)
+        for one in describe(candidate, until=until, scene=scene, measures=measures):
+            yield Compared(one.model_copy(update={"window": window}), gap)
+        return
+    wanted = [measure for measure in measures if measure in BY_ANY]
+    found = {"": compare(reference, candidate, until=until, scene=scene, measures=measures)} | {
+        f'impacts = "{law}"': compare(history, candidate, until=until, scene=scene, measures=wanted)
+        for law, history in others.items()
+    }
+    for first in found[""].figures:
+        rivals = {law: one for law, one in found.items() if not law or first.measure in BY_ANY}
+        # 1 is perfect; farthest is a law without a value
+        away = {law: abs(one[first.measure] - 1.0) for law, one in rivals.items()}
+        law = min(rivals, key=lambda law: math.inf if math.isnan(away[law]) else away[law])
+        nearest = found[law].figure(first.measure)
+        change = {
+            "against": first.against,
+            "note": "; ".join(filter(None, (nearest.note, law))),
+            "window": window,
+        }
+        yield Compared(nearest.model_copy(update=change), found[law].gap, found[law].fall)
+
+
+#: Quantities whose differences are explained, with their units.
+QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
+
+
+def explanations(
+    scene: Scene,
+    cell: results.Cell,
+    references: Iterable[results.Cell],
+    scatters: Mapping[str, Mapping[str, float]],
+    inputs: population.Inputs | None,
+) -> Iterator[numerical.Explanation]:
+    """The verdict on each quantity of a cell against each reference.
+
+    `scatters` is, by model, the scatter of the repeats of a measured history: rotations in rad,
+    slips in m. There is no verdict for a model whose numerical error is unknown. Where the outcomes
+    differ and a block falls, the only verdict is on the outcome.
+    """
+    if cell.numerical is None:
+        return
+    sizes = {"alpha": scene.block.alpha, "m": 1.0}
+    u_inputs = {name: inputs.u_input(name) or 0.0 for name in QUANTITIES} if inputs else {}
+    for other in references:
+        if cell.outcome != other.outcome and "overturned" in cell.outcome + other.outcome:
+            yield _other_outcome(other.model, (cell.numerical, other.numerical), inputs)
+            continue
+        for name, unit in QUANTITIES.items():
+            error = _difference(name, cell.figures, other)
+            if error is None:
+                continue
+            u_num, reason = _both(name, (cell.numerical, other.numerical))
+            own, theirs = scatters[cell.model].get(name, 0.0), scatters[other.model].get(name, 0.0)
+            yield numerical.explain(
+                name,
+                unit,
+                error,
+                u_num,
+                u_inputs.get(name, 0.0),
+                math.hypot(own / sizes[unit], theirs / sizes[unit]),
+                reason=reason,
+                against=other.model,
+            )
+
+
+def _difference(name: str, figures: Sequence[Figure], other: results.Cell) -> float | None:
+    mine, theirs = results.value_of(figures, name), results.value_of(other.figures, name)
+    if mine is None or theirs is None:  # a figure of both histories
+        return results.value_of(figures, name, other.model)
+    return abs(mine - theirs)
+
+
+def _other_outcome(
+    against: str,
+    both: Iterable[numerical.Numerical | None],
+    inputs: population.Inputs | None,
+) -> numerical.Explanation:
+    """The verdict on two different outcomes; a falling block's peaks and slips do not compare."""
+    if reasons := [reason for one in both if one for reason in one.reasons]:
+        return numerical.explain(
+            "outcome", "", None, None, reason="; ".join(reasons), against=against
+        )
+    both_occur = inputs is not None and 0.0 < inputs.overturns.value < 1.0  # among the draws
+    other = "not explained: model form or set-up, another outcome"
+    return numerical.Explanation(
+        quantity="outcome",
+        unit="",
+        against=against,
+        error=1.0,
+        u_num=0.0,
+        verdict=numerical.INPUTS if both_occur else other,
+    )
+
+
+def _both(name: str, both: Iterable[numerical.Numerical | None]) -> tuple[float | None, str]:
+    """The combined numerical uncertainty of both runs; None and the reason if one is unknown."""
+    known = [one for one in both if one]
+    parts = [one.u_num(name) for one in known]
+    if None in parts:
+        return None, known[parts.index(None)].reason(name)
+    return math.hypot(*(u for u in parts if u is not None)), ""
+
 
 #: Remark on a gap in a measured history.
 SHIFTS = (
@@ -75,7 +356,7 @@ class SuiteStudy(Study):
         self.suite, self.store, self.own = suite, Store(folder), suite.owners
         self.memory_mb = max((part.given.limits.memory_mb for part in suite.parts), default=None)
         #: By scene or ensemble, and by model: the cell, or the batches of it.
-        self.planned: dict[str, dict[str, list[comparing.Planned]]] = {}
+        self.planned: dict[str, dict[str, list[Planned]]] = {}
         for scene, variant, ensemble in suite.cells():
             found = list(self._planned(scene, variant, ensemble))
             self.planned.setdefault(found[0].place, {})[variant.label] = found
@@ -86,20 +367,20 @@ class SuiteStudy(Study):
             for item in found
         ]
         #: The record of each that has ended, or why it has none.
-        self.ended: dict[comparing.Planned, Any] = {
+        self.ended: dict[Planned, Any] = {
             item: pool.Failure(missing)
             for item in self.items
             if (missing := models.not_installed(item.variant.family))
         }
         self.playable = [item for item in self.items if item not in self.ended]
-        self.read_back: set[comparing.Planned] = set()
+        self.read_back: set[Planned] = set()
         #: Batches of which some scenes failed without a result.
-        self.traces: set[comparing.Planned] = set()
+        self.traces: set[Planned] = set()
         self.compared: dict[str, list[results.Cell]] = {}
 
     def _planned(
         self, scene: Scene, variant: models.Work, ensemble: motions.Ensemble | None
-    ) -> Iterator[comparing.Planned]:
+    ) -> Iterator[Planned]:
         """A cell, or the batches of an ensemble.
 
         A batch's key covers how its scenes are drawn, so it can be looked up without drawing them.
@@ -119,7 +400,7 @@ class SuiteStudy(Study):
                 for n in (every[k : k + ensemble.batch] for k in every[:: ensemble.batch])
             ]
         for numbers, depends in parts:
-            yield comparing.Planned(
+            yield Planned(
                 place,
                 scene,
                 variant,
@@ -134,7 +415,7 @@ class SuiteStudy(Study):
                 compiles=models.compiles(kind, variant.settings),
             )
 
-    def tasks(self, done: Mapping[Any, Any]) -> Sequence[comparing.Planned]:
+    def tasks(self, done: Mapping[Any, Any]) -> Sequence[Planned]:
         """All cells and batches of models that are installed, in the order in which they begin.
 
         First one cell for each compiled code, since the others with that code wait for it; then the
@@ -194,7 +475,17 @@ class SuiteStudy(Study):
         if any(item not in self.ended for item in self.items):
             return Finding(self.name, suite.name, "interrupted", complete=False)
         inputs = {
-            name: comparing.inputs_of(self.store, given) for name, given in suite.uncertain.items()
+            name: _of_scene(
+                self.store,
+                given.scene,
+                "inputs",
+                "validation.uncertainty.population",
+                population.Inputs,
+                partial(population.propagate, given),
+                spreads={place: spread.model_dump() for place, spread in given.spreads.items()},
+                correlation=given.correlation.tolist(),
+            )
+            for name, given in suite.uncertain.items()
         }
         cells: list[results.Cell] = []
         ensembles: list[results.EnsembleRecord] = []
@@ -241,7 +532,7 @@ class SuiteStudy(Study):
             exit_code=finished.exit_code,
         )
 
-    def _about(self, parts: Sequence[comparing.Planned], reason: str = "") -> dict[str, Any]:
+    def _about(self, parts: Sequence[Planned], reason: str = "") -> dict[str, Any]:
         """The fields of every cell, made of a history or of batches; `reason`: why it failed."""
         first, variant = parts[0], parts[0].variant
         status = "failed" if reason else "done"
@@ -267,15 +558,13 @@ class SuiteStudy(Study):
             "unexpected": bool(traced) and not models.is_own(variant.family),
         }
 
-    def _cell(
-        self, parts: Sequence[comparing.Planned], reference: results.Cell | None
-    ) -> results.Cell:
+    def _cell(self, parts: Sequence[Planned], reference: results.Cell | None) -> results.Cell:
         (planned,), record = parts, self.ended[parts[0]]
         if isinstance(record, pool.Failure):
             return results.Cell(**self._about(parts, record.reason))
         scene, own = planned.scene, self.own[planned.place]
         required = own.required(scene.name, planned.model)
-        found = comparing.compared(self.store, planned, self._asked(planned, required))
+        found = self._compared(planned, required)
         floor = partial(tolerances.floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
@@ -312,27 +601,71 @@ class SuiteStudy(Study):
         )
 
     def _asked(
-        self, planned: comparing.Planned, required: Iterable[tolerances.Place]
-    ) -> dict[str, comparing.Asked]:
-        """What a cell is compared with: its own figures, and the references that finished."""
-        there: dict[str, comparing.Planned | None] = {tolerances.OWN_FIGURES: None} | {
+        self, planned: Planned, required: Iterable[tolerances.Place]
+    ) -> Iterator[tuple[str, Planned | None, dict[str, list[str]]]]:
+        """What a cell is compared with: its own figures, and the references that finished.
+
+        With the measures by window: all over the whole time, else those `required`.
+        """
+        there: dict[str, Planned | None] = {tolerances.OWN_FIGURES: None} | {
             name: one
             for name, (one,) in self.planned[planned.place].items()
             if one is not planned and not isinstance(self.ended[one], pool.Failure)
         }
-        return {
-            name: (
-                there[name],
-                sorted(
-                    p.what
-                    for p in required
-                    if p.against == name
-                    and ("@" in p.what or tolerances.measure_of(p.what).on_request)
-                ),
+        yardsticks = self.own[planned.place].yardsticks(required)
+        for against in filter(there.__contains__, yardsticks):
+            book = measures.DIFFERENCES if there[against] else measures.FIGURES
+            windows = {"": [name for name, one in book.items() if not one.on_request]}
+            for place in sorted(required):
+                name, _, window = place.what.partition("@")
+                if place.against == against and (window or tolerances.MEASURES[name].on_request):
+                    windows.setdefault(window, []).append(name)
+            yield against, there[against], windows
+
+    def _compared(self, planned: Planned, required: Iterable[tolerances.Place]) -> ComparisonRecord:
+        """The comparisons of a cell, kept in the store."""
+        asked = list(self._asked(planned, required))
+        named = {window for *_, windows in asked for window in windows if window}
+        ends = {window: float(window[:-1]) for window in named - {tolerances.HORIZON}}
+        if tolerances.HORIZON in named:  # up to it, histories can be compared point by point
+            ends[tolerances.HORIZON] = _of_scene(
+                self.store,
+                planned.scene,
+                tolerances.HORIZON,
+                "ebm.horizon",
+                float,
+                partial(predictability_horizon, planned.scene),
             )
-            for name in self.own[planned.place].yardsticks(required)
-            if name in there
-        }
+        against = [[name, one.key if one else "", windows] for name, one, windows in asked]
+        # with the code of this module and of `compare`
+        depends = [planned.key, against, sorted(ends.items()), provenance.code_digest(__name__)]
+        name = name_of(planned.place, planned.model, provenance.digest(json.dumps(depends)))
+        compute = partial(self._figures, planned, asked, ends)
+        return kept(self.store, name, ComparisonRecord, compute)
+
+    def _figures(
+        self,
+        planned: Planned,
+        asked: Iterable[tuple[str, Planned | None, Mapping[str, Sequence[str]]]],
+        ends: Mapping[str, float],
+    ) -> ComparisonRecord:
+        """The measures asked of a cell, each window to its end (s), else over the whole time."""
+        candidate, scene = self.store.load(planned.name), planned.scene
+        landing = landing_of(self.store, scene)
+        parted = landing.t if landing else math.inf
+        figures: list[Compared] = []
+        for _, reference, windows in asked:
+            yardstick = self.store.load(reference.name) if reference else None
+            others = under_other_laws(scene, reference.variant) if reference and landing else {}
+            for window, names in windows.items():
+                until = ends.get(window)
+                rivals = others if until is None or until > parted else {}
+                figures += by_any(candidate, yardstick, rivals, scene, names, window, until)
+        return ComparisonRecord(
+            figures=tuple(figures),
+            impact_law=landing.followed_by(candidate, scene) if landing else None,
+            overturned_at=candidate.overturned_at,
+        )
 
     def _explained(self, scene: str, inputs: population.Inputs | None) -> Iterator[results.Cell]:
         """The cells of a scene with the verdicts on their differences from the references.
@@ -346,7 +679,7 @@ class SuiteStudy(Study):
         for cell in self.compared[scene]:
             against = {own.given.reference, own.given.model_form} - {cell.model}
             references = [other for other in done if other.model in against]
-            found = comparing.explanations(own.scenes[scene], cell, references, scatters, inputs)
+            found = explanations(own.scenes[scene], cell, references, scatters, inputs)
             yield cell.model_copy(update={"explanations": tuple(found)})
 
     def _ensemble(self, name: str) -> tuple[results.EnsembleRecord, list[results.Cell]]:
@@ -366,18 +699,18 @@ class SuiteStudy(Study):
             for label, some in played.items()
         ]
 
-    def _batch(self, planned: comparing.Planned) -> comparing.BatchRecord:
+    def _batch(self, planned: Planned) -> BatchRecord:
         """The record of a batch; of one that failed, each scene has its reason."""
         found, count = self.ended[planned], len(planned.numbers)
         if isinstance(found, pool.Failure):
-            found = comparing.BatchRecord(
+            found = BatchRecord(
                 peaks=(None,) * count, outcomes=(found.reason,) * count, cost=results.CostRecord()
             )
         return found
 
     def _ensemble_cell(
         self,
-        batches: Sequence[comparing.Planned],
+        batches: Sequence[Planned],
         costs: Sequence[results.CostRecord],
         samples: Mapping[str, measures.Sample],
     ) -> results.Cell:
@@ -399,7 +732,7 @@ class SuiteStudy(Study):
         own = self.own[name]
         required = own.required(name, label)
         figures = [
-            comparing.Compared(
+            Compared(
                 evaluate(measure, measures.Samples(samples[other], mine), "alpha", against=other)
             )
             for other in own.yardsticks(required)
@@ -417,7 +750,7 @@ class SuiteStudy(Study):
 def _checks(
     own: suites.Suite,
     required: Mapping[tolerances.Place, results.Kind],
-    figures: Sequence[comparing.Compared],
+    figures: Sequence[Compared],
     floor: Callable[[Measure], float],
     beside: Mapping[str, float | None] = MappingProxyType({}),
 ) -> Iterator[results.Check]:
@@ -440,7 +773,7 @@ def _checks(
             window=place.what.partition("@")[2],
             note="not computed" if itself else f"{place.against} failed in this scene",
         )
-        found = known.get((place.against, place.what), comparing.Compared(nothing))
+        found = known.get((place.against, place.what), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap
         yield tolerances.judge(
             found.figure,

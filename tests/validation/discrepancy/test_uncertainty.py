@@ -21,7 +21,7 @@ from rockcheck import (
 )
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import experience, files
-from rockcheck.validation.suite import across, comparing, results, suites, tables
+from rockcheck.validation.suite import across, results, runner, suites, tables
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.uncertainty import numerical, population
 
@@ -284,7 +284,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, verdict):
         )
         for ends in ("at rest", "overturned left")
     )
-    (found,) = comparing.explanations(BOOKCASE, own, [other], {}, inputs)
+    (found,) = runner.explanations(BOOKCASE, own, [other], {}, inputs)
     assert found.verdict.startswith(verdict)
 
 
