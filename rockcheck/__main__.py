@@ -2,10 +2,12 @@
 
 import atexit
 import gc
+import io
 import os
 import sys
 import time
 from collections.abc import Sequence
+from typing import Any
 
 #: Start of the program, by `time.perf_counter`.
 BEGAN = time.perf_counter()
@@ -21,11 +23,33 @@ def _leave_garbage() -> None:
         gc.freeze()
 
 
+class _Pipe(io.FileIO):
+    """An output whose reader may close it, as in `rockcheck scenes | head -1`.
+
+    The rest is dropped, and the exit code stays.
+    """
+
+    def write(self, data: Any) -> int:
+        try:
+            return super().write(data) or 0
+        except OSError as error:  # what waits to be written would be tried again as Python ends
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            if not isinstance(error, BrokenPipeError):
+                raise
+        return len(data)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     from rockcheck.commands.cli import main as run
     from rockcheck.scenes import progress
 
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is not None and not stream.isatty():
+            pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
+            how = {"errors": stream.errors, "line_buffering": stream.line_buffering}
+            setattr(sys, name, io.TextIOWrapper(pipe, stream.encoding, **how))
     code = run(arguments, began=BEGAN)
     # Compiled code may still run in threads, which Python would wait for.
     if code == progress.INTERRUPTED:

@@ -3,7 +3,6 @@
 Each command is a function of a module of rockcheck.commands.
 """
 
-import contextlib
 import importlib
 import inspect
 import itertools
@@ -12,12 +11,12 @@ import re
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, TextIO, cast, get_type_hints
+from typing import Annotated, Any, cast, get_type_hints
 
 import typer
 import typer.core
@@ -238,82 +237,44 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
 
     `began` is the start of the program, by `time.perf_counter`; None: now.
     """
-    with _readers_may_go():
-        try:
-            code = app(
-                args=list(sys.argv[1:] if arguments is None else arguments),
-                prog_name="rockcheck",
-                standalone_mode=False,
-                obj=time.perf_counter() if began is None else began,
-            )
-        except (typer.TyperException, InputError) as error:
-            return _told(
-                error.format_message() if isinstance(error, typer.TyperException) else str(error), 2
-            )
-        except ModelFailure as error:
-            return _told(str(error), 3)
-        except (KeyboardInterrupt, typer.Abort):
-            code = progress.INTERRUPTED
-        except OSError as error:  # a full disk: what was written before is whole
-            return _told(
-                f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used:"
-                f" {error.strerror or error}",
-                2,
-            )
-        except MemoryError:
-            return _told("out of memory; what was finished is kept", 3)
-        except Exception as error:
-            where = report_file(
-                f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
-                + "".join(traceback.format_exception(error))
-            )
-            return _told(
-                f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
-                f" {where or f'this: {error}'}",
-                results.FAULT,
-            )
-        # A study has gathered what there is, or Typer has caught it.
-        if code == progress.INTERRUPTED:
-            return _told("interrupted; what was finished is kept", progress.INTERRUPTED)
-        return code if isinstance(code, int) else 0
-
-
-@dataclass(eq=False)
-class _Pipe:
-    """A text stream whose reader may close it, as in `rockcheck scenes | head -1`.
-
-    The rest of the text is dropped.
-    """
-
-    _stream: Any
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
-
-    def write(self, text: str) -> int:
-        with contextlib.suppress(BrokenPipeError):
-            self._stream.write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        try:
-            self._stream.flush()
-        except BrokenPipeError:  # what waits to be written would be tried again as Python ends
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())
-            os.close(nowhere)
-
-
-@contextlib.contextmanager
-def _readers_may_go() -> Iterator[None]:
-    """Within this block a closed stdout or stderr does not change the exit code."""
-    out, err = (cast(TextIO, _Pipe(stream)) for stream in (sys.stdout, sys.stderr))
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            yield
-        finally:
-            out.flush()
-            err.flush()
+    try:
+        code = app(
+            args=list(sys.argv[1:] if arguments is None else arguments),
+            prog_name="rockcheck",
+            standalone_mode=False,
+            obj=time.perf_counter() if began is None else began,
+        )
+        print(end="", flush=True)  # a full disk shows itself here
+    except (typer.TyperException, InputError) as error:
+        return _told(
+            error.format_message() if isinstance(error, typer.TyperException) else str(error), 2
+        )
+    except ModelFailure as error:
+        return _told(str(error), 3)
+    except (KeyboardInterrupt, typer.Abort):
+        code = progress.INTERRUPTED
+    except OSError as error:  # a full disk: what was written before is whole
+        return _told(
+            f"{printable(Path(os.fsdecode(error.filename or 'output')))}: cannot be used:"
+            f" {error.strerror or error}",
+            2,
+        )
+    except MemoryError:
+        return _told("out of memory; what was finished is kept", 3)
+    except Exception as error:
+        where = report_file(
+            f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
+            + "".join(traceback.format_exception(error))
+        )
+        return _told(
+            f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
+            f" {where or f'this: {error}'}",
+            results.FAULT,
+        )
+    # A study has gathered what there is, or Typer has caught it.
+    if code == progress.INTERRUPTED:
+        return _told("interrupted; what was finished is kept", progress.INTERRUPTED)
+    return code if isinstance(code, int) else 0
 
 
 def _told(message: str, code: int) -> int:

@@ -76,6 +76,7 @@ def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monk
     [
         ("scenes", 0),
         ("scenes --json", 0),
+        ("scenes >&-", 0),
         ("--help", 0),
         ("simulate --help", 0),
         ("no-such-command", 2),
