@@ -468,7 +468,7 @@ def conformance(
         _export(usable_folder(export))
         return
     given, folders = dict(map(setting_of, sets or [])), histories or []
-    known = () if folders else models.engine_names()
+    known = () if folders else models.ENGINE_NAMES
     names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
     _check_engines(names, allow_code or (), own=tune is None)
     if tune is not None:
@@ -488,7 +488,7 @@ def conformance(
 
 
 def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool) -> None:
-    known = models.engine_names()
+    known = models.ENGINE_NAMES
     for name in names:
         models.check_allowed(name, allow_code)
         if name not in known and not (own and models.is_own(name)):

@@ -116,6 +116,9 @@ FAMILIES: dict[str, Family] = {
     ),
 }
 
+#: Names of the physics engines, installed or not.
+ENGINE_NAMES = tuple(name for name, kind in FAMILIES.items() if kind.module == ENGINES)
+
 
 def family(name: str) -> Family:
     """The family of that name, or of a user-defined model "module:Class".
@@ -126,11 +129,6 @@ def family(name: str) -> Family:
     if colon and module.isidentifier() and class_name.isidentifier():
         return Family(module, class_name, "a model of the user's own")
     return FAMILIES[errors.one_of("model", name, FAMILIES)]
-
-
-def engine_names() -> tuple[str, ...]:
-    """Names of the physics engines, installed or not."""
-    return tuple(name for name, kind in FAMILIES.items() if kind.module == ENGINES)
 
 
 def not_installed(name: str) -> str:
@@ -201,26 +199,24 @@ def _class_of(name: str) -> Any:
         ) from None
 
 
-def build(name: str, settings: Mapping[str, Any] | None = None) -> Model:
+def build(
+    name: str,
+    settings: Mapping[str, Any] | None = None,
+    search_path: Sequence[str] | None = None,
+) -> Model:
     """The model of that name with these settings.
 
-    Raises `InputError` naming the setting that is not usable, and for a user-defined model: the
-    process that plays it builds it by `build_own`.
+    Raises `InputError` naming the setting that is not usable, and for a user-defined model without
+    a `search_path`. Its code, in one of these folders, is imported: give them only in the process
+    that plays it, for code that was allowed.
     """
-    if is_own(name):
+    if is_own(name) and search_path is None:
         raise InputError(
             f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can"
             " play"
         )
-    return build_own(name, settings)
-
-
-def build_own(name: str, settings: Mapping[str, Any] | None = None) -> Model:
-    """`build`, also for a user-defined model, whose code is imported.
-
-    For worker processes; call it only for code that was allowed.
-    """
     check_allowed(name, (name,))
+    sys.path.extend(path for path in search_path or () if path not in sys.path)
     kind, model_class, settings = family(name), _class_of(name), dict(settings or {})
     if not isinstance(model_class, type) or not callable(getattr(model_class, "simulate", None)):
         raise InputError(
@@ -277,7 +273,7 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     if uncertainty:
         try:
             found = numerical.numerical_uncertainty(
-                build_own(work.family, work.settings), scene, history
+                build(work.family, work.settings, work.search_path), scene, history
             )
         except (ModelFailure, InputError) as error:
             found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
@@ -324,8 +320,7 @@ def _end_of(work: Work, scene: Scene) -> tuple[float, str, Cost]:
 
 def _simulate(work: Work, scene: Scene) -> History:
     """The history; raises `ModelFailure` for what is none, is empty or has a value not finite."""
-    sys.path.extend(path for path in work.search_path if path not in sys.path)
-    returned: object = build_own(work.family, work.settings).simulate(scene)
+    returned: object = build(work.family, work.settings, work.search_path).simulate(scene)
     if not isinstance(returned, History):
         raise ModelFailure(
             f"{work.family} returned {type(returned).__name__}; `simulate` must return a"

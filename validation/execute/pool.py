@@ -137,7 +137,7 @@ class Pool:
     _pool: Any = field(default=None, init=False, repr=False)
     _environment: dict[str, str | None] = field(default_factory=dict, init=False, repr=False)
     _compiled: set[str] = field(default_factory=set, init=False, repr=False)
-    _breaks: int = field(default=0, init=False, repr=False)
+    _breaks_left: int = field(default=MOST_BREAKS, init=False, repr=False)
 
     def __enter__(self) -> Self:
         from pebble import ProcessPool
@@ -205,9 +205,9 @@ class Pool:
 
         Pebble's pool breaks where a process ends before it was heard which call it began.
         """
-        if self._pool.active or self._breaks == MOST_BREAKS:
+        if not self._breaks_left or self._pool.active:
             return False
-        self._breaks += 1
+        self._breaks_left -= 1
         self.__exit__(RuntimeError)
         self.__enter__()
         waiting.extendleft(reversed(dict.fromkeys(call for call, _ in running.values())))
@@ -324,7 +324,7 @@ class Cluster(Pool):
     def __init__(self, address: str, memory_mb: float | None = None) -> None:
         super().__init__(1, memory_mb)
         self._address, self._run = address, uuid.uuid4().hex
-        self._stack = ExitStack()
+        self._stack, self._breaks_left = ExitStack(), 0  # Dask replaces lost workers itself
 
     def __enter__(self) -> Self:
         self._pool = self._stack.enter_context(connected(self._address))
@@ -333,17 +333,12 @@ class Cluster(Pool):
     def __exit__(self, *fault: Any) -> None:
         self._stack.__exit__(*fault)
 
-    def _mend(self, *_: Any) -> bool:
-        return False
-
-    def _workers(self) -> Any:
-        return self._pool.scheduler_info(n_workers=-1)["workers"]
-
     def _room(self) -> int:
-        return AHEAD * max(1, sum(about["nthreads"] for about in self._workers().values()))
+        return AHEAD * max(1, sum(self._pool.nthreads().values()))
 
     def _schedule(self, call: Call, seconds: float, first: bool) -> list[Future[Any]]:
-        machines = {about["host"]: address for address, about in self._workers().items()}
+        workers = self._pool.scheduler_info(n_workers=-1)["workers"]
+        machines = {about["host"]: address for address, about in workers.items()}
         # The machine is a preference only: the calls of a lost worker must go elsewhere.
         wishes = [{"workers": [one], "allow_other_workers": True} for one in machines.values()]
         given = call.function, call.arguments, seconds, self.memory_mb, self._run

@@ -10,25 +10,25 @@ import json
 import os
 import platform
 import re
-import time
 from collections.abc import Container, Iterable, Mapping
 from functools import cache
-from importlib import metadata
+from importlib import metadata, resources
 from importlib.machinery import PathFinder
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import Scene, reading, writing
+from rockcheck.scenes import InputError, Scene
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.execute import models
+from rockcheck.validation.execute.store import Store, name_of
 
 #: The package whose code counts where it can be reached; the package of the model itself always
 #: does.
 OWN_PACKAGE = "rockcheck"
-#: Time (s) after which a cached digest is removed.
-_KEPT = 30 * 86400.0
+#: The kind of results that a digest of our code is, in the user's own store.
+CODE = "code"
 
 
 def cell_key(
@@ -75,42 +75,34 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
     Imports count at its top and inside functions. The hash is that of the syntax trees without
     docstrings: comments, layout and documentation do not count. For rockcheck's own modules it is
-    cached for later processes, under a hash of all our sources.
+    kept for later processes, under a hash of all our sources.
     """
-    kept = _kept(module) if module.split(".")[0] == OWN_PACKAGE else None
-    known = reading.head_of(kept, 100).strip() if kept else ""
-    if re.fullmatch(r"[0-9a-f]{16}", known):
-        return known
-    found = digest(
-        "".join(
-            f"{name}\n{_source_of(path)[1]}\n"
-            for name, path in sorted(reachable(module, search_path).items())
-        )
-    )
-    if kept:
-        with contextlib.suppress(OSError):
-            kept.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            writing.write_whole(kept, found + "\n")
-            for old in kept.parent.glob("*.txt"):
-                if time.time() - old.stat().st_mtime > _KEPT:
-                    old.unlink(missing_ok=True)
-    return found
+    with contextlib.suppress(InputError, OSError):  # there may be no folder to keep it in
+        if module.split(".")[0] == OWN_PACKAGE:
+            user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
+            user.mkdir(mode=0o700, parents=True, exist_ok=True)
+            kept, name = Store(user, (CODE,)), name_of(module, _of_all_sources())
+            if (found := kept.get_record(CODE, name)) is None:
+                found = {"digest": _digest_of(module, search_path)}
+                kept.put_record(CODE, name, found)
+                kept.prune()
+            return str(found["digest"])
+    return _digest_of(module, search_path)
 
 
-def _kept(module: str) -> Path:
-    """The cache file for the digest of one of our modules, named by a hash of all our sources."""
-    spec = find_spec(OWN_PACKAGE)
-    content = hashlib.sha256(f"{module} {platform.python_version()}".encode())
-    for root in map(Path, (spec and spec.submodule_search_locations) or ()):
-        # a folder below the root may be a link to the folder of the sources
-        for source in sorted((*root.glob("*.py"), *root.glob("*/**/*.py"))):
-            content.update(source.name.encode() + b"\0" + source.read_bytes())
-    return (
-        Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser()
-        / "rockcheck"
-        / "code"
-        / f"{content.hexdigest()[:32]}.txt"
-    )
+def _digest_of(module: str, search_path: tuple[str, ...]) -> str:
+    files = sorted(reachable(module, search_path).items())
+    return digest("".join(f"{name}\n{_source_of(path)[1]}\n" for name, path in files))
+
+
+@cache
+def _of_all_sources() -> str:
+    """Hash of all our sources, and of the Python that reads them."""
+    root = Path(str(resources.files(OWN_PACKAGE)))
+    # a folder below the root may be a link to the folder of the sources
+    sources = sorted((*root.glob("*.py"), *root.glob("*/**/*.py")))
+    texts = (f"{one.name}\n{one.read_text(encoding='utf-8')}" for one in sources)
+    return digest("\n".join([platform.python_version(), *texts]))
 
 
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:

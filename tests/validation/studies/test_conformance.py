@@ -31,7 +31,7 @@ from rockcheck.validation.studies.conformance.study import (
 )
 
 RIGHT, CONVEX = MuJoCo(time_step=1e-3), MuJoCo(time_step=1e-3, cone_correction=False)
-HERE = [name for name in models.engine_names() if not models.not_installed(name)]
+HERE = [name for name in models.ENGINE_NAMES if not models.not_installed(name)]
 
 
 def played(player):
@@ -48,7 +48,7 @@ def verdicts(found, *wanted):
 def planted(monkeypatch):
     def gather(play):
         monkeypatch.setattr(
-            "rockcheck.validation.execute.models.build_own",
+            "rockcheck.validation.execute.models.build",
             lambda *_: SimpleNamespace(simulate=play),
         )
         return played(Player("planted", "best", 1e-3, "planted:Planted", {}, "1"))

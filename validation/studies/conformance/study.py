@@ -6,7 +6,6 @@ friction, by dropping a block and by sliding it.
 """
 
 import math
-import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -180,8 +179,7 @@ class Trial(Task):
     def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
         who, what = self.player, PHENOMENA[self.id]
-        sys.path.extend(path for path in who.search if path not in sys.path)
-        model: Any = models.build_own(who.model, who.given)
+        model: Any = models.build(who.model, who.given, who.search)
         version = who.version or str(getattr(model, "version", ""))
         if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
             return Seen(
