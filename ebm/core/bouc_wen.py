@@ -22,7 +22,7 @@ has not (ROCK, LEAN).
 
 import math
 
-from rockcheck.ebm.core import contacts, coulomb, ground, guards, modes, series
+from rockcheck.ebm.core import contacts, coulomb, ground, modes, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, note
@@ -51,11 +51,8 @@ def expand(block, base, run, reach):
     state.order, state.place, state.length = order, mode.sense * state.motion.x - a[Row.SIN, 0], h
 
 
-@inner_kernel
-def locate(block, run):
-    """The first event of the step. One more guard: z comes to the sense of slip."""
-    guards.fill_guards(block, run.state, run.a)
-    guards.first_event(run)
+#: The first event of the step. One more guard: z comes to the sense of slip.
+locate = coulomb.locate
 
 
 @inner_kernel

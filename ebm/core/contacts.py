@@ -29,17 +29,22 @@ def lower(block, motion):
 
 
 @inner_kernel
+def height(block, motion):
+    """Height of the mass's centre over the lower corner."""
+    side = lower(block, motion)
+    return side.radius * math.cos(side.alpha - abs(motion.theta))
+
+
+@inner_kernel
 def slip_velocity(block, motion):
     """V of the lower corner."""
-    side = lower(block, motion)
-    return motion.vx + side.radius * math.cos(side.alpha - abs(motion.theta)) * motion.w
+    return motion.vx + height(block, motion) * motion.w
 
 
 @inner_kernel
 def stand(block, motion):
     """Stops the pivot: the velocity is that of a rotation about it."""
-    side = lower(block, motion)
-    motion.vx = -side.radius * math.cos(side.alpha - abs(motion.theta)) * motion.w
+    motion.vx = -height(block, motion) * motion.w
 
 
 @inner_kernel
@@ -97,8 +102,7 @@ def closed_wall(block, motion, side, bottom):
 @inner_kernel
 def floor_gap(block, motion):
     """Height of the lower corner over the floor."""
-    side = lower(block, motion)
-    return motion.y - side.radius * math.cos(side.alpha - abs(motion.theta))
+    return motion.y - height(block, motion)
 
 
 @inner_kernel
@@ -133,8 +137,8 @@ def upright(block, motion):
         and abs(motion.theta) < CLOSED
         and abs(motion.w) < SLOW
     ):
-        v, side = slip_velocity(block, motion), lower(block, motion)
-        motion.y += block.height - side.radius * math.cos(side.alpha - abs(motion.theta))
+        v = slip_velocity(block, motion)
+        motion.y += block.height - height(block, motion)
         motion.theta = motion.w = 0.0
         motion.vx = v if abs(v) > SLOW else 0.0
 

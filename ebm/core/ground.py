@@ -176,6 +176,12 @@ def next_kink(g, t):
 
 
 @inner_kernel
+def smooth_until(base, t):
+    """The next kink after t of either component of the base motion."""
+    return min(next_kink(base.horizontal, t), next_kink(base.vertical, t))
+
+
+@inner_kernel
 def acceleration_after(g, t):
     """Acceleration soon after t, before the next kink: its sign tells how it leaves a zero at t."""
     return acceleration(g, _soon(g, t))

@@ -43,33 +43,22 @@ class Corner(NamedTuple):
     spin: float
 
 
-class Pivots(NamedTuple):
-    """A block that lands: S, s and k of the new pivot, s of the old one, c, and `spin`."""
-
-    S2: float
-    s2: float
-    share: float
-    s1: float
-    c: float
-    spin: float
-
-
 @inner_kernel
-def floor_stick(on, w1, v1):
+def floor_stick(b, S1, w1, v1):
     """Floor impact on the other corner, which sticks (e_g = 0): w2, P, Q.
 
     The angular momentum about the new pivot stays what it is: with v1 = 0, w2/w1 = 1 - k2 s2 (s1 +
     s2), Housner's ratio 1 - 1.5 s^2.
     """
-    s1, s2, c, k2 = on.s1, on.s2, on.c, on.share
+    s1, s2, c, k2 = side_of(b, S1).arm, side_of(b, -S1).arm, b.height, side_of(b, -S1).share
     w2 = (1.0 - k2 * (s1 + s2) * s2) * w1 - k2 * c * v1
-    return w2, on.S2 * (s2 * (w1 + w2) + (s1 - s2) * w1), c * (w1 - w2) - v1
+    return w2, -S1 * (s2 * (w1 + w2) + (s1 - s2) * w1), c * (w1 - w2) - v1
 
 
 @inner_kernel
-def floor_slip(on, d, mu_k, w1, v1):
+def floor_slip(b, S1, d, mu_k, w1, v1):
     """Floor impact on the other corner, which slips toward d (e_g = 0): w2, v2, P."""
-    s1, s2, c, spin, S2 = on.s1, on.s2, on.c, on.spin, on.S2
+    s1, s2, c, spin, S2 = side_of(b, S1).arm, side_of(b, -S1).arm, b.height, b.spin, -S1
     old, new = s1 * s2 + mu_k * d * S2 * s1 * c, s2 * s2 + mu_k * d * S2 * s2 * c
     w2 = w1 * (1.0 - spin * old) / (1.0 + spin * new)
     p = (s1 + s2) * abs(w1) / (1.0 + spin * new)
@@ -85,18 +74,15 @@ def floor_impact(b, S1, w1, v1, mu_s, mu_k):
     then the velocity with which it slides.
     """
     S2 = -S1
-    new = side_of(b, S2)
-    on = Pivots(float(S2), new.arm, new.share, side_of(b, S1).arm, b.height, b.spin)
-    s1, c = on.s1, on.c
     rounding = NOISE[Kind.POSITION] * (abs(w1) + abs(v1))
-    w2, p, q = floor_stick(on, w1, v1)
+    w2, p, q = floor_stick(b, S1, w1, v1)
     if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p + rounding:
         return Landing.HELD_FAST, w2, 0.0, p
     stuck = w2, p
     turns = False
     toward = -1.0 if q > 0.0 else 1.0
     for d in (toward, -toward):
-        w2, v2, p = floor_slip(on, d, mu_k, w1, v1)
+        w2, v2, p = floor_slip(b, S1, d, mu_k, w1, v1)
         turns = turns or S2 * w2 >= 0.0
         if S2 * w2 >= 0.0 and d * v2 >= -rounding:
             return Landing.SLID, w2, v2, p
@@ -104,8 +90,8 @@ def floor_impact(b, S1, w1, v1, mu_s, mu_k):
         # Static friction above kinetic leaves a gap in which neither form is consistent: sticking
         # is the nearer one.
         return Landing.HELD_FAST, stuck[0], 0.0, stuck[1]
-    p = s1 * abs(w1)
-    xdot = v1 - c * w1
+    p = side_of(b, S1).arm * abs(w1)
+    xdot = v1 - b.height * w1
     return (
         Landing.FLAT_END,
         0.0,

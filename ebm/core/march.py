@@ -15,13 +15,13 @@ from rockcheck.ebm.core.contacts import closed_floor
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.guards import KIND
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
-from rockcheck.ebm.core.state import Base, Records, Run, mode_code, rests
+from rockcheck.ebm.core.state import NEW_STATE, Base, Records, Run, mode_code, rests
 from rockcheck.ebm.core.strike import strike
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 
 def loop_with(friction: ModuleType) -> object:
-    """The function that plays a row of `play`: the event loop with the four doors of `friction`."""
+    """The function that plays the rows of `play`: the event loop with four doors of `friction`."""
     expand, locate = friction.expand, friction.locate
     advance_friction, after_event = friction.advance, friction.after_event
 
@@ -44,13 +44,14 @@ def loop_with(friction: ModuleType) -> object:
     def step(block, base, run):
         """One Taylor step, and the event that ends it."""
         state = run.state
-        smooth = smooth_until(base, state)
+        smooth = min(ground.smooth_until(base, state.t), state.t_end)
         expand(block, base, run, smooth - state.t)
         state.smooth_until = smooth  # not before: what is known of the base would be read again
-        if not finite(state, state.length > 0.0):
-            return
-        locate(block, run)
-        if not finite(state, math.isfinite(state.tau)):
+        state.tau = math.nan
+        if state.length > 0.0:  # no step is good for a series that is not finite
+            locate(block, run)
+        if not math.isfinite(state.tau):
+            state.ending = Ending.NOT_FINITE
             return
         steps.sample(block, run)
         steps.advance(block, base, run)
@@ -59,29 +60,34 @@ def loop_with(friction: ModuleType) -> object:
             resolve(block, base, run)
 
     @inner_kernel
-    def play_row(rows, i, state, work, records, found):
-        """Plays row i in the state, and notes what is kept of it."""
-        state.motion = rows.starts[i]
-        state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
-        sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
-        base = Base(
-            ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
-            ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
-        )
-        written = Records(records.out[i], records.out_mode[i], records.log[i])
-        march(rows.settings[i], base, Run(state, work[0], work[1], written))
-        keep(state, found[i])
+    def play_rows(rows, states, begins, work, records, found):
+        """Plays the rows one after the other in the state, and notes what is kept of each.
 
-    return play_row
+        `begins` is a copy of NEW_STATE.
+        """
+        state = states[0]
+        begins[0].control = state.control
+        for i in range(len(rows.durations)):
+            states[0] = begins[0]
+            state.motion = rows.starts[i]
+            state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
+            sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
+            base = Base(
+                ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
+                ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
+            )
+            written = Records(records.out[i], records.out_mode[i], records.log[i])
+            march(rows.settings[i], base, Run(state, work[0], work[1], written))
+            keep(state, found[i])
+
+    return play_rows
 
 
 @inner_kernel
 def begin(block, base, run):
-    """Prepares the first mode at t = 0."""
+    """Prepares the first mode at t = 0, in a state that is new but for its motion and control."""
     state, motion, control = run.state, run.state.motion, run.state.control
-    state.ending, state.t = Ending.GOING, 0.0
-    state.zeta = state.swing_energy = state.swing_place = np.nan
-    state.peak, state.stride, state.swing, state.repeats = abs(motion.theta), np.inf, 0.0, False
+    state.peak = abs(motion.theta)
     # All that a block does before it topples happens within alpha. Terms fall like the powers of a
     # ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what
     # is left out is a geometric series. It may be half of the tolerance.
@@ -89,39 +95,11 @@ def begin(block, base, run):
     state.tolerance_rad = control.tolerance * min(block.left.alpha, block.right.alpha)
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
     state.quiet_from = quiet_from(base, state.tolerance_rad)
-    state.steps = state.events = state.rows = state.gains = 0
-    state.largest_gain = state.impulse = 0.0
-    state.rules[:] = 0
-    state.winds = state.known = False
-    state.began = state.place = 0.0
-    settle.no_impacts(state)
-    modes.forget(state)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
     stands = motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
-    state.guard, state.before, state.changing = Guard.NONE, 0, True
-    leaves = stands and closed_floor(block, motion)
-    state.event = Event.RELEASE if leaves else Event.UNTOLD
-    mode = state.mode
-    mode.family = mode.sense = mode.pivot = mode.slip = mode.pull = mode.tip = mode.far = 0
-
-
-@inner_kernel
-def smooth_until(base, state):
-    """The time up to which the base motion is smooth, or at which the run ends."""
-    kink = min(ground.next_kink(base.horizontal, state.t), ground.next_kink(base.vertical, state.t))
-    return min(kink, state.t_end)
-
-
-@inner_kernel
-def finite(state, holds):
-    """Whether the motion is finite, as `holds` says; else the run ends.
-
-    No step is good for a series that is not finite.
-    """
-    if not holds:
-        state.ending = Ending.NOT_FINITE
-    return holds
+    if stands and closed_floor(block, motion):
+        state.event = Event.RELEASE
 
 
 @inner_kernel
@@ -134,7 +112,7 @@ def resolve(block, base, run):
     if state.guard <= Guard.FAR_GAP:
         state.impulse = 0.0
         resting = settle.settling_speed(state)
-        state.event, state.known = strike(block, base, run, resting)
+        strike(block, base, run, resting)
         if state.impulse > 0.0:
             modes.forget(state)  # a new motion: all modes may be tried again
         elif block.unilateral:
@@ -159,7 +137,7 @@ def keep(state, found):
     found.steps, found.rows, found.at_rest = state.steps, state.rows, rests(state.mode)
 
 
-_play_row, _play_row_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
+_play_rows, _play_rows_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
 
 
 @kernel
@@ -171,15 +149,13 @@ def play(rows, states, work, records, found):
     `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
     after, impulse.
     """
-    for i in range(len(rows.durations)):
-        _play_row(rows, i, states[0], work, records, found)
+    _play_rows(rows, states, NEW_STATE.copy(), work, records, found)
 
 
 @kernel
 def play_bouc_wen(rows, states, work, records, found):
     """As `play`, with Bouc-Wen friction."""
-    for i in range(len(rows.durations)):
-        _play_row_bouc_wen(rows, i, states[0], work, records, found)
+    _play_rows_bouc_wen(rows, states, NEW_STATE.copy(), work, records, found)
 
 
 #: The event loop with each friction of a model's settings.

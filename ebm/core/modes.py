@@ -21,7 +21,7 @@ import numpy as np
 from rockcheck.ebm.core import contacts, ground, guards, series
 from rockcheck.ebm.core.motion import flat_series, tilt_series
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
-from rockcheck.ebm.core.state import MODE, MODES, code_of, on_wall, rests
+from rockcheck.ebm.core.state import MODE, code_of, on_wall, rests
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series that a selection looks at.
@@ -85,8 +85,7 @@ _TRIES = _tries()
 @inner_kernel
 def forget(state):
     """A new instant begins: no mode has been tried in it."""
-    for k in range(MODES):
-        state.tried[k] = False
+    state.tried[:] = 0
     state.slack = state.least_slack = 1.0
     state.since, state.ended = state.t, -1
 
@@ -127,7 +126,7 @@ def wrong_by(block, base, run, measured):
         order = tilt_series(block, base, run, look, 0.0, 0.0)
         state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
     guards.fill_guards(block, run.state, run.a)
-    smooth = min(ground.next_kink(base.horizontal, t), ground.next_kink(base.vertical, t)) - t
+    smooth = ground.smooth_until(base, t) - t
     worst = 0.0
     for which in range(len(guards.KIND)):
         ahead = guards.seen(guards.KIND[which], smooth)
@@ -174,15 +173,12 @@ def favoured(block, base, state):
     toward = ground.acceleration(base.horizontal, t)
     if abs(toward) <= series.NOISE[Kind.FORCE]:
         toward = ground.acceleration_after(base.horizontal, t)
-    if toward == 0.0:
-        toward = -motion.vx
-    if toward == 0.0 and abs(motion.x) > series.NOISE[Kind.POSITION]:
-        toward = motion.x
-    if toward == 0.0 and block.gap_left != block.gap_right:
-        toward = block.gap_left - block.gap_right
-    if toward == 0.0:
-        toward = block.right.arm - block.left.arm
-    return 0 if toward == 0.0 else (1 if toward > 0.0 else -1)
+    off = motion.x if abs(motion.x) > series.NOISE[Kind.POSITION] else 0.0
+    room = block.gap_left - block.gap_right if block.gap_left != block.gap_right else 0.0
+    for one in (toward, -motion.vx, off, room, block.right.arm - block.left.arm):
+        if one != 0.0:
+            return 1 if one > 0.0 else -1
+    return 0
 
 
 @inner_kernel

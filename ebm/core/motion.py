@@ -65,19 +65,6 @@ def base_series(base, t, sign, order, a):
 
 
 @inner_kernel
-def turned(block, state, a):
-    """Writes the start of the series of rotation, sine and cosine; returns the side it tips to."""
-    mode, motion = state.mode, state.motion
-    sign = float(mode.sense)
-    a[Row.PHI, 0] = sign * motion.theta
-    a[Row.OMEGA, 0] = sign * motion.w
-    side = side_of(block, mode.sense)
-    sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
-    a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
-    return side
-
-
-@inner_kernel
 def tilt_series(block, base, run, order, enough, reach):
     """Fills the workspace with the series of a tilted block's motion; returns their order.
 
@@ -85,18 +72,18 @@ def tilt_series(block, base, run, order, enough, reach):
     `reach` (the longest step there can be). ROCK, whose motion does not depend on P and Q, has them
     where the setting needs a guard on them.
     """
-    mode, motion, a = run.state.mode, run.state.motion, run.a
-    base_series(base, run.state.t, float(mode.sense), order, a)
-    side = turned(block, run.state, run.a)
-    sign = float(mode.sense)
+    mode, motion, a, sign = run.state.mode, run.state.motion, run.a, float(run.state.mode.sense)
+    base_series(base, run.state.t, sign, order, a)
+    a[Row.PHI, 0], a[Row.OMEGA, 0] = sign * motion.theta, sign * motion.w
+    side = side_of(block, mode.sense)
+    sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
+    a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
     if rocks(mode):
         still = base.vertical.form.kind == Shape.STILL
         forces = block.unilateral or not block.no_slip
         return _rock_series(side.share, still, order, enough, reach, forces, a)
-    a[Row.XI, 0] = sign * motion.x
-    a[Row.XI, 1] = sign * motion.vx
-    a[Row.Y, 0] = motion.y
-    a[Row.Y, 1] = motion.vy
+    a[Row.XI, 0], a[Row.XI, 1] = sign * motion.x, sign * motion.vx
+    a[Row.Y, 0], a[Row.Y, 1] = motion.y, motion.vy
     if mode.pivot == Pivot.STICK and mode.tip != mode.far:
         return _lean_series(block, side, mode.tip != 0, order, a)
     if mode.pivot == Pivot.SLIPPING and not on_wall(mode) and not run.state.winds:
@@ -304,21 +291,13 @@ class _Acting(NamedTuple):
     """The contacts of a mode.
 
     The side that the block tips to, `spin` = 1/I, the friction `kappa` of a slipping pivot (Q =
-    -kappa P), and which contacts act.
+    -kappa P), and which contacts act: floor, tip wall, far wall.
     """
 
     side: Any
     spin: float
     kappa: float
-    floor: bool
-    tip: bool
-    far: bool
-
-
-@inner_kernel
-def _acts(acting, which):
-    """Whether contact `which` acts: floor, tip wall, far wall."""
-    return (acting.floor, acting.tip, acting.far)[which]
+    acts: tuple[bool, bool, bool]
 
 
 @inner_kernel
@@ -341,7 +320,7 @@ def _contact_rows(acting, a):
     turns, slips = (-s, -tip_arm, -far_arm), (kappa, 0.0, 0.0)
     n = 0
     for which in range(3):
-        if _acts(acting, which):
+        if acting.acts[which]:
             row, column = Row.CONSTRAINT + n, Row.COLUMN + n
             a[row, 0], a[row, 1], a[row, 2] = along[which], upward[which], turns[which]
             a[column, 0], a[column, 1] = -kappa if which == 0 else along[which], upward[which]
@@ -354,7 +333,7 @@ def _contact_rows(acting, a):
             a[row, j] = a[i, 0] * a[column, 0] + a[i, 1] * a[column, 1]
             a[row, j] += acting.spin * a[i, 2] * a[column, 2]
     inverse_of(a, Row.MATRIX, Row.INVERSE, n)
-    if acting.floor and not a[Row.INVERSE, 0] > 0.0:
+    if acting.acts[0] and not a[Row.INVERSE, 0] > 0.0:
         a[Row.INVERSE, 0] = np.nan
     return n
 
@@ -367,9 +346,8 @@ def _contact_series(block, state, order, enough, reach, a):
     """
     mode = state.mode
     floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
-    static = tip and far
-    side = side_of(block, mode.sense)
-    acting = _Acting(side, block.spin, friction(block, state), floor, tip, far)
+    side, kappa = side_of(block, mode.sense), friction(block, state)
+    acting = _Acting(side, block.spin, kappa, (floor, tip, far))
     n = _contact_rows(acting, a)
     s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
     scale = 1.0
@@ -396,7 +374,7 @@ def _contact_series(block, state, order, enough, reach, a):
         free = ds * (i - 1.0), dc * (i - 1.0), along, moment
         ax, ay, aphi = _accelerations(acting, n, free, k, a)
         _wind(block, state, k, a)
-        if static:
+        if tip and far:
             ax = aphi = 0.0
             ay = 0.0 if floor else ay
         twice = RECIPROCAL[i] * RECIPROCAL[k + 1]
@@ -426,12 +404,12 @@ def _moment_of_lower_orders(acting, k, a):
 
     None where both walls hold it.
     """
-    moment = 0.0
-    if acting.floor:
+    moment, (floor, tip, far) = 0.0, acting.acts
+    if floor:
         a[Row.FLOOR_ARM, k] = a[Row.SIN, k] + acting.kappa * a[Row.COS, k]
         moment -= _products(a, Row.FLOOR_ARM, Row.P, 1, k, k)
-    if acting.tip or acting.far:
-        along, across = wall_turn(acting.side, acting.tip)
+    if tip or far:
+        along, across = wall_turn(acting.side, tip)
         a[Row.WALL_ARM, k] = along * a[Row.SIN, k] + across * a[Row.COS, k]
         moment -= _products(a, Row.WALL_ARM, Row.WALL_PUSH, 1, k, k)
     return moment
@@ -455,7 +433,7 @@ def _accelerations(acting, n, free, k, a):
     ax, ay, aphi = along, -a[Row.G, k], acting.spin * moment
     r = 0
     for which in range(3):
-        if _acts(acting, which):
+        if acting.acts[which]:
             a[Row.KNOWN, r] = (
                 kc - ay + s * aphi,
                 tip_reach - ax + tip_arm * aphi,
@@ -472,7 +450,7 @@ def _accelerations(acting, n, free, k, a):
         aphi += acting.spin * a[Row.COLUMN + r, 2] * force
     r = 0
     for which in range(3):
-        if _acts(acting, which):
+        if acting.acts[which]:
             a[(Row.P, Row.NA, Row.NB)[which], k] = a[Row.FOUND, r]
             r += 1
     a[Row.Q, k] = -acting.kappa * a[Row.P, k]
@@ -571,11 +549,8 @@ def motion_at(block, state, a, tau, motion):
         reach, reach_rate = radius * np.sin(angle), radius * np.cos(angle)
         xi, v = wall * (reach - delta(block, mode, mode.tip != 0)), wall * reach_rate * w
     else:
-        xi, v = value(a, Row.XI, order, tau), slope(a, Row.XI, order, tau)
-    if mode.pivot != Pivot.OFF:
-        y, vy = c, s * w
-    else:
-        y, vy = value(a, Row.Y, order, tau), slope(a, Row.Y, order, tau)
+        xi, v = _place_at(a, Row.XI, order, tau)
+    y, vy = (c, s * w) if mode.pivot != Pivot.OFF else _place_at(a, Row.Y, order, tau)
     motion.x, motion.y, motion.theta = sign * xi, y, sign * phi
     motion.vx, motion.vy, motion.w = sign * v, vy, sign * w
 
@@ -584,16 +559,13 @@ def motion_at(block, state, a, tau, motion):
 def _flat_at(block, state, a, tau, motion):
     """Writes the motion of a translating block."""
     mode, order = state.mode, state.order
-    if not on_wall(mode) and mode.pivot != Pivot.STICK:
-        motion.x = value(a, Row.XI, order, tau)
-        motion.vx = slope(a, Row.XI, order, tau)
-    else:
-        motion.x = a[Row.XI, 0]
-        motion.vx = 0.0
-    if mode.pivot == Pivot.OFF:
-        motion.y = value(a, Row.Y, order, tau)
-        motion.vy = slope(a, Row.Y, order, tau)
-    else:
-        motion.y = block.height
-        motion.vy = 0.0
+    stays, lies = on_wall(mode) or mode.pivot == Pivot.STICK, mode.pivot != Pivot.OFF
+    motion.x, motion.vx = (a[Row.XI, 0], 0.0) if stays else _place_at(a, Row.XI, order, tau)
+    motion.y, motion.vy = (block.height, 0.0) if lies else _place_at(a, Row.Y, order, tau)
     motion.theta = motion.w = 0.0
+
+
+@inner_kernel
+def _place_at(a, row, order, tau):
+    """A coordinate and its rate."""
+    return value(a, row, order, tau), slope(a, row, order, tau)

@@ -141,56 +141,44 @@ Friction = IntEnum("Friction", "FREE HELD PLUS MINUS", start=0)
 Found = IntEnum("Found", "ENDLESS FITS LEAST_WRONG", start=0)
 
 
-class Rule(IntEnum):
-    """The modelling choices of the event-based models.
-
-    They are made where rigid-body mechanics, or rounding, leaves more than one answer or none. Each
-    has one home in the code, is counted in every run (`History.cost.rules`), and has a paragraph in
-    docs/limits.md.
-    """
-
-    #: The floor falls away faster than g under a flat block, and nothing favours left or right: it
-    #: hangs flat, by both corners.
-    HANGS = 0
-    #: A mode is selected once at an instant. One that has just ended goes on only where no other
-    #: fits.
-    MODE_AGAIN = 1
-    #: No mode, or no set of contacts at an impact, fits (rounding, or beyond Painleve's limit): the
-    #: one that is wrong by least is taken.
-    LEAST_CONTRADICTION = 2
-    #: Impacts that go on at one instant become plastic.
-    ENDLESS_STAGES = 3
-    #: A landing or rebound slower than the settling speed ends in rest.
-    SETTLES = 4
-    #: The settling speed is raised as impacts accumulate (Zeno).
-    RATTLES = 5
-    #: Between two walls that it touches at once nothing rebounds.
-    WEDGED = 6
-    #: Landing flush against a wall in the bilateral model: the closed branch.
-    FLUSH_LANDING = 7
-    #: A hanging block that comes down with less energy than the tolerance has not touched the
-    #: floor.
-    GRAZES = 8
-    #: A corner that meets the wall as the block lands, on its base or on its side, belongs to the
-    #: landing.
-    LANDS_ALONG = 9
-    #: Both bottom corners strike the floor at once: they share the impact, unless the law of
-    #: impacts names the one that is first.
-    FLAT_LANDING = 10
-
+#: The modelling choices of the event-based models. They are made where rigid-body mechanics, or
+#: rounding, leaves more than one answer or none. Each has one home in the code, is counted in every
+#: run (`History.cost.rules`), and has a paragraph in docs/limits.md.
+Rule = IntEnum(
+    "Rule",
+    "HANGS MODE_AGAIN LEAST_CONTRADICTION ENDLESS_STAGES SETTLES RATTLES WEDGED FLUSH_LANDING"
+    " GRAZES LANDS_ALONG FLAT_LANDING",
+    start=0,
+)
 
 RULES = len(Rule)
 #: As histories and docs/limits.md name them.
 RULE_NAMES = (
+    # The floor falls away faster than g under a flat block, and nothing favours left or right: it
+    # hangs flat, by both corners.
     "hangs flat",
+    # A mode is selected once at an instant. One that has just ended goes on only where no other
+    # fits.
     "mode goes on",
+    # No mode, or no set of contacts at an impact, fits (rounding, or beyond Painleve's limit): the
+    # one that is wrong by least is taken.
     "least contradiction",
+    # Impacts that go on at one instant become plastic.
     "endless stages",
+    # A landing or rebound slower than the settling speed ends in rest.
     "settles",
+    # The settling speed is raised as impacts accumulate (Zeno).
     "rattles",
+    # Between two walls that it touches at once nothing rebounds.
     "wedged",
+    # Landing flush against a wall in the bilateral model: the closed branch.
     "flush landing",
+    # A hanging block that comes down with less energy than the tolerance has not touched the floor.
     "grazes",
+    # A corner that meets the wall as the block lands, on its base or on its side, belongs to the
+    # landing.
     "lands along a wall",
+    # Both bottom corners strike the floor at once: they share the impact, unless the law of impacts
+    # names the one that is first.
     "flat landing",
 )

@@ -22,13 +22,6 @@ _AT_ONCE = 20
 
 
 @inner_kernel
-def no_impacts(state):
-    """Begins the memory of impacts."""
-    state.settling_speed, state.counted_since, state.last_impact = SETTLE, -1.0, -1.0
-    state.counted = state.full = state.at_once = 0
-
-
-@inner_kernel
 def settling_speed(state):
     """The speed below which a contact that is struck now stays closed."""
     t = state.t

@@ -9,11 +9,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.core.block import record
+from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.contact_impacts import IMPACT
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.names import ROWS, RULES, Event, Family, HistoryMode, Pivot, Row
+from rockcheck.ebm.core.names import (
+    ROWS,
+    RULES,
+    Ending,
+    Event,
+    Family,
+    Guard,
+    HistoryMode,
+    Pivot,
+    Row,
+)
 from rockcheck.ebm.core.series import WIDTH
+from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
@@ -124,6 +135,29 @@ STATE = record(
     impact=IMPACT,
 )
 
+#: The state before a run: of what is not named there is none.
+NEW_STATE = np.array(
+    [
+        filled(
+            STATE,
+            ending=Ending.GOING,
+            stride=np.inf,
+            guard=Guard.NONE,
+            changing=True,
+            event=Event.UNTOLD,
+            swing_energy=np.nan,
+            swing_place=np.nan,
+            slack=1.0,
+            least_slack=1.0,
+            ended=-1,
+            settling_speed=SETTLE,
+            counted_since=-1.0,
+            last_impact=-1.0,
+            zeta=np.nan,
+        )
+    ]
+)
+
 #: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an
 #: Ending), counts of its steps and of the rows written, and whether it then stood at rest.
 FOUND = record(motion=MOTION, t="f8", peak="f8", ending="i8", steps="i8", rows="i8", at_rest="?")
@@ -188,9 +222,10 @@ def workspace():
 
 
 @inner_kernel
-def place(mode, family, sense, pivot, slip):
-    """Makes a mode without walls, on a floor that pushes."""
-    mode.family, mode.sense, mode.pivot, mode.slip = family, sense, pivot, slip
+def rock_on(state, sense):
+    """After an impact the block is known to rock, free of walls, about the pivot on this side."""
+    mode, state.known = state.mode, True
+    mode.family, mode.sense, mode.pivot, mode.slip = Family.TILT, sense, Pivot.STICK, 0
     mode.pull, mode.tip, mode.far = 1, 0, 0
 
 

@@ -27,14 +27,11 @@ def may_go_on(block, base, run):
 
     Its time is up, its outcome is certain, or it has taken too many steps.
     """
-    state, motion = run.state, run.state.motion
-    if state.t >= state.t_end:
+    state, motion, decides = run.state, run.state.motion, run.state.control.until_decided
+    if state.t >= state.t_end or (decides and state.repeats):
         state.ending = Ending.DONE
         return False
-    if run.state.control.until_decided:
-        if state.repeats:
-            state.ending = Ending.DONE
-            return False
+    if decides:
         verdict = decided(block, base, state)
         if verdict > 0.0:
             state.peak = verdict

@@ -14,13 +14,13 @@ from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
 from rockcheck.ebm.core.names import Contact, Event, Family, Found, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
-from rockcheck.ebm.core.state import on_wall, place
+from rockcheck.ebm.core.state import on_wall, rock_on
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 
 @inner_kernel
 def strike(block, base, run, resting):
-    """Resolves the impact at the gap that has closed: the Event, and whether the mode is known.
+    """Resolves the impact at the gap that has closed: its event, and whether the mode is known.
 
     A known mode is already the one that follows. Rebounds slower than `resting` end in rest.
     """
@@ -34,21 +34,20 @@ def strike(block, base, run, resting):
         floor = mode.pivot != Pivot.OFF or contacts.closed_floor(block, motion)
         contacts.land_upright(block, motion, float(mode.sense), floor)
     wall = which == Guard.TIP_GAP or which == Guard.FAR_GAP
-    known = False
+    state.event = Event.LANDS if which == Guard.LANDING else Event.FLOOR_IMPACT
+    if wall:
+        state.event = Event.WALL_IMPACT
     if block.unilateral:
         _strike_all(block, base, run, resting)
     elif wall:
-        known = _wall_impact(block, state, which == Guard.TIP_GAP, resting)
+        _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
-        known = _floor_impact(block, state, resting)
-    if not known and not block.unilateral:
+        _floor_impact(block, state, resting)
+    if not state.known and not block.unilateral:
         contacts.stand_if_slow(block, motion)
     if motion.theta == 0.0 and abs(motion.w) < SETTLE:
         _settle_flat(block, state, resting)
-        known = False
-    if wall:
-        return Event.WALL_IMPACT, known
-    return (Event.LANDS if which == Guard.LANDING else Event.FLOOR_IMPACT), known
+        state.known = False
 
 
 @inner_kernel
@@ -73,8 +72,7 @@ def touch(block, mode, motion, which):
     """
     phi = abs(motion.theta)
     if which == Guard.LANDING:
-        side = contacts.lower(block, motion)
-        motion.y = side.radius * math.cos(side.alpha - phi)
+        motion.y = contacts.height(block, motion)
     elif which == Guard.TIP_GAP and mode.family == Family.TILT and mode.pivot == Pivot.STICK:
         sign, side = float(mode.sense), side_of(block, mode.sense)
         pivot = sign * motion.x - side.radius * math.sin(side.alpha - phi)
@@ -113,10 +111,7 @@ def _settle_flat(block, state, resting):
 
 @inner_kernel
 def _floor_impact(block, state, resting):
-    """Bilateral pivot: the block lands at theta = 0.
-
-    Returns whether it is already known to rock on in the state's mode.
-    """
+    """Bilateral pivot: the block lands at theta = 0."""
     mode, motion = state.mode, state.motion
     w1, v1 = motion.w, contacts.slip_velocity(block, motion)
     S1, c = mode.sense, block.height
@@ -124,7 +119,7 @@ def _floor_impact(block, state, resting):
     if on_wall(mode):  # from LADDER: every contact plastic, flush rest
         state.impulse = abs(motion.vy)
         contacts.stop(motion)
-        return False
+        return
     if contacts.wall_gap(block, motion, -S1) < contacts.CLOSED:
         # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper
         # is silent).
@@ -134,23 +129,18 @@ def _floor_impact(block, state, resting):
         motion.w = -e * w1 if e * abs(w1) > resting else 0.0
         motion.vx = (-e * v1 if S1 * v1 > 0.0 else v1) - c * motion.w
         motion.vy = S1 * s1 * motion.w
-        return False
+        return
     mu_s = block.mu_s if not block.no_slip else np.inf
     form, w2, v2, p = impacts.floor_impact(block, S1, w1, v1, mu_s, block.mu_k)
     state.impulse = p
     motion.w, motion.vx, motion.vy = w2, v2 - c * w2, -S1 * s2 * w2
     if form == impacts.Landing.HELD_FAST and abs(w2) > SETTLE:
-        place(mode, Family.TILT, -S1, Pivot.STICK, 0)
-        return True
-    return False
+        rock_on(state, -S1)
 
 
 @inner_kernel
 def _wall_impact(block, state, tip, resting):
-    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall.
-
-    Returns whether the mode is already right.
-    """
+    """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall."""
     mode, motion = state.mode, state.motion
     # Wedged: between both walls at once nothing rebounds.
     gaps = contacts.wall_gap(block, motion, 1) + contacts.wall_gap(block, motion, -1)
@@ -158,14 +148,14 @@ def _wall_impact(block, state, tip, resting):
         state.rules[Rule.WEDGED] += 1
         state.impulse = abs(motion.vx)
         contacts.stop(motion)
-        return False
-    left = tip if mode.family == Family.FLAT else (mode.sense > 0) == tip
-    e = block.e_left if left else block.e_right
-    if mode.family == Family.FLAT:
+        return
+    flat = mode.family == Family.FLAT
+    e = block.e_left if tip == (flat or mode.sense > 0) else block.e_right
+    if flat:
         state.impulse = (1.0 + e) * abs(motion.vx)
         motion.vx = -e * motion.vx if e * abs(motion.vx) > resting else 0.0
-        return False
-    return _corner_impact(block, state, 1.0 if tip else -1.0, e, resting)
+    else:
+        _corner_impact(block, state, 1.0 if tip else -1.0, e, resting)
 
 
 @inner_kernel
@@ -205,9 +195,7 @@ def _corner_impact(block, state, sw, e, resting):
     if (block.no_slip and stays) or flush:
         contacts.stop(motion)
     if not stays and v2 == 0.0:
-        place(mode, Family.TILT, mode.sense, Pivot.STICK, 0)
-        return True
-    return False
+        rock_on(state, mode.sense)
 
 
 @called_kernel

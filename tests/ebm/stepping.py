@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel, natural
-from rockcheck.ebm.core import march, modes
+from rockcheck.ebm.core import march
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.series import WIDTH
-from rockcheck.ebm.core.state import FOUND, STATE, Records, Run, workspace
+from rockcheck.ebm.core.state import FOUND, NEW_STATE, Records, Run, workspace
 from rockcheck.ebm.natural import pack, state_for
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
@@ -22,13 +22,13 @@ def nothing() -> Records:
 def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int) -> Run:
     """A run with this motion (x, y, theta and their rates) and these fields of its mode; the others
     are 0."""
-    state = np.zeros(1, STATE)[0]
+    state = NEW_STATE.copy()[0]
     state.t, state.t_end = t, math.inf
     for name, value in zip(state.motion.dtype.names, motion, strict=True):
         setattr(state.motion, name, value)
     for name, value in mode.items():
         setattr(state.mode, name, value)
-    modes.forget(state)
+    state.since = t
     state.control = (1e-10, 100, 100, False, 1.0)
     return Run(state, *workspace(), nothing())
 
