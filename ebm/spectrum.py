@@ -115,25 +115,19 @@ def overturning_spectrum(
             " or a record",
             "excitation.kind",
         )
+    outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
+    undecided = np.zeros(outcomes.shape, dtype=bool)
+    evaluations = 0
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
         model.check(scene)
 
-        def play(scene: Scene, amplitudes: Floats, frequencies: Floats) -> Nodes:
-            return play_nodes(
-                scene,
-                amplitudes,
-                frequencies,
-                model=model,
-                jobs=jobs,
-                on_progress=lambda done, total, what="": on_progress(
-                    evaluations + done, outcomes.size
-                ),
-            )
-
-    outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)
-    undecided = np.zeros(outcomes.shape, dtype=bool)
-    evaluations = 0
+        play = partial(
+            play_nodes,
+            model=model,
+            jobs=jobs,
+            on_progress=lambda done, total, what="": on_progress(evaluations + done, outcomes.size),
+        )
 
     def run(nodes: NDArray[np.bool_]) -> None:
         nonlocal evaluations

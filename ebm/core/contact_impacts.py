@@ -34,9 +34,13 @@ from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Fri
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-# Every set of at most three contacts: their number, the contacts, and these as bits.
+# Every set of at most three contacts: their number, the contacts, behind them the floor's tangent,
+# and the contacts as bits.
 _SETS = np.array(
-    [[len(some), *some, *[0] * (3 - len(some)), sum(1 << j for j in some)] for some in CONTACT_SETS]
+    [
+        [len(some), *[*some, *[Contact.TANGENT] * 3][:3], sum(1 << j for j in some)]
+        for some in CONTACT_SETS
+    ]
 )
 _LARGEST_FIRST = np.argsort(-_SETS[:, 0], kind="stable")
 # By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
@@ -44,6 +48,8 @@ _WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
 for _bits in range(1 << CONTACTS):
     _inside = np.flatnonzero(_SETS[:, 4] & ~_bits == 0)
     _WITHIN[_bits, : len(_inside)] = _inside
+# The horizontal part of each contact's row (see `contact_rows`), and the two on the floor.
+_ALONG = np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 _ON_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
 # than this give no solution.
@@ -93,23 +99,17 @@ def contact_rows(b, sense, phi, rows):
     """
     pivot, other = side_of(b, sense), side_of(b, -sense)
     s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
-    rows[:] = 0.0
-    rows[Contact.FOOT, 1], rows[Contact.FOOT, 2] = 1.0, -s
-    rows[Contact.OTHER, 1], rows[Contact.OTHER, 2] = 1.0, other.radius * math.sin(other.alpha + phi)
-    rows[Contact.TIP_TOP, 0], rows[Contact.TIP_TOP, 2] = (
-        1.0,
+    turns = (
+        -s,
+        other.radius * math.sin(other.alpha + phi),
         -pivot.top_radius * math.cos(pivot.top_alpha + phi),
-    )
-    rows[Contact.TIP_BOTTOM, 0], rows[Contact.TIP_BOTTOM, 2] = 1.0, c
-    rows[Contact.FAR_BOTTOM, 0], rows[Contact.FAR_BOTTOM, 2] = (
-        -1.0,
+        c,
         -other.radius * math.cos(other.alpha + phi),
-    )
-    rows[Contact.FAR_TOP, 0], rows[Contact.FAR_TOP, 2] = (
-        -1.0,
         other.top_radius * math.cos(other.top_alpha - phi),
+        c,
     )
-    rows[Contact.TANGENT, 0], rows[Contact.TANGENT, 2] = 1.0, c
+    for j in range(len(turns)):
+        rows[j, 0], rows[j, 1], rows[j, 2] = _ALONG[j], j <= Contact.OTHER, turns[j]
 
 
 @inner_kernel
@@ -187,12 +187,6 @@ def _push(rows, index, kappa, k):
 
 
 @inner_kernel
-def _unknown(number, i):
-    """The contact of unknown i of a set; behind its contacts, the floor's tangent."""
-    return _SETS[number, 1 + i] if i < _SETS[number, 0] else Contact.TANGENT
-
-
-@inner_kernel
 def _try_set(block, impact, number, friction):
     """The impulses of the contacts in the set and the velocities after them; False if singular."""
     rows, system, v, spin = impact.rows, impact.system, impact.v, block.spin
@@ -201,12 +195,12 @@ def _try_set(block, impact, number, friction):
     mu_k = block.mu_k
     kappa = mu_k if friction == Friction.PLUS else (-mu_k if friction == Friction.MINUS else 0.0)
     for i in range(n):
-        row = _unknown(number, i)
+        row = _SETS[number, 1 + i]
         system[i, n] = 0.0 if row == Contact.TANGENT else impact.target[row]
         for k in range(3):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
-            column = _unknown(number, j)
+            column = _SETS[number, 1 + j]
             x, y = _push(rows, column, kappa, 0), _push(rows, column, kappa, 1)
             system[i, j] = rows[row, 0] * x + rows[row, 1] * y
             system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
@@ -216,7 +210,7 @@ def _try_set(block, impact, number, friction):
         trial[k], lam[k] = v[k], 0.0
     for j in range(n):
         lam[j] = system[j, n]
-        index = _unknown(number, j)
+        index = _SETS[number, 1 + j]
         for k in range(3):
             trial[k] += (spin if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
@@ -321,16 +315,6 @@ def _one_corner(law, impact):
 
 
 @inner_kernel
-def _soonest(approach, ahead, rounding):
-    """When the next of the contacts that approach is struck."""
-    soonest = np.inf
-    for j in range(CONTACTS):
-        if approach[j] < -rounding:
-            soonest = min(soonest, ahead[j] / -approach[j])
-    return soonest
-
-
-@inner_kernel
 def _floor_first(impact, number, rounding):
     """The contacts that are struck next in a neighbouring trajectory, and those that rest.
 
@@ -341,7 +325,10 @@ def _floor_first(impact, number, rounding):
     if number == 0:
         floor = min(approach[Contact.FOOT], approach[Contact.OTHER]) < -rounding
         ahead[: Contact.TIP_TOP], ahead[Contact.TIP_TOP :] = 0.0, floor
-    soonest = _soonest(approach, ahead, rounding)
+    soonest = np.inf
+    for j in range(CONTACTS):
+        if approach[j] < -rounding:
+            soonest = min(soonest, ahead[j] / -approach[j])
     for j in range(CONTACTS):
         strikes = ahead[j] <= -approach[j] * soonest * (1.0 + _PARALLEL)
         taking[j] = approach[j] < -rounding and strikes

@@ -70,8 +70,8 @@ _ANY = 2.0**400
 def _enter(a, which, constant, *weights):
     """Enters a guard into the table: its constant, and the weights of its series (see GUARDS)."""
     row = Row.TABLE + which
-    for k in range(len(weights)):
-        a[row, _COMBINES[which, k]] = weights[k]
+    for k in range(_MOST):
+        a[row, _COMBINES[which, k]] = weights[k] if k < len(weights) else 0.0
     a[row, _CONSTANT], a[row, _THERE] = constant, 1.0
 
 

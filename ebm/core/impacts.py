@@ -12,8 +12,8 @@ on the pivot.
 """
 
 import math
+from collections import namedtuple
 from enum import IntEnum
-from typing import NamedTuple
 
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED
@@ -28,19 +28,8 @@ Landing = IntEnum("Landing", "HELD_FAST SLID FLAT_END", start=0)
 Branch = IntEnum("Branch", "A_STICK B_STICK C_STICK D_SLIP E_SLIP NO_BRANCH", start=0)
 
 
-class Corner(NamedTuple):
-    """A corner that strikes a wall, and the pivot.
-
-    S, Sw, s, c, C = S Sw c', the pivot's k (`share`), and `spin`.
-    """
-
-    S: float
-    Sw: float
-    s: float
-    c: float
-    C: float
-    share: float
-    spin: float
+#: A corner that strikes a wall, and the pivot: S, Sw, s, c, C = S Sw c', the pivot's k, and `spin`.
+Corner = namedtuple("Corner", "S Sw s c C share spin")
 
 
 @inner_kernel

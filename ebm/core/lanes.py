@@ -35,17 +35,9 @@ _RAMP = ir.Constant(_VECTOR, [float(place) for place in _PLACES])
 class Lanes(types.Type):
     """numba's type of eight numbers."""
 
-    def __init__(self) -> None:
-        super().__init__("Lanes")
 
-
-_LANES = Lanes()
-
-
-@register_model(Lanes)
-class _Model(models.PrimitiveModel):
-    def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
+_LANES = Lanes("Lanes")
+register_model(Lanes)(lambda manager, kind: models.PrimitiveModel(manager, kind, _VECTOR))
 
 
 def _indices(places: Any) -> Any:
@@ -116,7 +108,6 @@ class _Arithmetic(AbstractTemplate):
     def generic(self, args: Any, kws: Any) -> Any:
         if _LANES in args and all(kind in (_LANES, types.float64) for kind in args):
             return signature(_LANES, *args)
-        return None
 
 
 def _calculates(operation: Any, instruction: str) -> None:

@@ -56,7 +56,7 @@ def loop_with(friction: ModuleType) -> object:
         steps.sample(block, run)
         steps.advance(block, base, run)
         advance_friction(run)
-        if state.guard != Guard.NONE and not steps.passes_on(block, base, run):
+        if not steps.passes_on(block, base, run):
             resolve(block, base, run)
 
     @inner_kernel
@@ -78,7 +78,10 @@ def loop_with(friction: ModuleType) -> object:
             )
             written = Records(records.out[i], records.out_mode[i], records.log[i])
             march(rows.settings[i], base, Run(state, work[0], work[1], written))
-            keep(state, found[i])
+            kept = found[i]
+            kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
+            kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
+            kept.at_rest = rests(state.mode)
 
     return play_rows
 
@@ -127,14 +130,6 @@ def end(run):
         state.ending = Ending.NOT_FINITE
     if state.ending == Ending.DONE and not run.state.control.until_decided:
         steps.sample_rest(run, np.inf)
-
-
-@inner_kernel
-def keep(state, found):
-    """Writes what is kept of a run."""
-    found.motion = state.motion
-    found.t, found.peak, found.ending = state.t, state.peak, state.ending
-    found.steps, found.rows, found.at_rest = state.steps, state.rows, rests(state.mode)
 
 
 _play_rows, _play_rows_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)

@@ -14,7 +14,7 @@ instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
 
 import math
-from typing import NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -285,22 +285,11 @@ def _clean(block, motion, floor):
         contacts.upright(block, motion)
 
 
-class _Touching(NamedTuple):
-    """What a selection begins with.
-
-    The side to which the block would rather tip (0: either) and the side that is tried first;
-    whether the block touches the floor, and its slip velocity; the walls that it touches, as bits:
-    flat (left and right), as it tips to the first side, and to the other; and the row of `_TRIES`.
-    """
-
-    favoured: int
-    first: int
-    floor: bool
-    v: float
-    upright_walls: int
-    near: int
-    away: int
-    tries: int
+#: What a selection begins with: the side to which the block would rather tip (0: either) and the
+#: side that is tried first; whether the block touches the floor, and its slip velocity; the walls
+#: that it touches, as bits: flat (left and right), as it tips to the first side, and to the other;
+#: and the row of `_TRIES`.
+_Touching = namedtuple("_Touching", "favoured first floor v upright_walls near away tries")
 
 
 @inner_kernel

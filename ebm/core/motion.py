@@ -25,7 +25,7 @@ speed. While the block is *flat* (theta = 0, both corners down or both walls' co
 only translates.
 """
 
-from typing import Any, NamedTuple
+from collections import namedtuple
 
 import numpy as np
 
@@ -287,17 +287,9 @@ def _lean_series(block, side, tip, order, a):
     return order
 
 
-class _Acting(NamedTuple):
-    """The contacts of a mode.
-
-    The side that the block tips to, `spin` = 1/I, the friction `kappa` of a slipping pivot (Q =
-    -kappa P), and which contacts act: floor, tip wall, far wall.
-    """
-
-    side: Any
-    spin: float
-    kappa: float
-    acts: tuple[bool, bool, bool]
+#: The contacts of a mode: the side that the block tips to, `spin` = 1/I, the friction `kappa` of a
+#: slipping pivot (Q = -kappa P), and which contacts act: floor, tip wall, far wall.
+_Acting = namedtuple("_Acting", "side spin kappa acts")
 
 
 @inner_kernel
@@ -423,11 +415,7 @@ def _accelerations(acting, n, free, k, a):
     sine and cosine but for phi's own, and what moves xi and phi but for the unknown forces.
     """
     side, (ks, kc, along, moment) = acting.side, free
-    # The rates of s'.
-    tip_reach, far_reach = (
-        side.tip_sin * kc - side.tip_cos * ks,
-        side.far_sin * kc - side.far_cos * ks,
-    )
+    tip_reach, far_reach = _wall_arms(side, kc, -ks)  # the rates of s'
     s, c = a[Row.SIN, 0], a[Row.COS, 0]
     tip_arm, far_arm = _wall_arms(side, s, c)
     ax, ay, aphi = along, -a[Row.G, k], acting.spin * moment

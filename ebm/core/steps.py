@@ -81,12 +81,10 @@ def advance(block, base, run):
 
 @inner_kernel
 def passes_on(block, base, run):
-    """Whether the event that ends the step ends no mode.
-
-    The block only grazes the floor, or the run is over.
-    """
+    """Whether no event has ended the mode: the block only grazes the floor, or the run is over."""
     state, motion = run.state, run.state.motion
-    if state.guard == Guard.PHI and not block.unilateral and _grazes(block, base, run):
+    lands = state.guard == Guard.PHI and not block.unilateral
+    if state.guard == Guard.NONE or (lands and _grazes(block, base, run)):
         return True
     state.swing = 0.0
     if state.events + 1 >= run.state.control.most_events:
