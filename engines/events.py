@@ -35,7 +35,7 @@ def events_of(scene: Scene, t: Floats, states: Floats, felt: Floats) -> list[Eve
     after more than 2 ms; "slip" and "stick" of the pivot; "settled"; "overturned ...".
     """
     motion = _Motion(scene, t, states, felt)
-    found = [event for contact in motion.contacts for event in motion.at_contact(contact)]
+    found = [event for i in range(len(motion.contacts)) for event in motion.at_contact(i)]
     found += motion.at_floor()
     if abs(states[-1, 2]) >= steps.LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
@@ -67,40 +67,39 @@ class _Motion:
         step = float(np.min(np.diff(t), initial=1e-3))
         self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * step**2
         x, y, theta, x_dot, y_dot, theta_dot = states.T
-        cos, sin = np.cos(theta), np.sin(theta)
+        #: Of each contact: its corner, normal and distance.
+        self.places = np.array([(*one.corner, *one.normal, one.distance) for one in self.contacts])
+        bx, bz, nx, nz, distance = self.places.T[:, :, None]
+        arm = contacts.arm_of(bx, bz, np.cos(theta), np.sin(theta))
         #: Of each contact at step ends: its gap, m; whether it touches, or has struck in the step
         #: before; whether it is closed, openings of less than 2 ms left out.
-        self.gap: dict[contacts.Contact, Floats] = {}
-        self.touching: dict[contacts.Contact, Flags] = {}
-        self.closed: dict[contacts.Contact, Flags] = {}
-        for contact in self.contacts:
-            arm = contacts.arm_of(*contact.corner, cos, sin)
-            gap = contacts.gap_of(*contact.normal, contact.distance, x, y, arm)
-            rate = contacts.rate_of(*contact.normal, x_dot, y_dot, theta_dot, arm)
-            # An engine that looks ahead stops a block, or turns it round, up to two steps before it
-            # arrives.
-            arrives = gap[:-1] + 2.0 * np.diff(t) * rate[:-1] < self.near
-            struck = (rate[:-1] < -HOLD * scene.gravity) & (rate[1:] > 0.5 * rate[:-1])
-            touching = (gap < self.near) | np.concatenate([[False], arrives & struck])
-            self.gap[contact], self.touching[contact] = gap, touching
-            self.closed[contact] = _held(touching, t)
+        self.gap: Floats = contacts.gap_of(nx, nz, distance, x, y, arm)
+        rate = contacts.rate_of(nx, nz, x_dot, y_dot, theta_dot, arm)
+        # An engine that looks ahead stops a block, or turns it round, up to two steps before it
+        # arrives.
+        arrives = self.gap[:, :-1] + 2.0 * np.diff(t) * rate[:, :-1] < self.near
+        struck = (rate[:, :-1] < -HOLD * scene.gravity) & (rate[:, 1:] > 0.5 * rate[:, :-1])
+        self.touching: Flags = self.gap < self.near
+        self.touching[:, 1:] |= arrives & struck
+        self.closed = [_held(touching, t) for touching in self.touching]
         #: The states of the box's centre.
         self.box = kinematics.of_box(scene.block, states)
         self.slip_rate = kinematics.slip_rate(scene.block, theta, self.box[:, 3], theta_dot)
 
-    def onset(self, contact: contacts.Contact, index: int) -> float:
+    def onset(self, contact: int, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
-        before, after = self.gap[contact][index - 1 : index + 1]
+        before, after = self.gap[contact, index - 1 : index + 1]
         part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
 
-    def at_contact(self, contact: contacts.Contact) -> list[Found]:
+    def at_contact(self, contact: int) -> list[Found]:
         """Impacts of a contact; of one with a wall, releases too."""
-        kind = "floor impact" if contact.surface == "floor" else "wall impact"
+        floor = self.contacts[contact].surface == "floor"
+        kind = "floor impact" if floor else "wall impact"
         t, closed = self.t, self.closed[contact]
         strikes = _rises(closed)
         impacts = [(self.onset(contact, i), kind, i, self.impulse(contact, i)) for i in strikes]
-        if contact.surface == "floor":
+        if floor:
             return impacts
         return impacts + [
             (t[end], "release", end, 0.0)
@@ -110,10 +109,10 @@ class _Motion:
 
     def at_floor(self) -> list[Found]:
         """Uplift, flight, slip and rest, from which lower corners are closed."""
-        t, (left, right) = self.t, (self.closed[contact] for contact in self.contacts[:2])
+        t, (left, right) = self.t, self.closed[:2]
         flat, flight = left & right, ~(left | right)
         noise = GAP_NOISE * self.near
-        lowest, highest = np.sort([self.gap[contact] for contact in self.contacts[:2]], axis=0)
+        lowest, highest = np.sort(self.gap[:2], axis=0)
         speed = np.abs(self.slip_rate)
         slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
         still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
@@ -136,7 +135,7 @@ class _Motion:
         """The first step end 2 ms after `index`, or the last one."""
         return min(int(np.searchsorted(self.t, self.t[index] + HOLD)), len(self.t) - 1)
 
-    def impulse(self, contact: contacts.Contact, index: int) -> float:
+    def impulse(self, contact: int, index: int) -> float:
         """Normal impulse per unit mass of a contact in the 2 ms after its onset, m/s.
 
         It follows from the balance of momentum: the change of velocity that free fall does not
@@ -147,29 +146,21 @@ class _Motion:
         first, last = index - 1, self.later(index)
         gained = self.states[last, 3:] - self.states[first, 3:]
         gained[:2] -= np.diff(self.t[first : last + 1]) @ self.felt[first:last]
+        acts: Flags = np.logical_or.reduce(self.touching[:, first : last + 1], axis=1)
+        acts[contact] = True
+        bx, bz, nx, nz, _ = self.places[acts].T
         theta = self.states[index, 2]
-        cos, sin = math.cos(theta), math.sin(theta)
-        along_x, along_y, turning = np.eye(3)  # an impulse acts on what a contact sees move
-        columns, owners = [], []
-        for other in self.contacts:
-            if other is contact or np.any(self.touching[other][first : last + 1]):
-                arm = contacts.arm_of(*other.corner, cos, sin)
-                normal = contacts.rate_of(*other.normal, along_x, along_y, turning, arm)
-                friction = (
-                    self.scene.floor.friction * (along_x - arm[1] * turning)
-                    if other.surface == "floor"
-                    else 0.0 * normal
-                )
-                columns += [normal + friction, normal - friction]  # the edges of its cone
-                owners += [other, other]
-        scale = np.array([1.0, 1.0, 1.0 / self.scene.block.radius])
+        arm = contacts.arm_of(bx, bz, math.cos(theta), math.sin(theta))
+        along_x, along_y, turning = np.eye(3)[:, :, None]  # an impulse acts on what a contact sees
+        normal = contacts.rate_of(nx, nz, along_x, along_y, turning, arm)
+        friction = self.scene.floor.friction * nz * (along_x - arm[1] * turning)  # walls are smooth
+        edges = np.stack([normal + friction, normal - friction], axis=-1)  # of the contacts' cones
+        scale = np.array([[1.0], [1.0], [1.0 / self.scene.block.radius]])
         impulses, _ = nnls(
-            np.array(columns).T * scale[:, None],
-            gained * np.array([1.0, 1.0, self.scene.block.gyration_squared]) * scale,
+            edges.reshape(3, -1) * scale,
+            gained * np.array([1.0, 1.0, self.scene.block.gyration_squared]) * scale[:, 0],
         )
-        return float(
-            sum(part for part, owner in zip(impulses, owners, strict=True) if owner is contact)
-        )
+        return float(impulses.reshape(-1, 2)[np.sum(acts[:contact])].sum())
 
     def modes(self, indices: Sequence[int]) -> list[str]:
         chosen = self.box[list(indices)]

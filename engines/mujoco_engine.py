@@ -8,7 +8,7 @@ import numpy as np
 from rockcheck.engines import steps
 from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import Engine
-from rockcheck.scenes import Floats, Floor, ModelFailure, Scene, printable
+from rockcheck.scenes import Floor, ModelFailure, Scene, printable
 
 
 class MuJoCoWorld(steps.World):
@@ -38,14 +38,10 @@ class MuJoCoWorld(steps.World):
         if dt != self.dt:
             self.model.opt.timestep = self.dt = dt
         self.mujoco.mj_step(self.model, self.data)
+        self.check()
 
     def state(self) -> steps.State:
         return (*self.qpos.tolist(), *self.qvel.tolist())
-
-    def march(self, felt: Floats, dt: float) -> Floats:
-        states = super().march(felt, dt)
-        self.check()
-        return states
 
     def check(self) -> None:
         """Raise `ModelFailure` if MuJoCo met a huge or non-finite state or acceleration."""
@@ -149,12 +145,10 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             0.0,
         )
 
-    def march(self, felt: Floats, dt: float) -> Floats:
+    def ready(self, dt: float) -> None:
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
         self.stiffness[:] = self.pushing_out / dt**2
         self.damping[:], self.slowing[:] = self.bouncing / dt, self.stopping / dt
-        self.tuned = None
-        return super().march(felt, dt)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         # Where a contact slips, the step is done again with the corrected cone.

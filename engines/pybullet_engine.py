@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.scenes import Floats, Scene
+from rockcheck.scenes import Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
 CORNER_RADIUS = 1e-9
@@ -100,11 +100,8 @@ class _PyBulletWorld(steps.World):
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self.client
         )
-        return x, z, -2.0 * math.atan2(turn, whole), *self.velocity()
-
-    def velocity(self) -> steps.Vector:
         (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
-        return vx, vz, -w
+        return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
 
     def close(self) -> None:
         self.bullet.disconnect(**self.options)
@@ -175,10 +172,9 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
         ), CORNER_RADIUS
 
-    def march(self, felt: Floats, dt: float) -> Floats:
+    def ready(self, dt: float) -> None:
         self.bounce(True)
         self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
-        return super().march(felt, dt)
 
     def bounce(self, bouncing: bool) -> None:
         if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):

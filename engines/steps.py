@@ -30,6 +30,8 @@ Marched = tuple[Floats, Floats, Floats]
 STEPS_AT_ONCE = 2048
 #: Where a block lies on its side: contacts stop it a hair before a quarter turn, or after it.
 LYING = math.pi / 2 - 1e-6
+#: Rows of an adaptive march for which there is room at first.
+ROOM = 8192
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 
@@ -53,19 +55,7 @@ class World(ABC):
         """Where the block is."""
 
     def ready(self, dt: float) -> None:  # noqa: B027 - most engines take steps of any length
-        """Before the block is placed for steps of `dt` s: what is done here is no run time."""
-
-    def velocity(self) -> Vector:
-        """How fast the block is."""
-        return self.state()[3:]
-
-    def march(self, felt: Floats, dt: float) -> Floats:
-        """States (n, 6) after each of n steps of `dt` s, with the `felt` accelerations (n, 2)."""
-        states = np.empty((len(felt), 6))
-        for row, (ax, ay) in enumerate(felt.tolist()):
-            self.step((ax, ay), dt)
-            states[row] = self.state()
-        return states
+        """Before the block is placed for fixed steps of `dt` s: this is no run time."""
 
     def bounce(self, bouncing: bool) -> None:  # noqa: B027 - asked of those alone whose steps can vary
         """Let contacts have their restitution, or none."""
@@ -73,11 +63,16 @@ class World(ABC):
     def push(
         self, pose: Vector, velocity: Vector, dt: float, felt: tuple[float, float], bouncing: bool
     ) -> Vector:
-        """The engine as a map of velocities, for adaptive steps: `Push`."""
+        """The engine as a map of velocities, for adaptive steps: the velocity after one.
+
+        It follows from pose and velocity before it, its length `dt` (s) and the acceleration `felt`
+        (m/s^2), with the contacts closed at that pose. They take their restitution only where
+        `bouncing`; otherwise they stop what approaches.
+        """
         self.bounce(bouncing)
         self.place(*pose, *velocity)
         self.step(felt, dt)
-        return self.velocity()
+        return self.state()[3:]
 
     def close(self) -> None:  # noqa: B027 - most engines hold nothing
         """Give back what the engine holds."""
@@ -113,12 +108,15 @@ def march_fixed(world: World, scene: Scene, times: Floats, felt: Floats) -> Marc
     The first state in which the block lies is the last one returned. Raises `ModelFailure` if the
     motion blows up or the block falls through the floor.
     """
-    dt = float(times[1]) if len(times) > 1 else 0.0
     pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
     world.place(*pieces[0][0].tolist())
     for first in range(0, len(felt), STEPS_AT_ONCE):
         progress.tell(first, len(felt))
-        states = world.march(felt[first : first + STEPS_AT_ONCE], dt)
+        some, dt = felt[first : first + STEPS_AT_ONCE], float(times[1])
+        states = np.empty((len(some), 6))
+        for row, (ax, ay) in enumerate(some.tolist()):
+            world.step((ax, ay), dt)
+            states[row] = world.state()
         tipped = np.flatnonzero(np.abs(states[:, 2]) >= LYING)
         if tipped.size:
             states = states[: tipped[0] + 1]
@@ -158,57 +156,6 @@ def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
     return np.hstack([positions, velocities])
 
 
-#: Rows of the march for which there is room at first.
-_ROOM = 8192
-
-
-#: An engine as a map of velocities: that of the block after a step, from pose and velocity before
-#: it, its length (s) and the felt acceleration (m/s^2), with the contacts closed at that pose. They
-#: take their restitution only where the last argument says so; otherwise they stop what approaches.
-Push = Callable[[Vector, Vector, float, tuple[float, float], bool], Vector]
-
-
-def adaptive_march(
-    scene: Scene, push: Push, longest: float, short: float = 1.0
-) -> Callable[[], Marched]:
-    """The march of a scene until |theta| = pi/2, to be called once; its compiled step is loaded.
-
-    The scene is one of a block with R = 1, see `in_units_of`. No step is longer than `longest` s;
-    the steps at impacts and after events are `short` times their usual length. The march raises
-    `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end / `longest` steps,
-    `end` the scene's last output time.
-    """
-    from rockcheck.engines import stepping
-    from rockcheck.scenes.compiled import for_types_of
-
-    course, run = stepping.begun(scene, longest, short)
-    most_steps = 100_000 + 20 * int(course.end / longest)
-    first = np.empty((_ROOM, stepping.COLUMNS))
-    first[0, :7] = 0.0, *run.state[:6]
-    step = for_types_of(stepping.step, run, course, (0.0, 0.0, 0.0), first[0])
-    planned = stepping.plan(run, course)
-
-    def march() -> Marched:
-        rows, count, going = first, 1, planned
-        while going:
-            x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
-            kicked = push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
-            if count == len(rows):
-                rows = np.concatenate([rows, np.empty_like(rows)])
-            going = step(run, course, kicked, rows[count])
-            count += 1
-            if count % 512 == 0:
-                progress.tell(rows[count - 1, 0], course.end)
-            if going == stepping.LOST or count > most_steps:
-                raise ModelFailure(
-                    f"no end to the events, or a motion that blew up, after {count} steps at t ="
-                    f" {rows[count - 1, 0]:g} s"
-                )
-        return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()
-
-    return march
-
-
 @dataclass(frozen=True)
 class FixedStep:
     """Steps of `largest` s, each."""
@@ -241,5 +188,38 @@ class AdaptiveStep:
     knobs: ClassVar[tuple[str, ...]] = ("largest_step", "short_steps")
 
     def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
-        """The march of a world through a scene, which is still to be called."""
-        return adaptive_march(scene, world.push, self.largest, self.short)
+        """The march of a world through a scene until |theta| = pi/2, to be called once.
+
+        Its compiled step is loaded. The scene is one of a block with R = 1, see `in_units_of`. The
+        march raises `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end /
+        `largest` steps, `end` the scene's last output time.
+        """
+        from rockcheck.engines import kernels
+        from rockcheck.scenes.compiled import for_types_of
+
+        course, run = kernels.begun(scene, self.largest, self.short)
+        most_steps = 100_000 + 20 * int(course.end / self.largest)
+        first = np.empty((ROOM, kernels.COLUMNS))
+        first[0, :7] = 0.0, *run.state[:6]
+        step = for_types_of(kernels.step, run, course, (0.0, 0.0, 0.0), first[0])
+        planned = kernels.plan(run, course)
+
+        def march() -> Marched:
+            rows, count, going = first, 1, planned
+            while going:
+                x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
+                kicked = world.push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
+                if count == len(rows):
+                    rows = np.concatenate([rows, np.empty_like(rows)])
+                going = step(run, course, kicked, rows[count])
+                count += 1
+                if count % 512 == 0:
+                    progress.tell(rows[count - 1, 0], course.end)
+                if going == kernels.LOST or count > most_steps:
+                    raise ModelFailure(
+                        "no end to the events, or a motion that blew up, after"
+                        f" {count} steps at t = {rows[count - 1, 0]:g} s"
+                    )
+            return rows[:count, 0].copy(), rows[:count, 1:7].copy(), rows[1:count, 7:].copy()
+
+        return march

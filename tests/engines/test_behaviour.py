@@ -306,7 +306,8 @@ class Scripted(Engine):
 
     def rigid_world(self, scene):
         return SimpleNamespace(
-            **dict.fromkeys(("place", "close", "ready"), lambda *given: None), **self.answers
+            **dict.fromkeys(("place", "close", "ready", "step"), lambda *given: None),
+            **self.answers,
         )
 
     stock_world = rigid_world
@@ -315,9 +316,9 @@ class Scripted(Engine):
 @pytest.mark.parametrize(
     ("step", "answers", "words"),
     [
-        (1e-3, {"march": lambda felt, dt: np.full((len(felt), 6), math.nan)}, "blew up"),
+        (1e-3, {"state": lambda: (math.nan,) * 6}, "blew up"),
         ("adaptive", {"push": lambda *asked: (math.nan,) * 3}, "blew up"),
-        (1e-3, {"march": lambda felt, dt: np.full((len(felt), 6), -1.0)}, "through the floor"),
+        (1e-3, {"state": lambda: (-1.0,) * 6}, "through the floor"),
         # A contact that never stops what approaches: one impact step after the other.
         ("adaptive", {"push": lambda *asked: (0.0, -1.0, 0.0)}, "no end to the events"),
     ],

@@ -13,7 +13,7 @@ from rockcheck import (
     Wall,
     engines,
 )
-from rockcheck.engines import stepping
+from rockcheck.engines import kernels
 from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.discrepancy import impact_laws
 
@@ -71,7 +71,7 @@ def test_where_there_is_nothing_to_tell(restitution: float, of: dict, played: di
     assert law_followed(scene.replace(**of), UNILATERAL.simulate(scene.replace(**played))) is None
 
 
-@pytest.mark.parametrize("closed", [stepping.CLOSED, 1.4 * stepping.CLOSED, 4.0 * stepping.CLOSED])
+@pytest.mark.parametrize("closed", [kernels.CLOSED, 1.4 * kernels.CLOSED, 4.0 * kernels.CLOSED])
 @pytest.mark.parametrize(
     "engine",
     [
@@ -118,7 +118,7 @@ def test_corners_that_land_at_one_instant_share_the_impact(
 ) -> None:
     """So with steps that end at events all engines follow the closed branch, however near a corner
     must be to touch."""
-    monkeypatch.setattr(stepping, "CLOSED", closed)
+    monkeypatch.setattr(kernels, "CLOSED", closed)
     model = getattr(engines, engine)(time_step="adaptive")
     found = law_followed(scene, model.simulate(scene))
     assert (found.law, found.errors["closed"]) == ("closed", pytest.approx(0.0, abs=3e-6))
