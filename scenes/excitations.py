@@ -5,7 +5,6 @@ m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 """
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -174,7 +173,20 @@ class Record(Motion):
                 "source": Path(path).name,
                 "notes": found.notes,
             }
-        return _at_peak(data) if isinstance(data, dict) and "pga" in data else data
+        if isinstance(data, dict) and "pga" in data:
+            pga, largest = data["pga"], max(map(abs, data.get("unscaled", ())), default=0.0)
+            number = isinstance(pga, int | float) and not isinstance(pga, bool)
+            refuse(
+                (
+                    not number or not 0.0 < pga <= MOST_PGA,
+                    f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}",
+                    "pga",
+                ),
+                (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
+            )
+            scale = pga * GRAVITY_OF_RECORDS / largest
+            data = {name: data[name] for name in data if name != "pga"} | {"scale": scale}
+        return data
 
     @classmethod
     def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
@@ -215,23 +227,6 @@ class Record(Motion):
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
-
-
-def _at_peak(data: Mapping[str, Any]) -> dict[str, Any]:
-    """A record's fields with the `scale` that gives it a peak acceleration of `pga` (g)."""
-    pga, largest = data["pga"], max(map(abs, data.get("unscaled", ())), default=0.0)
-    number = isinstance(pga, int | float) and not isinstance(pga, bool)
-    refuse(
-        (
-            not number or not 0.0 < pga <= MOST_PGA,
-            f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}",
-            "pga",
-        ),
-        (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
-    )
-    return {name: value for name, value in data.items() if name != "pga"} | {
-        "scale": pga * GRAVITY_OF_RECORDS / largest
-    }
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -7,7 +7,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.util import find_spec
@@ -57,7 +57,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     },
 }
 #: By a column's name in a table: its name in a history, and the factor to SI units.
-MEANINGS = {name: (name, 1.0) for name in UNITS} | {
+MEANINGS = {name: (name, 1.0) for name in COLUMNS} | {
     f"{name}_{unit}": (name, factor)
     for name, units in UNITS.items()
     for unit, factor in units.items()
@@ -281,17 +281,14 @@ class History(Shown):
         shown = printable(path)
         if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
             raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
-        frame = read_table(path)
+        frame = read_table(path).rename(columns=str.strip)
         beside = events_path(path)
         events = read_table(beside) if beside.exists() else pd.DataFrame()
         # pandas would take the first column for names of rows.
         if len(frame) and not isinstance(frame.index, pd.RangeIndex):
             raise InputError(f"{shown}: rows have more values than the heading has columns")
-        factors = _factors(frame.columns, shown)
-        frame.columns = list(factors)
         about, block = _about_of(frame, shown)
-        channels = _checked_channels(frame, factors, shown)
-        said = about.outcome in OUTCOMES and {*factors.values()} == {1.0}
+        channels, plain = _channels(frame, shown)
         try:
             event_list = tuple(
                 Event(
@@ -315,7 +312,7 @@ class History(Shown):
             model=printable(about.model, 200),
             channels=channels,
             event_list=event_list,
-            outcome=about.outcome if said else outcome_of(channels),
+            outcome=about.outcome if plain and about.outcome in OUTCOMES else outcome_of(channels),
             cost=cost,
             settings=about.settings,
             notes=tuple(printable(note, 1000) for note in about.notes),
@@ -431,35 +428,34 @@ def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:
         raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
 
 
-def _factors(heading: Iterable[str], shown: str) -> dict[str, float]:
-    """The columns' names in a history, and the factors to SI units."""
-    factors: dict[str, float] = {}
-    for given in map(str.strip, heading):
-        plain = re.sub(r"^time(?=_|$)", "t", given)
+def _channels(frame: pd.DataFrame, shown: str) -> tuple[dict[str, NDArray[Any]], bool]:
+    """The channels of a table in SI units, and whether the table has them in these."""
+    columns, factors = dict[str, str](), dict[str, float]()
+    for given in frame.columns:
+        bare = re.sub(r"\.\d+$", "", given)  # pandas numbers a name that is there twice
+        plain, first = (re.sub(r"^time(?=_|$)", "t", one) for one in (given, bare))
         known = (one for one in UNITS if plain.startswith(f"{one}_"))
-        if plain not in MEANINGS and (name := max(known, key=len, default="")):
-            raise InputError(
-                f"{shown}: column {printable(given)!r}: give a unit of {name}:"
-                f" {', '.join(UNITS[name])}"
-            )
+        unit_of = max(known, key=len, default="")
         name, factor = MEANINGS.get(plain, (given, 1.0))
-        # pandas numbers a name that is there twice
-        again, _ = MEANINGS.get(re.sub(r"\.\d+$", "", plain), (name, factor))
-        if again in factors:
-            raise InputError(
-                f"{shown}: column {printable(given)!r} gives {printable(again)} a second time"
-            )
-        factors[name] = factor
-    return factors
-
-
-def _checked_channels(
-    frame: pd.DataFrame, factors: Mapping[str, float], shown: str
-) -> dict[str, NDArray[Any]]:
+        again, _ = MEANINGS.get(first, (name, factor))
+        refuse(
+            (
+                unit_of and plain not in MEANINGS,
+                f"{shown}: column {printable(given)!r}: give a unit of {unit_of}:"
+                f" {', '.join(UNITS.get(unit_of, ()))}",
+                "",
+            ),
+            (
+                again in columns,
+                f"{shown}: column {printable(bare)!r} gives {printable(again)} a second time",
+                "",
+            ),
+        )
+        columns[name], factors[name] = given, factor
     refuse(
         *(
             (
-                name not in frame.columns,
+                name not in columns,
                 f"{shown}: no column {name!r}; t and theta are needed, of {', '.join(COLUMNS)}",
                 "",
             )
@@ -468,15 +464,15 @@ def _checked_channels(
         (len(frame) == 0, f"{shown}: no rows", ""),
     )
     channels = {
-        name: frame[name].astype(str).to_numpy()
+        name: frame[columns[name]].astype(str).to_numpy()
         if name == "mode"
-        else factors[name] * _numbers(frame[name], shown)
+        else factors[name] * _numbers(frame[columns[name]], shown)
         for name in COLUMNS
-        if name in frame.columns
+        if name in columns
     }
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")
-    return channels
+    return channels, {*factors.values()} == {1.0}
 
 
 def _numbers(column: pd.Series[Any], shown: str) -> Floats:

@@ -16,7 +16,7 @@ in proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, 
 from collections.abc import Callable
 from pathlib import Path
 
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.formats import (
     AT2_HEADER,
@@ -32,7 +32,6 @@ from rockcheck.scenes.recordings.recording import (
     UNITS,
     Reading,
     Recording,
-    fault,
     option,
     place_of,
 )
@@ -42,7 +41,7 @@ __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_componen
 
 #: Lines of a file that are searched for its format.
 _LOOKED_AT = 100
-Reader = Callable[[Path, list[str], Reading], list[Recording]]
+Reader = Callable[[list[str], Reading], list[Recording]]
 #: Formats by the ending of the file's name.
 _BY_NAME: dict[str, Reader] = {".at2": read_at2, ".csv": read_table}
 #: Formats with a header, in the words of a message.
@@ -62,29 +61,38 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     value that is not finite. Where something is not known, the message shows the option that
     supplies it.
     """
-    asked = reading or Reading()
-    lines = read_text(path, latin=True).split("\n")
-    head = [line[:200] for line in lines[:_LOOKED_AT]]
-    by_content: dict[Reader, bool] = {
-        read_knet: head[0].startswith("Origin Time"),
-        read_esm: any(line.startswith("SAMPLING_INTERVAL_S:") for line in head),
-        read_volume: any(map(is_volume, head)),
-        read_at2: any(AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]),
-    }
-    fits = next((reader for reader, fit in by_content.items() if fit), read_table)
-    read = _BY_NAME.get(path.suffix.lower(), fits)
-    for name in ("column", "header_lines", "decimal") if read in _WITH_HEADER else ():
-        if getattr(asked, name) is not None:
-            raise fault(
-                path,
-                f"is {_WITH_HEADER[read]}, which says by itself where its numbers stand; leave the"
-                f" option {name} out",
+    asked, lines = reading or Reading(), read_text(path, latin=True).split("\n")
+    try:
+        head = [line[:200] for line in lines[:_LOOKED_AT]]
+        by_content: dict[Reader, bool] = {
+            read_knet: head[0].startswith("Origin Time"),
+            read_esm: any(line.startswith("SAMPLING_INTERVAL_S:") for line in head),
+            read_volume: any(map(is_volume, head)),
+            read_at2: any(
+                AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]
+            ),
+        }
+        fits = next((reader for reader, fit in by_content.items() if fit), read_table)
+        read = _BY_NAME.get(path.suffix.lower(), fits)
+        refuse(
+            *(
+                (
+                    getattr(asked, name) is not None,
+                    f"is {_WITH_HEADER[read]}, which says by itself where its numbers stand; leave"
+                    f" the option {name} out",
+                    "",
+                )
+                for name in ("column", "header_lines", "decimal")
+                if read in _WITH_HEADER
             )
-    found = read(path, lines, asked)
-    if asked.component is None:
-        return found
-    names = [one.component for one in found]
-    return [found[place_of(path, "component", asked.component, names, _listed(found))]]
+        )
+        found = read(lines, asked)
+        if asked.component is None:
+            return found
+        names = [one.component for one in found]
+        return [found[place_of("component", asked.component, names, _listed(found))]]
+    except InputError as error:
+        raise InputError(f"{printable(path)}{', ' if error.key else ': '}{error}") from None
 
 
 def read_record(path: Path, reading: Reading | None = None) -> Recording:
@@ -94,8 +102,9 @@ def read_record(path: Path, reading: Reading | None = None) -> Recording:
     """
     found = read_components(path, reading)
     if len(found) > 1:
-        raise fault(
-            path, f"{len(found)} components, {_listed(found)}; give one: {option('component', 1)}"
+        raise InputError(
+            f"{printable(path)}: {len(found)} components, {_listed(found)}; give one:"
+            f" {option('component', 1)}"
         )
     return found[0]
 

@@ -11,12 +11,11 @@ import math
 import re
 from dataclasses import dataclass
 from itertools import takewhile
-from pathlib import Path
 
 import numpy as np
 
 from rockcheck.scenes.base import LEAST, MOST
-from rockcheck.scenes.errors import printable
+from rockcheck.scenes.errors import printable, refuse
 from rockcheck.scenes.recordings.recording import (
     NUMBER,
     UNITS,
@@ -64,31 +63,31 @@ _CSMIP_UNIT = re.compile(r"\b(?:in\s++|units\s*+:\s*+)([a-z/0-9^]++)", re.IGNORE
 _CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGNORECASE)
 _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
 _UP = {400: "up", 401: "down"}
+NO_FIELDS = "a format without fields"
 
 
-def read_at2(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
     """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
     found = (AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in lines[:20])
     header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
     if match is None:
-        raise fault(path, "no header line with NPTS and DT within the first 20 lines")
+        raise fault("no header line with NPTS and DT within the first 20 lines")
     for n, line in enumerate(lines[:header], 1):
         if other := _OTHER_KIND.search(line[:_WIDE]):
-            raise fault(path, f"{printable(other[0], 30)!r}; only accelerations can be read", n)
+            raise fault(f"{printable(other[0], 30)!r}; only accelerations can be read", n)
     words = (word for line in lines[:header] for word in _UNITS.findall(line))
     stated = next(filter(None, map(known_unit, words)), "")
     if not stated and reading.unit is None:
         raise fault(
-            path,
             "no header line that states UNITS OF G or another; give the unit:"
             f" {option('unit', 'cm/s2')}",
         )
-    unit = settled_unit(path, stated, reading)
-    count = checked_count(path, header, "NPTS", match[1])
-    step = settled_step(path, checked_step(path, header, "DT", match[2]), reading)
-    values = numbers(path, enumerate(lines[header:], header + 1), count)
+    unit = settled_unit(stated, reading)
+    count = checked_count(header, "NPTS", match[1])
+    step = settled_step(checked_step(header, "DT", match[2]), reading)
+    values = numbers(enumerate(lines[header:], header + 1), count)
     if len(values) != count:
-        raise fault(path, f"NPTS says {count}, the file has {len(values)} samples", header)
+        raise fault(f"NPTS says {count}, the file has {len(values)} samples", header)
     fields = lines[1].split(",")  # event, date, station and component, or another form
     name = fields[-1].strip()[:10]
     return [
@@ -102,7 +101,7 @@ def read_at2(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     ]
 
 
-def read_esm(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+def read_esm(lines: list[str], reading: Reading) -> list[Recording]:
     """ESM (DYNA 1.2): lines of KEY: value, then one acceleration a line."""
     said = [match for match in takewhile(bool, map(_ESM_LINE.match, lines)) if match]
     header = {match[1]: (n, match[2].strip()) for n, match in enumerate(said, 1)}
@@ -110,24 +109,22 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
 
     def stated(key: str) -> tuple[int, str]:
         if not header.get(key, (0, ""))[1]:
-            raise fault(path, f"no header line that states {key}")
+            raise fault(f"no header line that states {key}")
         return header[key]
 
     kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
     if kind[1].upper() != "ACCELERATION":
-        raise fault(
-            path, f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0]
-        )
+        raise fault(f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0])
     place, count_word = stated("NDATA")
     if not re.fullmatch(r"[0-9]++", count_word):
-        raise fault(path, f"NDATA {printable(count_word, 30)!r} is not a count", place)
-    count = checked_count(path, place, "NDATA", count_word)
+        raise fault(f"NDATA {printable(count_word, 30)!r} is not a count", place)
+    count = checked_count(place, "NDATA", count_word)
     line, word = stated("SAMPLING_INTERVAL_S")
-    step = settled_step(path, checked_step(path, line, "SAMPLING_INTERVAL_S", word), reading)
-    unit = settled_unit(path, known_unit(header.get("UNITS", (0, ""))[1]), reading)
-    values = numbers(path, enumerate(lines[first - 1 :], first))
+    step = settled_step(checked_step(line, "SAMPLING_INTERVAL_S", word), reading)
+    unit = settled_unit(known_unit(header.get("UNITS", (0, ""))[1]), reading)
+    values = numbers(enumerate(lines[first - 1 :], first))
     if len(values) != count:
-        raise fault(path, f"NDATA says {count}, the file has {len(values)} samples", place)
+        raise fault(f"NDATA says {count}, the file has {len(values)} samples", place)
     return [
         Recording(
             samples=np.array(values) * UNITS[unit],
@@ -139,7 +136,7 @@ def read_esm(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
     ]
 
 
-def read_knet(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
     """K-NET and KiK-net: 17 header lines, then counts of the digitiser.
 
     Names of the header stand in the first 18 columns. The counts have an offset: their mean is
@@ -151,35 +148,37 @@ def read_knet(path: Path, lines: list[str], reading: Reading) -> list[Recording]
         if line.startswith("Memo"):
             break
     else:
-        raise fault(path, "no header line Memo. within the first 40 lines")
+        raise fault("no header line Memo. within the first 40 lines")
     scale = _KNET_SCALE.match(header.get("Scale Factor", (0, ""))[1])
     rate = _KNET_RATE.match(header.get("Sampling Freq(Hz)", (0, ""))[1])
     if not scale or not rate:
         raise fault(
-            path,
             f"no header line that states {'Sampling Freq(Hz)' if scale else 'Scale Factor in gal'}",
         )
     place = header["Scale Factor"][0]
-    factor, counts = number(path, place, scale[1]), number(path, place, scale[2])
+    factor, counts = number(place, scale[1]), number(place, scale[2])
     if counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST:
-        raise fault(path, f"Scale Factor {printable(scale[0], 40)} is not usable", place)
-    hertz = checked_step(path, header["Sampling Freq(Hz)"][0], "Sampling Freq(Hz)", rate[1])
-    values = np.array(numbers(path, enumerate(lines[n:], n + 1)))
-    if not len(values):
-        raise fault(path, "no samples after the line Memo.")
-    if stated := header.get("Duration Time(s)"):
-        expected = number(path, *stated) * hertz
-        if abs(expected - len(values)) > 0.5:
-            found = f"{expected:.10g} samples, the file has {len(values)}"
-            raise fault(path, f"Duration Time(s) {stated[1]} is {found}", stated[0])
-    unit = settled_unit(path, "gal", reading)
+        raise fault(f"Scale Factor {printable(scale[0], 40)} is not usable", place)
+    hertz = checked_step(header["Sampling Freq(Hz)"][0], "Sampling Freq(Hz)", rate[1])
+    values = np.array(numbers(enumerate(lines[n:], n + 1)))
+    line_of, length = header.get("Duration Time(s)", (0, ""))
+    expected = number(line_of, length) * hertz if line_of else float(len(values))
+    refuse(
+        (not len(values), "no samples after the line Memo.", ""),
+        (
+            abs(expected - len(values)) > 0.5,
+            f"Duration Time(s) {length} is {expected:.10g} samples, the file has {len(values)}",
+            f"line {line_of}",
+        ),
+    )
+    unit = settled_unit("gal", reading)
     samples = values * (factor / counts * UNITS[unit])
     mean = float(np.mean(samples))
     said = f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
     return [
         Recording(
             samples=samples - mean,
-            time_step=settled_step(path, 1.0 / hertz, reading),
+            time_step=settled_step(1.0 / hertz, reading),
             unit=unit,
             form="K-NET ASCII",
             component=printable(header.get("Dir.", (0, ""))[1], 30),
@@ -219,7 +218,7 @@ def is_volume(line: str) -> bool:
     )
 
 
-def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+def read_volume(lines: list[str], reading: Reading) -> list[Recording]:
     """Every block of acceleration, in the file's order."""
     found: list[Recording] = []
     block, index = _Block(), 0
@@ -227,47 +226,39 @@ def read_volume(path: Path, lines: list[str], reading: Reading) -> list[Recordin
         line = lines[index][:_WIDE]
         index += 1
         if header := _HEADER.match(line):
-            index = _heed(path, lines, index, header, block)
+            index = _heed(lines, index, header, block)
         elif said := COSMOS_BLOCK.match(line):
             block.count, block.seconds = said[1], said[2] or ""
             block.unit = known_unit(said[3]) or _COSMOS_UNITS.get(said[4] or "", "")
             block.across, block.width = int(said[5]), int(said[6])
         elif said := CSMIP_BLOCK.match(line):
             rest = line[said.end() :]
-            block.count, block.step = said[1], (index, number(path, index, said[2]))
+            block.count, block.step = said[1], (index, number(index, said[2]))
             block.unit = next(map(known_unit, _CSMIP_UNIT.findall(rest)), "")
             if shape := _CSMIP_FORMAT.search(rest):
                 block.across, block.width = map(int, shape.groups())
         elif named := _CHANNEL.search(line):
             block.name = named[2]
         if block.count:
-            found.append(_recording(path, lines, index, block, reading))
+            found.append(_recording(lines, index, block, reading))
             block, index = _Block(), index + block.height
     if not found:
         raise fault(
-            path,
             "a V2 file without a block of accelerations; only corrected accelerations can be read",
         )
     return found
 
 
-def _fields(path: Path, index: int, across: int, width: int) -> tuple[int, int]:
-    """The numbers on a line and their width; raises `InputError` where there are none."""
-    if across < 1 or width < 1:
-        raise fault(path, "a format without fields", index)
-    return across, width
-
-
-def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
+def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
     """Take direction and time step from a block of header values; returns the line after it."""
-    across, width = _fields(path, index, int(header[4]), int(header[5]))
-    rows = min(int(header[3][:6]), len(lines) - index)
+    across, width = int(header[4]), int(header[5])
+    refuse((across < 1 or width < 1, NO_FIELDS, f"line {index}"))
+    end = min(index + int(header[3][:6]), len(lines))
 
     def word(place: int) -> tuple[int, str]:
         row, column = divmod(place - 1, across)
-        return index + row + 1, lines[index + row][
-            column * width : (column + 1) * width
-        ].strip() if row < rows else ""
+        line = "".join(lines[index + row : min(index + row + 1, end)])
+        return index + row + 1, line[column * width : (column + 1) * width].strip()
 
     if header[2].lower() == "integer":
         if re.fullmatch(r"[0-9]{1,3}", word(54)[1]):
@@ -276,41 +267,43 @@ def _heed(path: Path, lines: list[str], index: int, header: re.Match[str], block
     else:
         for place, seconds in ((62, 1e-3), (34, 1.0)):
             n, text = word(place)
-            if text and (value := number(path, n, text)) > 0.0:
+            if text and (value := number(n, text)) > 0.0:
                 block.step = n, float(f"{value * seconds:.12g}")
                 break
-    return index + rows
+    return end
 
 
-def _recording(
-    path: Path, lines: list[str], index: int, about: _Block, reading: Reading
-) -> Recording:
-    if not about.step[0]:
-        raise fault(path, "no real header before this block states the time step", index)
-    count = checked_count(path, index, "the count of points", about.count)
-    _fields(path, index, about.across, about.width)
-    place, stated = about.step
-    step = checked_step(path, place, "the time step", f"{stated!r}")
-    seconds = settled_step(path, step, reading)
-    unit = settled_unit(path, about.unit, reading)
+def _recording(lines: list[str], index: int, about: _Block, reading: Reading) -> Recording:
+    (place, stated), here = about.step, f"line {index}"
+    refuse(
+        (not place, "no real header before this block states the time step", here),
+        (about.across < 1 or about.width < 1, NO_FIELDS, here),
+    )
+    count = checked_count(index, "the count of points", about.count)
+    step = checked_step(place, "the time step", f"{stated!r}")
+    seconds = settled_step(step, reading)
+    unit = settled_unit(about.unit, reading)
     values: list[float] = []
     for n, line in enumerate(lines[index : index + about.height], index + 1):
         ends = range(0, min(about.across, count - len(values)) * about.width, about.width)
         words = [line[end : end + about.width].strip() for end in ends]
         if "" in words:
             break
-        values += [number(path, n, word) for word in words]
-    if len(values) != count:
-        raise fault(
-            path,
-            f"the header says {count} points of acceleration, the block has {len(values)}",
-            index,
-        )
+        values += [number(n, word) for word in words]
     length = count * seconds
-    # A time step of another record would be a silent fault.
-    if about.seconds and abs(length - int(about.seconds[:9])) > 1.0 + 0.01 * length:
-        said = f"{count} points every {seconds:g} s are {length:.6g} s"
-        raise fault(path, f"{said}, not {about.seconds[:9]} secs", index)
+    refuse(
+        (
+            len(values) != count,
+            f"the header says {count} points of acceleration, the block has {len(values)}",
+            here,
+        ),
+        # A time step of another record would be a silent fault.
+        (
+            about.seconds and abs(length - int(about.seconds[:9])) > 1.0 + 0.01 * length,
+            f"{count} points every {seconds:g} s are {length:.6g} s, not {about.seconds[:9]} secs",
+            here,
+        ),
+    )
     return Recording(
         samples=np.array(values) * UNITS[unit],
         time_step=seconds,

@@ -4,13 +4,12 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, Strict, StringConstraints
 
 from rockcheck.scenes.base import LEAST, MOST, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable, refuse
 
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000
@@ -81,11 +80,9 @@ class Recording:
     notes: tuple[str, ...] = ()
 
 
-def fault(path: Path, said: str, line: int | None = None) -> InputError:
-    """The `InputError` for a file, and for a line of it."""
-    return InputError(
-        f"{printable(path)}, line {line}: {said}" if line else f"{printable(path)}: {said}"
-    )
+def fault(said: str, line: int | None = None) -> InputError:
+    """The `InputError` for a file, and for a line of it; `read_components` names the file."""
+    return InputError(said, f"line {line}" if line else "")
 
 
 def option(name: str, value: str | float) -> str:
@@ -94,7 +91,7 @@ def option(name: str, value: str | float) -> str:
     return f"--read {name}={value} (in a scene file: {name} = {quote}{value}{quote})"
 
 
-def number(path: Path, line: int, word: str) -> float:
+def number(line: int, word: str) -> float:
     """The finite number in `word`, in Fortran's notation or C's.
 
     Raises `InputError` if it is none, or larger than `MOST`.
@@ -108,10 +105,10 @@ def number(path: Path, line: int, word: str) -> float:
         if math.isfinite(value)
         else f"{shown!r} is not a finite number"
     )
-    raise fault(path, said, line)
+    raise fault(said, line)
 
 
-def place_of(path: Path, kind: str, asked: int | str, names: Sequence[str], listed: str) -> int:
+def place_of(kind: str, asked: int | str, names: Sequence[str], listed: str) -> int:
     """Place from 0 of the column or component that is `asked` for, by its number or its name.
 
     `kind` and `listed` are words for the message of the `InputError` where there is no such one.
@@ -120,7 +117,7 @@ def place_of(path: Path, kind: str, asked: int | str, names: Sequence[str], list
         return asked - 1
     if names.count(asked) == 1:
         return names.index(asked)
-    raise fault(path, f"no single {kind} {printable(repr(asked))}; there are {listed}")
+    raise fault(f"no single {kind} {printable(repr(asked))}; there are {listed}")
 
 
 def is_number(word: str) -> bool:
@@ -128,7 +125,7 @@ def is_number(word: str) -> bool:
     return _NUMBER.fullmatch(word) is not None
 
 
-def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
+def numbers(lines: Iterable[tuple[int, str]], count: int = 0) -> list[float]:
     """All numbers of numbered lines, separated by blanks.
 
     Where some have run together and there are `count`, the lines are cut into columns of one width.
@@ -137,7 +134,7 @@ def numbers(path: Path, lines: Iterable[tuple[int, str]], count: int = 0) -> lis
     cells = [(n, word) for n, line in rows for word in line.split()]
     if count and not all(is_number(word) for _, word in cells):
         cells = _columns(rows, count) or cells
-    return [number(path, n, word) for n, word in cells]
+    return [number(n, word) for n, word in cells]
 
 
 def _columns(rows: list[tuple[int, str]], count: int) -> list[tuple[int, str]]:
@@ -160,52 +157,53 @@ def known_unit(text: str) -> str:
     return next((unit for unit, spelt in _SPELT.items() if spelt.fullmatch(word)), "")
 
 
-def settled_unit(path: Path, stated: str, reading: Reading) -> str:
+def settled_unit(stated: str, reading: Reading) -> str:
     """The unit of the file: stated in it, or given by `reading`.
 
     Raises `InputError` where it is neither, and where the two differ.
     """
-    if not stated and reading.unit is None:
-        raise fault(
-            path,
+    refuse(
+        (
+            not stated and reading.unit is None,
             f"the unit of acceleration is not stated; give it: {option('unit', 'g')}, or one of"
             f" {', '.join(UNITS)}",
-        )
-    if stated and reading.unit and UNITS[stated] != UNITS[reading.unit]:
-        raise fault(
-            path,
+            "",
+        ),
+        (
+            stated and reading.unit and UNITS[stated] != UNITS[reading.unit],
             f"the file states the unit {stated}, not {reading.unit}; leave the option unit out",
-        )
+            "",
+        ),
+    )
     return stated or str(reading.unit)
 
 
-def settled_step(path: Path, stated: float, reading: Reading) -> float:
+def settled_step(stated: float, reading: Reading) -> float:
     """The time step in s that a header states.
 
     Raises `InputError` where `reading` gives another.
     """
     if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
         raise fault(
-            path,
             f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the"
             " option time_step out",
         )
     return stated
 
 
-def checked_count(path: Path, line: int, name: str, count: str) -> int:
+def checked_count(line: int, name: str, count: str) -> int:
     """A number of samples from a header; raises `InputError` if it is out of range."""
     value = int(count[:12])
     if not 1 <= value <= MOST_SAMPLES:
-        raise fault(path, f"{name} {count[:20]} is not in 1..{MOST_SAMPLES}", line)
+        raise fault(f"{name} {count[:20]} is not in 1..{MOST_SAMPLES}", line)
     return value
 
 
-def checked_step(path: Path, line: int, name: str, word: str) -> float:
+def checked_step(line: int, name: str, word: str) -> float:
     """A time step from a header, s; raises `InputError` if it is below `LEAST`."""
-    value = number(path, line, word)
+    value = number(line, word)
     if value < LEAST:
         raise fault(
-            path, f"{name} {word} is {'not positive' if value <= 0.0 else f'below {LEAST:g}'}", line
+            f"{name} {word} is {'not positive' if value <= 0.0 else f'below {LEAST:g}'}", line
         )
     return value

@@ -94,14 +94,13 @@ def _parted(
     All are horizontal if they are `named`.
     """
     read, faults = read_files(paths, reading)
-    across = {
-        path: [one for one in found if named or not is_vertical(path, one[1])]
-        for path, found in read.items()
-    }
-    upward = {
-        path: [one for one in found if not named and is_vertical(path, one[1])]
-        for path, found in read.items()
-    }
+    across, upward = (
+        {
+            path: [one for one in found if up == (not named and is_vertical(path, one[1]))]
+            for path, found in read.items()
+        }
+        for up in (False, True)
+    )
     return across, upward, faults
 
 

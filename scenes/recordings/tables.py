@@ -5,12 +5,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
 from rockcheck.scenes.base import LEAST, Floats
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.reading import MOST_COLUMNS
 from rockcheck.scenes.recordings.recording import (
     MOST_SAMPLES,
@@ -47,7 +46,7 @@ class _Layout:
     separator: str | None
     decimal_comma: bool
 
-    def words(self, path: Path, n: int, line: str) -> list[str]:
+    def words(self, n: int, line: str) -> list[str]:
         """The fields of a line; decimal commas become points."""
         if self.separator is None or '"' not in line:
             words = line.split(self.separator)
@@ -55,7 +54,7 @@ class _Layout:
             try:
                 words = next(csv.reader([line], delimiter=self.separator))
             except csv.Error as error:
-                raise fault(path, f"not a line of a CSV table: {printable(error)}", n) from None
+                raise fault(f"not a line of a CSV table: {printable(error)}", n) from None
         words = [word.strip() for word in words]
         if not self.decimal_comma:
             return words
@@ -64,20 +63,20 @@ class _Layout:
         ]
 
 
-def read_table(path: Path, lines: list[str], reading: Reading) -> list[Recording]:
+def read_table(lines: list[str], reading: Reading) -> list[Recording]:
     """Read a column of times and one of accelerations, or accelerations alone.
 
     Lines that start with # or % are remarks.
     """
-    cells = _cells_of(path, lines, reading)
+    cells = _cells_of(lines, reading)
     time, place, stated = _columns(cells, reading)
     if time is None and reading.time_step is None:
-        raise fault(path, f"no column of times; give the time step: {option('time_step', 0.01)}")
-    unit = settled_unit(path, stated, reading)
+        raise fault(f"no column of times; give the time step: {option('time_step', 0.01)}")
+    unit = settled_unit(stated, reading)
     samples, times, words = cells.read(place, time)
     step, notes = float(reading.time_step or 0.0), list[str]()
     if time is not None:
-        step, notes = _step_of(path, times, words, [n for n, _ in cells.rows], reading)
+        step, notes = _step_of(times, words, [n for n, _ in cells.rows], reading)
         if not cells.names or cells.names[time].lower() in ("t", "time"):
             notes.append(f"column {time + 1} is taken as the time in s")
     return [
@@ -98,7 +97,6 @@ def read_table(path: Path, lines: list[str], reading: Reading) -> list[Recording
 class _Cells:
     """The lines of data and their layout; `names` is empty where no line names the columns."""
 
-    path: Path
     rows: NumberedLines
     layout: _Layout
     names: list[str]
@@ -108,38 +106,46 @@ class _Cells:
         """Numbers of column `place` and of column `time`, and the words of the latter."""
         values, times, words = [], [], []
         for n, line in self.rows:
-            cells = self.layout.words(self.path, n, line)
+            cells = self.layout.words(n, line)
             if len(cells) != self.width:
                 whose = "the header names" if self.names else "the first line has"
-                raise fault(self.path, f"{len(cells)} fields where {whose} {self.width}", n)
+                raise fault(f"{len(cells)} fields where {whose} {self.width}", n)
             if time is not None:
-                times.append(number(self.path, n, cells[time]))
+                times.append(number(n, cells[time]))
                 words.append(cells[time])
-            values.append(number(self.path, n, cells[place]))
+            values.append(number(n, cells[place]))
         return np.array(values), np.array(times), words
 
 
-def _cells_of(path: Path, lines: list[str], reading: Reading) -> _Cells:
-    if reading.component is not None:
-        raise fault(path, "a table has columns; give the option column in place of component")
+def _cells_of(lines: list[str], reading: Reading) -> _Cells:
     rows: NumberedLines = [
         (n, line)
         for n, line in enumerate(lines, 1)
         if n > (reading.header_lines or 0) and line.strip() and line[0] not in "#%"
     ]
-    if not rows:
-        raise fault(path, "empty")
-    layout = _layout_of(path, rows, reading)
-    names, rows = _names_of(path, rows, layout, reading)
-    if len(rows) > MOST_SAMPLES:
-        raise fault(path, f"more than {MOST_SAMPLES} lines")
-    width = len(names) or len(layout.words(path, *rows[0]))
-    if width > MOST_COLUMNS:
-        raise fault(path, f"more than {MOST_COLUMNS} columns", rows[0][0])
-    return _Cells(path, rows, layout, names, width)
+    refuse(
+        (
+            reading.component is not None,
+            "a table has columns; give the option column in place of component",
+            "",
+        ),
+        (not rows, "empty", ""),
+    )
+    layout = _layout_of(rows, reading)
+    names, rows = _names_of(rows, layout, reading)
+    width = len(names) or len(layout.words(*rows[0]))
+    refuse(
+        (len(rows) > MOST_SAMPLES, f"more than {MOST_SAMPLES} lines", ""),
+        (
+            width > MOST_COLUMNS,
+            f"more than {MOST_COLUMNS} columns",
+            "".join(f"line {n}" for n, _ in rows[:1]),
+        ),
+    )
+    return _Cells(rows, layout, names, width)
 
 
-def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
+def _layout_of(rows: NumberedLines, reading: Reading) -> _Layout:
     """The layout of a table, from its first line of numbers, else from its first line."""
     head = [line for _, line in rows[:_MOST_HEADER]]
     with_digits = next(
@@ -159,7 +165,6 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
             and all(_DECIMAL_COMMA.fullmatch(line.strip()[:60]) for line in head)
         ):
             raise fault(
-                path,
                 f"a comma between columns or before the decimals? {option('decimal', ',')}, or"
                 " decimal .",
                 rows[-1][0],
@@ -172,25 +177,24 @@ def _layout_of(path: Path, rows: NumberedLines, reading: Reading) -> _Layout:
 
 
 def _names_of(
-    path: Path, rows: NumberedLines, layout: _Layout, reading: Reading
+    rows: NumberedLines, layout: _Layout, reading: Reading
 ) -> tuple[list[str], NumberedLines]:
     """The columns' names, [] where no line names them, and the lines of data."""
-    first = layout.words(path, *rows[0])
+    first = layout.words(*rows[0])
     if any(word in NAMED or word == "time_s" for word in first):
         return first, rows[1:]
     if all(map(is_number, first)):
         return [], rows
     searched = rows[: _MOST_HEADER if reading.header_lines is None else 2]
     for index, ((n, above), line) in enumerate(pairwise(searched), 1):
-        words = layout.words(path, *line)
+        words = layout.words(*line)
         if all(map(is_number, words)):
-            names = layout.words(path, n, above.replace(" [", "[").replace(" (", "("))
+            names = layout.words(n, above.replace(" [", "[").replace(" (", "("))
             return names if len(names) == len(words) else [], rows[index:]
-    if len(first) > 1 and len(rows) > 1 and len(layout.words(path, *rows[1])) == len(first):
+    if len(first) > 1 and len(rows) > 1 and len(layout.words(*rows[1])) == len(first):
         # a column of words beside those of numbers, or a first line of data that is wrong
         return first, rows[1:]
     raise fault(
-        path,
         f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"
         f" {option('header_lines', 3)}",
         rows[0][0],
@@ -203,7 +207,10 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, int, str]:
     Times are None if there is no such column. The unit is the one that the column's name states, ""
     if none. Raises `InputError` where the columns are not clear.
     """
-    names, stated = cells.names, list(map(_unit_of, cells.names)) or [""] * cells.width
+    names = cells.names
+    stated = [
+        NAMED.get(name) or next(map(known_unit, _BRACKETS.findall(name)), "") for name in names
+    ] or [""] * cells.width
     times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
     time: int | None = times[0] if len(times) == 1 else None
     if not names and cells.width > 1 and reading.time_step is None:
@@ -230,17 +237,12 @@ def _unclear(cells: _Cells) -> InputError:
         else f"{cells.width} columns; give that of the accelerations"
     )
     line = cells.rows[0][0] - bool(cells.names) if cells.rows else 1
-    return fault(cells.path, f"{said}: {option('column', 2)}", line)
+    return fault(f"{said}: {option('column', 2)}", line)
 
 
 def _chosen(cells: _Cells, column: int | str) -> int:
     shown = printable(", ".join(cells.names)) if cells.names else f"1 to {cells.width}"
-    return place_of(cells.path, "column", column, cells.names or [""] * cells.width, shown)
-
-
-def _unit_of(name: str) -> str:
-    match = _BRACKETS.search(name)
-    return NAMED.get(name) or (known_unit(match[1]) if match else "")
+    return place_of("column", column, cells.names or [""] * cells.width, shown)
 
 
 def _decimals(word: str) -> int:
@@ -249,7 +251,6 @@ def _decimals(word: str) -> int:
 
 
 def _step_of(
-    path: Path,
     time: Floats,
     words: Sequence[str],
     lines: Sequence[int],
@@ -262,11 +263,15 @@ def _step_of(
     digit or 1 % of a step. If `reading` gives a time step, only that one is tried. Raises
     `InputError` where none fits.
     """
-    if len(words) < 2:
-        raise fault(path, f"{len(words)} sample(s); at least 2 are needed to know the time step")
-    mean = float(time[-1] - time[0]) / (len(time) - 1)
-    if not mean > LEAST:
-        raise fault(path, "time_s does not increase")
+    mean = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    refuse(
+        (
+            len(words) < 2,
+            f"{len(words)} sample(s); at least 2 are needed to know the time step",
+            "",
+        ),
+        (not mean > LEAST, "time_s does not increase", ""),
+    )
     digit = 10.0 ** -min(max(map(_decimals, words)), 30)
     # A coarser digit could hide a sample that is missing or in the wrong place.
     tells = digit <= 0.5 * mean
@@ -288,7 +293,7 @@ def _step_of(
         first = int(uneven[0])
         hint = "" if tells else f"; times of {digit:g} s may hide it: {option('time_step', 0.005)}"
         raise fault(
-            path, f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first]
+            f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first]
         )
     notes = [f"the first time is {time[0]:g} s; it is 0 here"] if abs(time[0]) > rounding else []
     return float(f"{step:.12g}") if step == mean and reading.time_step is None else step, notes
