@@ -229,19 +229,19 @@ class _Pages:
 
     def write(self, name: str, stamp: str) -> None:
         """Write figures and data, and last the page, with its `stamp`; or the index (`INDEX`)."""
-        if name == INDEX:
-            self._write_index()
-            return
-        view, page = self.views[name], self.folder / self.links[name]
+        view, address = self.views.get(name), self.links.get(name, INDEX)
+        page = self.folder / address
         before = belongings(page)
-        if isinstance(view, EnsembleView):
-            template, shown = "finding.html", self._write_ensemble(view)
-        else:
-            template, shown = "scene.html", self._write_scene(view)
-        write_page(
-            self.folder, self.links[name], template, view=view, stamp=stamp, **shown, **self.common
-        )
-        remove(page.parent, before - belongings(page))
+        match view:
+            case SceneView():
+                template, shown = "scene.html", self._write_scene(view)
+            case EnsembleView():
+                template, shown = "finding.html", self._write_ensemble(view)
+            case None:
+                template, shown = "index.html", self._write_index()
+        write_page(self.folder, address, template, view=view, stamp=stamp, **shown, **self.common)
+        # the tables beside the index are those of the run
+        remove(page.parent, [one for one in before - belongings(page) if "/" in one])
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
         """Write a scene's figures and data; returns what its page shows beside the view.
@@ -298,31 +298,26 @@ class _Pages:
             )
         return {"found": page}
 
-    def _write_index(self) -> None:
+    def _write_index(self) -> dict[str, Any]:
+        """Write the figures of the index; returns what it shows."""
         figures = writing.made(self.folder, PAGES, FIGURES)
-        blocks = tables.accuracy(self.run)
-        (figures / f"{tables.PEAKS}.svg").unlink(missing_ok=True)
+        blocks, matrix = tables.accuracy(self.run), tables.matrix(self.run)
         for plot in (block for block in blocks if isinstance(block, Plot)):
             save(figure_of(plot), figures / plot.name)
-        matrix = tables.matrix(self.run)
-        write_page(
-            self.folder,
-            INDEX,
-            "index.html",
-            scenes=self.scenes,
-            ensembles=self.ensembles,
-            links=self.links,
-            worst=tables.worst_table(self.run, self.links),
-            hidden_worst=max(0, len(tables.worst_first(self.run)) - tables.WORST),
-            times=tables.times_table(self.run),
-            summaries={
+        return {
+            "scenes": self.scenes,
+            "ensembles": self.ensembles,
+            "links": self.links,
+            "worst": tables.worst_table(self.run, self.links),
+            "hidden_worst": max(0, len(tables.worst_first(self.run)) - tables.WORST),
+            "times": tables.times_table(self.run),
+            "summaries": {
                 m: models.FAMILIES[m].summary for m in self.run.models if m in models.FAMILIES
             },
-            matrix={scene: row for scene, row in matrix.items() if scene in self.views},
-            accuracy=blocks,
-            glance=tables.glance(self.run, matrix),
-            **self.common,
-        )
+            "matrix": {scene: row for scene, row in matrix.items() if scene in self.views},
+            "accuracy": blocks,
+            "glance": tables.glance(self.run, matrix),
+        }
 
     def stamp(self, view: SceneView | EnsembleView) -> str:
         """The stamp of a page (`stamp_of`), for all that it shows.
