@@ -583,7 +583,31 @@ def blocks(paper: Paper, claims: Sequence[Claim]) -> Iterator[Block]:
         "Each sentence of section 5 and the conclusions, judged by spectra of"
         f" {len(paper.amplitudes)} x {len(paper.frequencies)} nodes.",
     )
-    yield _areas(paper)
+    gaps = AXES["gap"]
+    areas, alone = (100.0 * safe.mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
+    yield Plot(
+        "safe-areas",
+        panels=[
+            Panel(
+                f"Wall on the {side}",
+                [
+                    series
+                    for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True)
+                    for series in (
+                        *(
+                            Series(f"μ {mu:g}, e {e:g}", gaps, line)
+                            for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
+                        ),
+                        Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
+                    )
+                ],
+            )
+            for side, of_side in zip(AXES["side"], areas, strict=True)
+        ],
+        x=Axis("gap, mm"),
+        y=Axis("safe nodes, %"),
+        note="Safe areas of all spectra.",
+    )
     yield _rows(
         "claim-figures",
         "The figures behind each verdict",
@@ -644,32 +668,4 @@ def _rows(name: str, title: str, of: Mapping[str, Sequence[Row]]) -> Table:
         title,
         on="page",
         folded=True,
-    )
-
-
-def _areas(paper: Paper) -> Plot:
-    gaps = AXES["gap"]
-    areas, alone = (100.0 * safe.mean(axis=(-2, -1)) for safe in (paper.safe, paper.safe_alone))
-    return Plot(
-        "safe-areas",
-        panels=[
-            Panel(
-                f"Wall on the {side}",
-                [
-                    series
-                    for mu, of_mu, free in zip(AXES["friction"], of_side, alone, strict=True)
-                    for series in (
-                        *(
-                            Series(f"μ {mu:g}, e {e:g}", gaps, line)
-                            for e, line in zip(RESTITUTIONS, of_mu.T.tolist(), strict=True)
-                        ),
-                        Series(f"μ {mu:g}, no wall", gaps, [float(free)] * len(gaps), style="dots"),
-                    )
-                ],
-            )
-            for side, of_side in zip(AXES["side"], areas, strict=True)
-        ],
-        x=Axis("gap, mm"),
-        y=Axis("safe nodes, %"),
-        note="Safe areas of all spectra.",
     )

@@ -97,11 +97,6 @@ def _when(t: Floats, values: Floats, level: float) -> float:
     return float(t[i]) if i == 0 else float(np.interp(level, values[near], t[near]))
 
 
-def _between(m: Motion, name: str, start: float, end: float) -> float:
-    channel = getattr(m, name)
-    return float(np.interp(end, m.t, channel) - np.interp(start, m.t, channel))
-
-
 def _apart(one: Floats, other: Floats) -> float:
     rows = min(len(one), len(other))
     return float(np.max(np.abs(one[:rows] - other[:rows])))
@@ -180,17 +175,15 @@ ROCK = Scene(
     duration=2.5,
     output_step=1e-3,
 )
-#: Angular velocity from rest that just reaches the balance point.
-CRITICAL = math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter
-
-
-#: By name, a block that is set in motion so that it just falls, or just does not.
+#: By name, a block that is set in motion so that it just falls, or just does not: at a part of the
+#: angular velocity from rest that just reaches the balance point.
 FLICKED = {
     name: Scene(
         name=name,
         block=SLENDER,
         floor=Floor(friction=0.6),
-        initial_angular_velocity=part * CRITICAL,
+        initial_angular_velocity=part
+        * (math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter),
         duration=6.0,
     )
     for name, part in (("tip", 1.03), ("return", 0.97))
@@ -367,7 +360,7 @@ PHENOMENA: dict[str, Phenomenon] = {
                     output_step=0.05,
                 ),
             ),
-            lambda m: 3.6e6 * _between(m, "x", 5.0, 10.0) / 5.0,
+            lambda m: 3.6e6 * np.diff(np.interp([5.0, 10.0], m.t, m.x))[0] / 5.0,
             0.0,
             1.0,
             "mm an hour",
@@ -607,7 +600,7 @@ PHENOMENA: dict[str, Phenomenon] = {
                     output_step=1e-3,
                 ),
             ),
-            lambda m: _between(m, "theta", LANDS + 0.01, LANDS + 0.03) / 0.02,
+            lambda m: np.diff(np.interp([LANDS + 0.01, LANDS + 0.03], m.t, m.theta))[0] / 0.02,
             0.0,
             None,
             "rad/s",

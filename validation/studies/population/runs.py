@@ -456,7 +456,6 @@ Numbers = tuple[tuple[str, float], ...]
 MOST_ROWS = 2000
 #: Runs of one task, at the most.
 MOST_RUNS = 256
-_SEED = 1
 #: Name of the runs by the other law of impacts, among the models; and the law that is compared.
 LAW, OTHER_LAW = "impact law", {"impacts": "floor-first"}
 
@@ -633,7 +632,7 @@ class Asked(Study):
             return ()
         from scipy.stats import qmc
 
-        sobol = qmc.Sobol(len(first.spreads), seed=np.random.default_rng(_SEED))
+        sobol = qmc.Sobol(len(first.spreads), seed=np.random.default_rng(1))
         for row in (values := first.values(sobol.random(self.samples))):
             first.at(row)  # names a draw that is no scene
         return tuple(tuple(zip(first.names, row, strict=True)) for row in values.tolist())

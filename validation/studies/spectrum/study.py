@@ -66,14 +66,6 @@ NEAR = 2
 MAPPED, MAP_SIZE = 8, 25
 #: All shares and maps, as JSON keeps them (`agree`).
 Agreement = Mapping[str, Any]
-#: Of a book's nodes: spectra and motions by panel, what the paper's sentences ask for, and the
-#: agreement of the other models.
-_Found = tuple[
-    dict[Panel, Spectrum],
-    dict[Panel, tiles.Played],
-    measures.Paper | None,
-    Agreement | None,
-]
 
 
 @dataclass(frozen=True)
@@ -152,8 +144,15 @@ class Spectra(Study):
         """The name of a spectrum's files: the panel's, and the model's unless it is the paper's."""
         return panel.name + ("" if self.request.model == "ebm" else f"--{self.request.model}")
 
-    def _found(self, book: Book) -> _Found:
-        """All that follows from the nodes played; the book lists those still to be played."""
+    def _found(
+        self, book: Book
+    ) -> tuple[
+        dict[Panel, Spectrum], dict[Panel, tiles.Played], measures.Paper | None, Agreement | None
+    ]:
+        """Spectra and motions by panel, what the paper's sentences ask for, and the agreement.
+
+        All follows from the nodes played; the book lists those still to be played.
+        """
         spectra = {
             panel: one for panel in self.panels if (one := self._spectrum(book, panel)) is not None
         }

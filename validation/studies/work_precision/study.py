@@ -112,8 +112,8 @@ class WorkPrecision(Study):
     def _batches(self) -> Iterator[Task]:
         nodes = 20 if self.quick else timings.NODES
         yield from (
-            Measure("batch", case.name, nodes, where="timed", expected=nodes**2 / 1000.0)
-            for case in timings.CASES
+            Measure("batch", name, nodes, where="timed", expected=nodes**2 / 1000.0)
+            for name in timings.CASES
         )
         yield from (
             Measure("size", f"{threads}", size, where="timed", expected=6e-5 * size)
@@ -189,11 +189,11 @@ class WorkPrecision(Study):
             (_models, plain),
             (_converged, walls),
             (_batches, times),
-            (_cold_starts, starts),
-            (_sizes, sizes),
-            (_saved, saved),
         )
-        blocks = [*itertools.chain.from_iterable(part(some) for part, some in parts if some)]
+        blocks = [
+            *itertools.chain.from_iterable(part(some) for part, some in parts if some),
+            *(table for table in _timings(starts, sizes, saved) if table.rows),
+        ]
         return Finding(
             self.name,
             f"Benchmark{'' if self.what == 'all' else f': {self.what}'}"
@@ -451,7 +451,7 @@ def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
 
 
 def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
-    best = [row for case in timings.CASES if (row := timings.at_level(times, case.name))]
+    best = [row for name in timings.CASES if (row := timings.at_level(times, name))]
     yield Table(
         "batches-at-level",
         [
@@ -485,11 +485,11 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
                 "",
                 [
                     Series(
-                        f"{case.name}: {case.words}",
-                        [row.error_95 for row in shown if row.case == case.name],
-                        [1e6 * row.cpu for row in shown if row.case == case.name],
+                        f"{name}: {words}",
+                        [row.error_95 for row in shown if row.case == name],
+                        [1e6 * row.cpu for row in shown if row.case == name],
                     )
-                    for case in timings.CASES
+                    for name, (words, *_) in timings.CASES.items()
                 ],
             )
         ],
@@ -499,7 +499,11 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
     yield _table("batch-times", pd.DataFrame(times), title="All tolerances", on="page", folded=True)
 
 
-def _cold_starts(starts: Sequence[timings.ColdStart]) -> Iterator[Block]:
+def _timings(
+    starts: Sequence[timings.ColdStart],
+    sizes: Sequence[timings.BatchSize],
+    saved: Sequence[timings.Saving],
+) -> Iterator[Table]:
     yield Table(
         "cold-starts",
         [
@@ -510,9 +514,6 @@ def _cold_starts(starts: Sequence[timings.ColdStart]) -> Iterator[Block]:
         [[start.cache, start.importing, start.first_simulation] for start in starts],
         "Cold starts",
     )
-
-
-def _sizes(sizes: Sequence[timings.BatchSize]) -> Iterator[Block]:
     threads = sorted({one.threads for one in sizes})
     wall = {(one.runs, one.threads): 1e6 * one.wall for one in sizes}
     yield Table(
@@ -529,9 +530,6 @@ def _sizes(sizes: Sequence[timings.BatchSize]) -> Iterator[Block]:
         "Random pulses, packing included.",
         on="page",
     )
-
-
-def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
     yield Table(
         "savings",
         [
@@ -555,7 +553,7 @@ def _saved(found: Sequence[timings.Saving]) -> Iterator[Block]:
                 one.change,
                 one.remark,
             ]
-            for one in found
+            for one in saved
         ],
         "What a scene does not need",
         f"Not measured: {'; '.join(timings.NOT_MEASURED)}.",

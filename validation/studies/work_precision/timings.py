@@ -53,19 +53,6 @@ SIZES, QUICK_SIZES = (1, 10, 100, 1000, 10_000, 100_000, 1_000_000), (1, 100, 10
 
 
 @dataclass(frozen=True)
-class BatchCase:
-    """A batch: what it is, and the model's settings.
-
-    `scene` is played under a grid of pulses; None: El Centro at several scales, to the end.
-    """
-
-    name: str
-    words: str
-    settings: dict[str, Any]
-    scene: Scene | None = None
-
-
-@dataclass(frozen=True)
 class BatchTime:
     """A batch at one tolerance: cost of a trajectory, and its error.
 
@@ -134,13 +121,15 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
 
 
 BESIDE = PLAIN.replace(walls=(Wall(side="left", gap=0.053),))
-CASES = (
-    BatchCase("pure rocking", "no slip, no wall", {"friction": "no-slip"}, PLAIN),
-    BatchCase("friction", "μ 0.3, no wall", {}, PLAIN),
-    BatchCase("wall", "μ 0.3, left wall at 53 mm, e 0", {}, BESIDE),
-    BatchCase("unilateral, wall", "the same, unilateral", {"pivot": "unilateral"}, BESIDE),
-    BatchCase("El Centro", "31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}),
-)
+#: The batches by name: what each is, the model's settings, and the scene that is played under a
+#: grid of pulses; None: El Centro at several scales, to the end.
+CASES: dict[str, tuple[str, dict[str, Any], Scene | None]] = {
+    "pure rocking": ("no slip, no wall", {"friction": "no-slip"}, PLAIN),
+    "friction": ("μ 0.3, no wall", {}, PLAIN),
+    "wall": ("μ 0.3, left wall at 53 mm, e 0", {}, BESIDE),
+    "unilateral, wall": ("the same, unilateral", {"pivot": "unilateral"}, BESIDE),
+    "El Centro": ("31 s of El Centro × 1.4 to 1.8, μ 0.3, to the end", {}, None),
+}
 
 
 def batch_size(runs: int, threads: int) -> BatchSize:
@@ -163,10 +152,10 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     Its runs are `nodes` pulses along each axis of the grid, or `nodes` scales of El Centro. All
     tolerances are played in turn with the timing of one right-hand side.
     """
-    case = next(case for case in CASES if case.name == name)
-    reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **case.settings)
-    if case.scene is not None:
-        packed = pack_pulses(case.scene, reference_model, *grid(case.scene, nodes))
+    _, settings, pulsed = CASES[name]
+    reference_model = EventBasedModel(tolerance=REFERENCE_TOLERANCE, **settings)
+    if pulsed is not None:
+        packed = pack_pulses(pulsed, reference_model, *grid(pulsed, nodes))
     else:
         scene = load_scene("fig4a")
         whole = scene.replace(duration=scene.excitation.quiet_after)
@@ -177,7 +166,7 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
             ],
             reference_model,
         )
-    play = partial(run_batch, packed, until_decided=case.scene is not None, strict=False, jobs=1)
+    play = partial(run_batch, packed, until_decided=pulsed is not None, strict=False, jobs=1)
     reference = play(reference_model)
     costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
     ground = natural.base_of(PLAIN).horizontal
@@ -189,7 +178,7 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     for _ in range(ROUNDS):
         ones.append(1e-6 * median(right_hand_side() for _ in range(5)))
         for tolerance in TOLERANCES:
-            model = EventBasedModel(tolerance=tolerance, **case.settings)
+            model = EventBasedModel(tolerance=tolerance, **settings)
             began, began_cpu = time.perf_counter(), time.process_time()
             found[tolerance] = play(model)
             costs[tolerance].append((time.process_time() - began_cpu, time.perf_counter() - began))
@@ -200,7 +189,7 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
         )
         rows.append(
             BatchTime(
-                case=case.name,
+                case=name,
                 tolerance=tolerance,
                 runs=len(packed.durations),
                 cpu=cpu,
