@@ -323,17 +323,27 @@ def likelier_side(paper: Paper) -> Measured:
     Up to an amplitude, up to a frequency, and in all.
     """
     rows, ends, whole, a = [], [], [], paper.amplitudes
-    for mu, outcomes in zip(AXES["friction"], paper.alone, strict=True):
+    for mu, outcomes, falls in zip(AXES["friction"], paper.alone, paper.falls_alone, strict=True):
         left, right = (np.mean(outcomes == side, axis=1) for side in (LEFT, RIGHT))
         gain = np.cumsum(right - left) > 0.0  # over amplitudes from the lowest up to each
         until = a[np.flatnonzero(gain)[-1]] if gain.any() else 0.0
+        # the lowest overturning by frequency, up to that at which the lead of one side is largest
+        some = np.flatnonzero(falls.any(axis=0))
+        clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
+        lead = np.cumsum(np.where(clockwise, 1, -1))
+        count = int(np.argmax(lead)) + 1
         rows += [
             Row(
                 f"μ {mu:g}, lower amplitudes",
                 f"clockwise up to a_p of {until:.1f} g tan α",
                 bool(until > 0.0),
             ),
-            _lowest(paper, mu, outcomes),
+            Row(
+                f"μ {mu:g}, the lowest overturning",
+                f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of"
+                f" {paper.frequencies[some[count - 1]]:.1f}",
+                bool(lead[count - 1] > 0),
+            ),
             Row(
                 f"μ {mu:g}, a_p from {a[0]:g} to {a[-1]:g} g tan α",
                 f"clockwise {share(right)} of the nodes, counterclockwise {share(left)}",
@@ -358,24 +368,6 @@ def likelier_side(paper: Paper) -> Measured:
         if wall.mean() < none.mean()
         else "",
     }
-
-
-def _lowest(paper: Paper, mu: float, outcomes: NDArray[np.int8]) -> Row:
-    """At how many frequencies the lowest overturning is clockwise.
-
-    Counted up to the frequency at which the lead of that side is largest.
-    """
-    falls = outcomes != SAFE
-    some = np.flatnonzero(falls.any(axis=0))
-    clockwise = outcomes[np.argmax(falls, axis=0)[some], some] == RIGHT
-    lead = np.cumsum(np.where(clockwise, 1, -1))
-    count = int(np.argmax(lead)) + 1
-    return Row(
-        f"μ {mu:g}, the lowest overturning",
-        f"clockwise at {np.sum(clockwise[:count])} of {count} frequencies, up to ω_p/p of"
-        f" {paper.frequencies[some[count - 1]]:.1f}",
-        bool(lead[count - 1] > 0),
-    )
 
 
 def near_one_impact(spectrum: Spectrum) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

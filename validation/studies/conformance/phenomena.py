@@ -301,14 +301,6 @@ def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Moti
     return float(sum(seen(m) != one for m, one in zip(motions, must, strict=True)))
 
 
-def _integral(scene: Scene) -> bool:
-    """Whether the sine overturns the needle before its first impact."""
-    t = np.linspace(0.0, scene.excitation.quiet_after, 20001)
-    return overturns_without_impact(
-        NEEDLE_P * t, scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
-    )
-
-
 COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
 
 #: By their names.
@@ -680,7 +672,13 @@ PHENOMENA: dict[str, Phenomenon] = {
             "overturning without impact",
             SINES,
             lambda *ms: _wrong(
-                map(_integral, SINES),
+                (
+                    overturns_without_impact(
+                        NEEDLE_P * t, base.acceleration(t) / (G * NEEDLE.alpha)
+                    )
+                    for base in (scene.excitation for scene in SINES)
+                    for t in (np.linspace(0.0, base.quiet_after, 20001),)
+                ),
                 # whether it overturns without having tipped to the other side
                 lambda m: (
                     falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)

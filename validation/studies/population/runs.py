@@ -276,15 +276,14 @@ def lines_of(
     A quantile is the smallest peak that the share of the motions does not exceed. A line ends where
     the block falls.
     """
-    x, signs = levels.tolist(), (1, -1)
+    x = levels.tolist()
     quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
     known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
     lines = [
-        (name, sign, line)
-        for name, both in zip(motions, known.tolist(), strict=True)
-        for sign, line in zip(signs, both, strict=True)
+        (name, sign, line, fell)
+        for name, *both in zip(motions, known.tolist(), np.isinf(peaks).tolist(), strict=True)
+        for sign, line, fell in zip((1, -1), *both, strict=True)
     ]
-    fell = iter(np.isinf(peaks).ravel().tolist())
     return [
         Plot(
             "lines",
@@ -295,7 +294,7 @@ def lines_of(
                     [
                         *(
                             Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
-                            for name, sign, line in lines
+                            for name, sign, line, _ in lines
                         ),
                         *(
                             Series(f"{100.0 * share:g} %", x, line, style=style)
@@ -319,9 +318,9 @@ def lines_of(
                 *map(Column, ("direction", "intensity", "peak_rotation_alpha", "overturned")),
             ],
             [
-                [name, sign, level, peak, int(next(fell))]
-                for name, sign, line in lines
-                for level, peak in zip(x, line, strict=True)
+                [name, sign, level, peak, int(over)]
+                for name, sign, line, fell in lines
+                for level, peak, over in zip(x, line, fell, strict=True)
             ],
             on="file",
         ),
@@ -747,19 +746,19 @@ def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...
     side, colon, numbers = text.rpartition(":")
     known = [wall.side for wall in scene.walls]
     sides: tuple[Any, ...] = (side,) if colon else tuple(known)
-    if colon and side not in get_args(Side):
-        raise InputError(f"{side!r} is not allowed: left or right", "--gaps")
     try:
         gaps = sorted({float(word) for word in numbers.split(",")})
     except ValueError:
         gaps = [-1.0]
-    if not all(0.0 <= gap < np.inf for gap in gaps):
-        raise InputError(
-            f"{text!r} is not allowed: clear gaps in m, 0 or more, with commas between", "--gaps"
-        )
-    if not sides:
-        raise InputError(
-            f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"
-        )
+    for wrong, said in (
+        (colon and side not in get_args(Side), f"{side!r} is not allowed: left or right"),
+        (
+            not all(0.0 <= gap < np.inf for gap in gaps),
+            f"{text!r} is not allowed: clear gaps in m, 0 or more, with commas between",
+        ),
+        (not sides, f"the scene has no wall: say on which side, as in left:{numbers}"),
+    ):
+        if wrong:
+            raise InputError(said, "--gaps")
     new = [Wall(side=one, gap=gaps[-1]) for one in sides if one not in known]
     return tuple(gaps), sides, scene.replace(walls=[*scene.walls, *new])

@@ -174,23 +174,18 @@ def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray
 
 
 def _motions(found: Sequence[Motion | None]) -> Played:
-    moved = [motion for motion in found if motion is not None]
-    ends = np.cumsum([len(motion.rows) for motion in moved], dtype=int)
-    kept, content = ends, b""
-    if moved:
-        rows = np.concatenate([motion.rows for motion in moved])
-        values = rows[:, 1:] / np.repeat(
-            [[one.block.alpha, *[one.block.half_width] * 2] for one in moved],
-            np.diff(ends, prepend=0),
-            axis=0,
-        )
-        chosen = enough(rows[:, 0], values, ends, COARSE)
-        kept, content = np.cumsum(chosen)[ends - 1], rows[chosen].astype("<f4").tobytes()
+    moved = {number: motion for number, motion in enumerate(found) if motion is not None}
+    if not moved:
+        return Played()
+    lengths = [len(motion.rows) for motion in moved.values()]
+    ends, rows = np.cumsum(lengths), np.concatenate([motion.rows for motion in moved.values()])
+    units = [[one.block.alpha, *[one.block.half_width] * 2] for one in moved.values()]
+    chosen = enough(rows[:, 0], rows[:, 1:] / np.repeat(units, lengths, axis=0), ends, COARSE)
     return Played(
         "",
-        tuple(number for number, motion in enumerate(found) if motion is not None),
-        tuple(kept.tolist()),
-        base64.b64encode(content).decode("ascii"),
+        tuple(moved),
+        tuple(np.cumsum(chosen)[ends - 1].tolist()),
+        base64.b64encode(rows[chosen].astype("<f4").tobytes()).decode("ascii"),
     )
 
 

@@ -433,12 +433,11 @@ def audited(scene: Scene) -> Scene:
 
 
 def _contradicts(scene: Scene, history: History) -> bool:
-    kinds = [event.kind for event in history.event_list]
-    falls = [kind for kind in kinds if kind.startswith("overturned")]
+    falls = [one.kind for one in history.event_list if one.kind.startswith("overturned")]
     times = [event.t for event in history.event_list] + [scene.duration * (1.0 + 1e-12)]
     backward = bool(np.any(np.diff(times) < 0.0))
     if history.outcome.startswith("overturned"):
-        return backward or falls != [history.outcome] or kinds[-1] != history.outcome
+        return backward or not falls == [history.outcome] == [history.event_list[-1].kind]
     whole = len(history.channels["t"]) == len(scene.output_times)
     upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
     return backward or bool(falls) or not (whole and upright)
