@@ -144,7 +144,7 @@ def times_table(run: results.Run) -> Table:
 
     The seconds stand below.
     """
-    places = run.by_scene()
+    places = run.by_scene
     taken = {
         model: {
             place: cells[model].cost.wall_seconds
@@ -191,32 +191,30 @@ def measures_table(view: SceneView, against: str) -> Table:
         )
         if figure.against == against
     ]
-    found: dict[tuple[str, str], dict[str, tuple[figures.Figure, results.Check | None]]] = {}
+    firsts: dict[tuple[str, str], figures.Figure] = {}
+    marks: dict[tuple[str, str, str], Mark] = {}
     for model, figure, check in shown:
-        found.setdefault((figure.measure, figure.window), {}).setdefault(model, (figure, check))
+        firsts.setdefault((figure.measure, figure.window), figure)
+        limit = f"limit {number(check.limit)}" if check else ""
+        mark = Mark(
+            f"{number(figure.value, 4)} {unit(figure.unit)}",
+            check.weighs if check and check.verdict != "not defined" else "",
+            more="; ".join(filter(None, [limit, figure.note])),
+        )
+        marks.setdefault((figure.measure, figure.window, model), mark)
     models = list(dict.fromkeys(model for model, *_ in shown))
-    firsts = {key: next(iter(row.values()))[0] for key, row in found.items()}
     return Table(
         "measures",
         [text("measure"), *map(Column, models)],
         [
             [
                 Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
-                *(_measured(*found[key][m]) if m in found[key] else None for m in models),
+                *(marks.get((*key, model)) for model in models),
             ]
-            for key in sorted(found, key=lambda key: (key[0], firsts[key].until or math.inf))
+            for key in sorted(firsts, key=lambda key: (key[0], firsts[key].until or math.inf))
         ],
         f"All measures against {label_of(against)}",
         folded=True,
-    )
-
-
-def _measured(figure: figures.Figure, check: results.Check | None) -> Mark:
-    limit = f"limit {number(check.limit)}" if check else ""
-    return Mark(
-        f"{number(figure.value, 4)} {unit(figure.unit)}",
-        check.weighs if check and check.verdict != "not defined" else "",
-        more="; ".join(filter(None, [limit, figure.note])),
     )
 
 
@@ -317,16 +315,20 @@ DEVIATIONS: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
 PEAKS = "overview-peaks"
 
 
-def matrix(run: results.Run) -> dict[str, list[Entry | None]]:
-    """By scene: an entry for each model of the run, None where it does not play the scene."""
-    cells = run.by_scene()
+def matrix(run: results.Run, scenes: Iterable[str] = ()) -> dict[str, dict[str, Entry]]:
+    """By scene and model: an entry for each cell of these scenes, or of all."""
+    cells = run.by_scene
     return {
-        scene: [entry(run, cells.get(scene, {}), model) for model in run.models]
-        for scene in run.scenes
+        scene: {
+            model: entry(run, cells[scene], model)
+            for model in run.models
+            if model in cells.get(scene, ())
+        }
+        for scene in scenes or run.scenes
     }
 
 
-def glance(run: results.Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict[str, Any]:
+def glance(run: results.Run, rows: Mapping[str, Mapping[str, Entry]]) -> dict[str, Any]:
     """The answers that the index gives first; `rows` are the run's `matrix`.
 
     The entry `farthest` from the reference, the scenes whose outcome depends on the model (`apart`,
@@ -336,14 +338,14 @@ def glance(run: results.Run, rows: Mapping[str, Sequence[Entry | None]]) -> dict
     others = (
         one
         for row in rows.values()
-        for one in row
-        if one and one["cell"].model != run.reference and one["rms"]
+        for one in row.values()
+        if one["cell"].model != run.reference and one["rms"]
     )
     accepted = [(cell, check) for cell, check in run.checks() if check.expected is not None]
     return {
         "farthest": max(others, key=lambda one: one["rms"].value, default=None),
         "apart": [
-            (at, row) for at, row in rows.items() if any(one and one["apart"] for one in row)
+            (at, row) for at, row in rows.items() if any(one["apart"] for one in row.values())
         ],
         "changed": sorted(
             (pair for pair in accepted if _moved(pair[1])), key=lambda pair: -used(pair[1])
@@ -364,8 +366,8 @@ def _moved(check: results.Check) -> bool:
     )
 
 
-def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> Entry | None:
-    """How far a model lies from the run's reference in a scene; None where it does not play it.
+def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> Entry:
+    """How far a model lies from the run's reference in a scene, which it plays.
 
     `cells` are those of the scene, by model. Of its `cell`: `rms`, the RMS difference of rotation,
     is the judged figure of the shortest window, else the one of the `whole` time; `ratio` is that
@@ -375,10 +377,8 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     `why_apart`. `nearest` is the check that uses most of its limit, `used` that share; infinite
     where there is no history.
     """
-    cell, against = cells.get(model), run.reference
-    if cell is None:
-        return None
-    figures, of = all_figures(cell), ("theta_rms", against)
+    cell, figures, against = cells[model], all_figures(cells[model]), run.reference
+    of = "theta_rms", against
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")

@@ -81,7 +81,7 @@ class View:
     @cached_property
     def cells(self) -> tuple[results.Cell, ...]:
         """Its cells, in the models' order."""
-        return self.run.of_scene(self.name)
+        return tuple(self.run.by_scene.get(self.name, {}).values())
 
     @cached_property
     def looks(self) -> dict[str, Look]:
@@ -408,10 +408,10 @@ def scene_views(
     slugs = slugs_of(run.scenes)
     names = [name for name in run.scenes if chosen is None or name in chosen]
     share = max(most_values / max(1, len(names)), 20_000.0)
-    views = []
+    views, cells = [], run.by_scene
     for name in names:
         scene = run.load_scene(name)
-        models = max(1, sum(cell.status == "done" for cell in run.of_scene(name)))
+        models = max(1, sum(cell.status == "done" for cell in cells.get(name, {}).values()))
         values = (scene.duration / scene.output_step + 1.0) * ((len(CHANNELS) + 2) * models)
         views.append(
             SceneView(run, name, slugs[name], scene, folder, max(1, math.ceil(values / share)))

@@ -78,10 +78,10 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
                 *config.getoption("--rockcheck-allow-code"),
             ],
         )
-        cell = runner.run_suite(
+        finished = runner.run_suite(
             loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict
-        ).cell(scene, model)
-        assert cell is not None
+        )
+        cell = finished.by_scene[scene][model]
         if wrong := list(tables.cell_lines(cell, strict)):
             pytest.fail("\n".join(wrong), pytrace=False)
         if all(check.verdict == "not defined" for check in cell.checks):

@@ -33,7 +33,7 @@ from rockcheck.commands import (
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, printable
 from rockcheck.validation.finding import Finding, Text
-from rockcheck.validation.suite import acceptance, across, results, runner, suites, tables
+from rockcheck.validation.suite import across, results, runner, suites, tables
 
 
 @dataclass(frozen=True)
@@ -251,7 +251,7 @@ def accept(
     """
     loaded, folder = _suite(suite, OfScene(), played.out, allow_code or ())
     finished = play(loaded, folder, played)
-    changes, refused = acceptance.accept(loaded, finished, reason, write=not dry_run)
+    changes, refused = suites.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
     told(
         Finding(

@@ -108,7 +108,7 @@ def test_runs_of_two_suites_are_not_compared(refused):
 )
 def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, names, kept):
     run = results.Run.load("a")
-    near = run.cell("short", "near")
+    near = run.by_scene["short"]["near"]
 
     def reached(peak: float) -> results.Run:
         figure = figures.Figure(

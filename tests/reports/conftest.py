@@ -260,12 +260,13 @@ def make_run(folder, duration=12.0):
         ensembles=(ensemble,),
         faults=("tolerance [old.cm.ebm: theta_rms] has no cell in the suite",),
         measures=(
-            figures.MeasureRecord(
-                name="theta_rms",
-                label="RMS difference of rotation",
-                unit="angle",
-                formula="sqrt <d^2> of theta, in alpha.",
-            ),
+            {
+                "name": "theta_rms",
+                "label": "RMS difference of rotation",
+                "unit": "angle",
+                "formula": "sqrt <d^2> of theta, in alpha.",
+                "source": "",
+            },
         ),
         versions={"rockcheck": "0.1.0", "python": "3.11", "mujoco": "4.0.0"},
         hardware={"processor": f"made up {NASTY}", "cores": "2"},

@@ -242,7 +242,7 @@ def test_a_block_that_falls_is_shown_up_to_its_fall(visit):
 
 
 def test_a_measured_history_is_dots(opened, tmp_path, finished):
-    cell = finished.cell("free", "cm")
+    cell = finished.by_scene["free"]["cm"]
     history = History.load(tmp_path / cell.history)
     table = dataclasses.replace(
         history,

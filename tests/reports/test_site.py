@@ -67,7 +67,7 @@ def test_index_lists_what_is_wrong_worst_first(run, index):
 
 
 def test_index_says_how_far_each_model_is(run, index):
-    rows = {scene: dict(zip(run.models, row, strict=True)) for scene, row in matrix(run).items()}
+    rows = matrix(run)
     assert set(rows) == set(run.scenes)
     late, falling = rows["beside a wall"]["mine:Model"], rows["Free"]["ebm"]
     assert (late["rms"].window, late["rms"].value, late["used"]) == (
@@ -75,8 +75,8 @@ def test_index_says_how_far_each_model_is(run, index):
         pytest.approx(0.006),
         pytest.approx(3.0),
     )
-    assert rows["free"]["mine:Model"] is None
-    outcomes = {run.cell("Free", model).outcome for model in ("ebm", "ebm-unilateral")}
+    assert "mine:Model" not in rows["free"]
+    outcomes = {run.by_scene["Free"][model].outcome for model in ("ebm", "ebm-unilateral")}
     assert (falling["why_apart"], falling["apart"]) == ("", len(outcomes) > 1)
     worst = dict(re.findall(r'<tr data-scene="(.*?)" data-worst="(.*?)">', index))
     # Of the last one a model has no history.
@@ -88,7 +88,7 @@ def test_index_answers_three_questions_first(run, index):
     farthest = found["farthest"]["cell"]
     assert (farthest.scene, farthest.model) == ("beside a wall", "mine:Model")
     assert [scene for scene, _ in found["apart"]] == [
-        scene for scene, row in matrix(run).items() if any(one and one["apart"] for one in row)
+        scene for scene, row in matrix(run).items() if any(one["apart"] for one in row.values())
     ]
     verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
     shares = [tables.used(check) for _, check in found["changed"]]
@@ -115,7 +115,7 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
         cell.model_copy(
             update={"checks": tuple(check.model_copy(update=missing) for check in cell.checks)}
         )
-        for cell in finished.of_scene("free")
+        for cell in finished.by_scene["free"].values()
     ]
     finished.model_copy(
         update={
@@ -188,7 +188,9 @@ def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_g
 
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
     left = again(
-        scenes={"free": finished.scenes["free"]}, cells=finished.of_scene("free"), ensembles=()
+        scenes={"free": finished.scenes["free"]},
+        cells=tuple(finished.by_scene["free"].values()),
+        ensembles=(),
     )
     assert sorted(left) == [
         "data/free.js",
@@ -271,7 +273,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
     view = EnsembleView(run, "crowd", "crowd", record)
     (row,) = view.page().table("data/crowd-against-ebm-unilateral").records()
     reference, other = (np.array(record.peaks[m]) > 1.0 for m in ("ebm-unilateral", "cm"))
-    figures = {f.measure: f.value for f in run.cell("crowd", "cm").figures}
+    figures = {f.measure: f.value for f in run.by_scene["crowd"]["cm"].figures}
     expected = {
         "both fall": np.sum(reference & other),
         "only the reference falls": np.sum(reference & ~other),

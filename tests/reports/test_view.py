@@ -17,7 +17,6 @@ from rockcheck.reports.site import PAGES, write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import (
     accuracy,
-    entry,
     glance,
     matrix,
     times_table,
@@ -69,14 +68,14 @@ def test_a_figure_that_is_as_it_was_accepted_has_not_changed_though_its_limit_is
 def test_a_run_that_ends_during_a_fall_says_so(run, last, outcome, apart):
     """Two models fall to one side, one of them after the scene's end: the outcome does not depend
     on the model."""
-    own = run.cell("Free", "ebm")
+    own = run.by_scene["Free"]["ebm"]
     figure = figures.Figure(
         measure="last_rotation", label="last rotation", unit="alpha", value=last
     )
     change = {"outcome": "moving", "overturned_at": None, "figures": (*own.figures, figure)}
     cells = [own.model_copy(update=change) if one is own else one for one in run.cells]
     changed = run.model_copy(update={"cells": tuple(cells)})
-    found = entry(changed, changed.by_scene()["Free"], "ebm")
+    found = matrix(changed)["Free"]["ebm"]
     assert (found["outcome"], found["apart"]) == (outcome, apart)
 
 

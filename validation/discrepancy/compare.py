@@ -89,8 +89,16 @@ def compare(
     for key, history in (("reference", reference), ("candidate", candidate)):
         errors.check_kind(history, History, "simulate or History.load", key)
     blocks = [one.block for one in (reference, candidate) if one.block is not None]
-    if scene is None and len(blocks) == 2:
-        _check_same(*blocks)
+    if scene is None and len(blocks) == 2 and not _same(*blocks):
+        said = (
+            ", ".join(
+                f"{key} = {value}" for key, value in one.model_dump(exclude_none=True).items()
+            )
+            for one in blocks
+        )
+        raise InputError(
+            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
+        )
     if until is not None and not until > 0.0:
         raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
     pair = Pair(reference, candidate, scene, math.inf if until is None else until)
@@ -114,22 +122,13 @@ def compare(
     )
 
 
-def _check_same(one: Block, other: Block) -> None:
-    """Raise `InputError` if blocks differ by more than the digits of a hand-written file."""
+def _same(one: Block, other: Block) -> bool:
+    """Whether blocks differ by no more than the digits of a hand-written file."""
     first, second = (
         (block.half_width, block.half_height, *block.offset, block.gyration_squared)
         for block in (one, other)
     )
-    if not np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius):
-        said = (
-            ", ".join(
-                f"{name} = {value}" for name, value in block.model_dump(exclude_none=True).items()
-            )
-            for block in (one, other)
-        )
-        raise InputError(
-            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
-        )
+    return np.allclose(first, second, rtol=1e-6, atol=1e-9 * one.radius)
 
 
 def describe(

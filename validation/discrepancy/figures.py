@@ -13,7 +13,6 @@ from itertools import compress
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import ConfigDict
 
 from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, kinematics
 
@@ -21,10 +20,8 @@ from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, kinem
 NOT_DEFINED = "not defined here"
 
 
-class Stored(Frozen):
-    """A value of `run.json`; a float that is not finite is written as null."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="null")
+#: A value of `run.json`; pydantic writes a float that is not finite as null.
+Stored = Frozen
 
 
 def value_words(value: float | None, *, yes_no: bool) -> str:
@@ -32,16 +29,6 @@ def value_words(value: float | None, *, yes_no: bool) -> str:
     if value is None:
         return "-"
     return ("yes" if value else "no") if yes_no else f"{value:.6g}"
-
-
-class MeasureRecord(Stored):
-    """How a measure is defined, for the pages: see `validation.discrepancy.measures`."""
-
-    name: str
-    label: str
-    unit: str
-    formula: str
-    source: str = ""
 
 
 class Figure(Stored):
@@ -95,14 +82,10 @@ TURNS = ("overturned left", "overturned right")
 
 
 class Unavailable(Exception):
-    """The measure cannot be computed from these histories; the message says what is missing."""
+    """The measure cannot be computed from these histories; the message says what is missing.
 
-
-class Undefined(Unavailable):
-    """The measure is undefined for these histories, as a ratio to zero: no pass and no fail."""
-
-    def __init__(self, why: str) -> None:
-        super().__init__(f"{NOT_DEFINED}: {why}")
+    One that begins with `NOT_DEFINED`: it is undefined for them, neither a pass nor a fail.
+    """
 
 
 @dataclass(frozen=True)
@@ -203,10 +186,6 @@ class WindowedHistory:
             if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
         ]
 
-    def strong(self, kind: str) -> float:
-        """The number of impacts that are not weak (`WEAK_IMPACT`)."""
-        return float(sum(_strong(self.events(kind))))
-
     def heights(self) -> Floats:
         """Height of the lowest corner above the floor, m."""
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
@@ -248,7 +227,7 @@ class Pair:
 
     @property
     def rocking(self) -> Floats:
-        """`theta`; raises `Undefined` where the reference's peak is too small to divide by."""
+        """`theta`; raises `Unavailable` where the reference's peak is too small to divide by."""
         floor = Measure.resolution
         if self.alpha is not None and len(self.time) > 1:
             g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
@@ -259,7 +238,7 @@ class Pair:
                 ),
             )
         if np.max(np.abs(self.theta[0])) <= floor:
-            raise Undefined("the reference does not rotate")
+            raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
         return self.theta
 
     @cached_property
@@ -342,14 +321,14 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
             partners[i] = j
             taken.add(j)
     only_reference, only_candidate = (
-        [e for n, e in compress(enumerate(events), _strong(events)) if n not in matched]
+        [e for n, e in compress(enumerate(events), strong(events)) if n not in matched]
         for events, matched in ((reference, partners), (candidate, taken))
     )
     pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
     return pairs, only_reference, only_candidate
 
 
-def _strong(impacts: Sequence[Event]) -> list[bool]:
+def strong(impacts: Sequence[Event]) -> list[bool]:
     """Which impacts are not weak (`WEAK_IMPACT`) among those of their kind."""
     kinds = {event.kind for event in impacts}
     most = {k: max(abs(event.impulse) for event in impacts if event.kind == k) for k in kinds}

@@ -30,11 +30,6 @@ def _peak(columns: Floats) -> float:
     return float(np.max(np.abs(columns[1] - columns[0])))
 
 
-def _peak_ratio(pair: figures.Pair) -> float:
-    reference, candidate = np.max(np.abs(pair.rocking), axis=1).tolist()
-    return float(candidate / reference)
-
-
 def _hausdorff(pair: figures.Pair) -> float:
     p = pair.known.block.weaker_pivot.frequency_parameter(pair.known.gravity)
     first, second = (np.column_stack([p * pair.time, column]) for column in pair.theta)
@@ -65,11 +60,6 @@ def _agree_until(pair: figures.Pair) -> tuple[float, str]:
     alone = (pair.reference, only_reference), (pair.candidate, only_candidate)
     found = [(e.t, f"{e.kind} only in {h.model}") for h, events in alone for e in events]
     return min(found, default=(pair.end, "all events agree"))
-
-
-def _unmatched(pair: figures.Pair) -> tuple[float, str]:
-    pairs, only_reference, only_candidate = pair.impacts
-    return float(len(only_reference) + len(only_candidate)), f"{len(pairs)} impacts matched"
 
 
 def _impact_time(pair: figures.Pair) -> tuple[float, str]:
@@ -201,7 +191,7 @@ DIFFERENCES = figures.by_name(
         "ratio of peak rotations",
         "1",
         "max |c| / max |r| of theta.",
-        _peak_ratio,
+        lambda pair: float(np.max(np.abs(pair.rocking[1])) / np.max(np.abs(pair.rocking[0]))),
         ideal=1.0,
     ),
     figures.Measure(
@@ -232,7 +222,10 @@ DIFFERENCES = figures.by_name(
         "1",
         "Number of impacts of either that have no counterpart in the other, matched as in"
         " `events_agree_until`.",
-        _unmatched,
+        lambda pair: (
+            float(sum(map(len, pair.impacts[1:]))),
+            f"{len(pair.impacts[0])} impacts matched",
+        ),
         resolution=0.0,
     ),
     figures.Measure(
@@ -340,7 +333,7 @@ FIGURES = figures.by_name(
         "floor impacts",
         "1",
         "Number of floor impacts stronger than 1 % of the strongest.",
-        lambda motion: motion.strong("floor impact"),
+        lambda motion: float(sum(figures.strong(motion.events("floor impact")))),
         resolution=0.0,
     ),
     _quantity(
@@ -348,7 +341,7 @@ FIGURES = figures.by_name(
         "wall impacts",
         "1",
         "Number of wall impacts stronger than 1 % of the strongest.",
-        lambda motion: motion.strong("wall impact"),
+        lambda motion: float(sum(figures.strong(motion.events("wall impact")))),
         resolution=0.0,
     ),
     _quantity(
@@ -454,10 +447,12 @@ def _flat_start(motion: figures.WindowedHistory, what: str, *, walls: int) -> tu
 
 
 def _stopped(motion: figures.WindowedHistory, scene: Scene, speed: float) -> None:
-    """Raises `Undefined` if the window ends before friction has taken `speed` (m/s)."""
+    """Raises `Unavailable` if the window ends before friction has taken `speed` (m/s)."""
     reached = scene.floor.friction * scene.gravity * float(motion.channel("t")[-1])
     if motion.history.overturned_at is None and reached <= speed:
-        raise figures.Undefined("the window ends before the block has stopped")
+        raise figures.Unavailable(
+            f"{figures.NOT_DEFINED}: the window ends before the block has stopped"
+        )
 
 
 def _released(motion: figures.WindowedHistory) -> tuple[Scene, Pivot, Pivot]:
@@ -570,8 +565,9 @@ class Samples:
         r, c = self.reference, self.candidate
         rocks, too = (~sample.fallen & (sample.peaks > SMALLEST_PEAK) for sample in (r, c))
         if np.sum(rocks) < 2:
-            raise figures.Undefined(
-                "fewer than two scenes in which the reference rocks and does not fall"
+            raise figures.Unavailable(
+                f"{figures.NOT_DEFINED}: fewer than two scenes in which the reference rocks and"
+                " does not fall"
             )
         usable = rocks & too
         if np.sum(usable) < 2:
@@ -598,10 +594,6 @@ def _ks_distance(samples: Samples) -> tuple[float, str]:
     ranks = np.unique(np.concatenate([r, c]), return_inverse=True)[1]
     found = scipy.stats.ks_2samp(ranks[: len(r)], ranks[len(r) :])
     return float(found.statistic), f"p = {found.pvalue:.2g}"
-
-
-def _area_metric(samples: Samples) -> tuple[float, str]:
-    return float(scipy.stats.wasserstein_distance(*_distributions(samples, 1.0))), ""
 
 
 def _share(hits: NDArray[np.bool_], of: int) -> tuple[float, str]:
@@ -650,7 +642,7 @@ STATISTICS = figures.by_name(
         "1",
         "Area between the distribution functions of peak |theta|/alpha (ASME V&V 10-2006; Ferson"
         " 2008), the fallen at 1, the balance point.",
-        _area_metric,
+        lambda two: (float(scipy.stats.wasserstein_distance(*_distributions(two, 1.0))), ""),
         resolution=1e-4,
     ),
     _agreement(

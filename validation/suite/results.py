@@ -20,14 +20,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePath
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import Cost, InputError, Scene, errors, printable, reading, writing
 from rockcheck.validation.discrepancy import impact_laws, measures
-from rockcheck.validation.discrepancy.figures import Figure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 
@@ -58,6 +58,8 @@ SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error
 #: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
 #: closed form. "absolute": a figure of the cell itself against its expected value.
 Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
+#: What is said of a measure.
+Said = Literal["name", "label", "unit", "formula", "source"]
 
 
 class Check(Stored):
@@ -180,7 +182,8 @@ class Cell(Stored):
         """The worst of the cell's checks; "error" if the model failed, "incomplete" if missing."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
-        return worst(check.weighs for check in self.checks)
+        weighed: list[Verdict] = [check.weighs for check in self.checks]
+        return max(weighed, key=SEVERITY.index, default="pass")
 
     @property
     def words(self) -> str:
@@ -232,7 +235,8 @@ class Run(Stored):
     models: tuple[str, ...]
     cells: tuple[Cell, ...]
     faults: tuple[str, ...] = ()
-    measures: tuple[MeasureRecord, ...] = ()
+    #: How each measure is defined, for the pages: see `validation.discrepancy.measures`.
+    measures: tuple[Annotated[dict[Said, str], Field(min_length=5)], ...] = ()
     versions: dict[str, str] = Field(default_factory=dict)
     hardware: dict[str, str] = Field(default_factory=dict)
     wall_seconds: float = 0.0
@@ -255,7 +259,7 @@ class Run(Stored):
         weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
         judged = any(check.verdict != "not defined" for _, check in self.checks())
         wrong = bool(self.faults) or (self.judged and not judged)
-        return worst(weighed + (["fail"] if wrong else []))
+        return max([*weighed, "fail" if wrong else "pass"], key=SEVERITY.index)
 
     @property
     def words(self) -> str:
@@ -287,22 +291,13 @@ class Run(Stored):
         """How many cells were read back."""
         return sum(cell.read_back for cell in self.cells)
 
-    def cell(self, scene: str, model: str) -> Cell | None:
-        """The cell of that scene and model, or None."""
-        return next(
-            (cell for cell in self.cells if (cell.scene, cell.model) == (scene, model)), None
-        )
-
+    @property
     def by_scene(self) -> dict[str, dict[str, Cell]]:
-        """All cells by scene or ensemble, and by model, in order; for loops over all cells."""
+        """All cells by scene or ensemble, and by model, in the suite's order."""
         found: dict[str, dict[str, Cell]] = {}
         for cell in self.cells:
             found.setdefault(cell.scene, {})[cell.model] = cell
         return found
-
-    def of_scene(self, scene: str) -> tuple[Cell, ...]:
-        """The cells of one scene, in the models' order."""
-        return tuple(cell for cell in self.cells if cell.scene == scene)
 
     @property
     def without_tolerance(self) -> int:
@@ -381,11 +376,6 @@ def value_of(
         ),
         None,
     )
-
-
-def worst(verdicts: Iterator[Any] | list[Any]) -> Verdict:
-    """The most severe verdict; "pass" if there is none."""
-    return max(verdicts, key=SEVERITY.index, default="pass")
 
 
 def _by_line(value: Any, depth: int = 2) -> str:

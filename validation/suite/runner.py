@@ -25,7 +25,7 @@ from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.scenes import History, InputError, ModelFailure, NonNegative, Scene, progress
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
-from rockcheck.validation.discrepancy.figures import Figure, Measure, MeasureRecord, Stored
+from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
@@ -511,12 +511,18 @@ class SuiteStudy(Study):
             inputs=inputs,
             printed=tuple(name for name in suite.scenes if self.own[name].given.print_figures),
             faults=tuple(
-                f"tolerance [{place}] has no cell in the suite"
+                f"tolerance [{'.'.join(place[:3])}: {place.what}] has no cell in the suite"
                 for place in suite.tolerances
                 if (place.scene, place.model) not in there
             ),
             measures=tuple(
-                MeasureRecord(name=m.name, label=m.label, unit=m.unit, formula=m.formula)
+                {
+                    "name": m.name,
+                    "label": m.label,
+                    "unit": m.unit,
+                    "formula": m.formula,
+                    "source": "",
+                }
                 for m in tolerances.MEASURES.values()
             ),
             versions=provenance.versions(),

@@ -77,6 +77,7 @@ from rockcheck.validation.suite.tolerances import (
     OWN_FIGURES,
     Place,
     Tolerances,
+    accepted_in,
     measure_of,
     parse_tolerances,
 )
@@ -282,8 +283,9 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except errors.InputError as error:
-        beside = f"{printable(path.parent)}{os.sep}"
-        told = str(error).startswith((beside, f"{printable(path)}: "))
+        # What begins with the name of a file, this one or one beside it, has no key and no quote.
+        file, beside = str(error).partition(": ")[0], f"{printable(path.parent)}{os.sep}"
+        told = file.startswith(beside) or not (error.key or "'" in file)
         raise errors.InputError(str(error) if told else f"{printable(path)}: {error}") from None
 
 
@@ -365,6 +367,34 @@ def scene_suite(
         for name, one in suite.models.items()
     }
     return replace(suite, models=variants, judged=False)
+
+
+def accept(
+    suite: Suite, run: results.Run, reason: str | None, *, write: bool = True
+) -> tuple[list[str], list[str]]:
+    """Write the figures of `run` into the tolerance file of `suite`.
+
+    Returns the changes and the refusals, a line each. A change is new, tightened (to a better
+    value), loosened (a wider limit) or moved (another expected value); the last two need a
+    `reason`, which goes into the file. A check without a figure, and a line that would not pass
+    now, is always refused; a figure that is not defined needs no line. Without `write` the file
+    stays as it is.
+    """
+    checks = [pair for pair in run.checks() if pair[1].verdict != "not defined"]
+    found = [
+        accepted_in(
+            part.tolerances_path,
+            [(c, one) for c, one in checks if c.scene in part.scenes or c.scene in part.ensembles],
+            reason,
+            nested=part.tolerances_path == part.path,
+            write=write,
+        )
+        for part in suite.parts
+    ]
+    changes, refused = (
+        list(itertools.chain.from_iterable(lines)) for lines in zip(*found, strict=True)
+    )
+    return changes, refused
 
 
 def is_scene(source: str) -> bool:

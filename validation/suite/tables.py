@@ -25,7 +25,7 @@ def shown(run: results.Run) -> tuple[str, ...]:
 
     Those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
     """
-    cells, ensembles = run.by_scene(), {ensemble.name for ensemble in run.ensembles}
+    cells, ensembles = run.by_scene, {ensemble.name for ensemble in run.ensembles}
     badness = {
         place: (
             max(results.SEVERITY.index(cell.verdict) for cell in models.values()),
@@ -40,7 +40,7 @@ def shown(run: results.Run) -> tuple[str, ...]:
 
 def not_shown(run: results.Run) -> list[str]:
     """A line with the number of scenes that are not `shown`; empty if there are none."""
-    more = len(run.by_scene()) - len(shown(run))
+    more = len(run.by_scene) - len(shown(run))
     said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
     return [said] if more else []
 
@@ -52,7 +52,7 @@ def finding_of(run: results.Run) -> Finding:
         return Finding(
             "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), wrong]
         )
-    cells = run.by_scene()
+    cells = run.by_scene
     rows = [
         ["" if n else scene, *_verdict_row(cell)]
         for scene in shown(run)
@@ -109,7 +109,7 @@ def _limit_used(check: results.Check) -> float | str:
 def outcome_tables(run: results.Run) -> Iterator[Table]:
     """A table per scene, a row per model: outcome, peak rotation, difference from the reference."""
     columns = [*map(text, ("model", "outcome")), *map(Column, ("peak", "apart", "took"))]
-    for scene, cells in run.by_scene().items():
+    for scene, cells in run.by_scene.items():
         rows = []
         for cell in cells.values():
             known, done = outcome_row(cell, run.reference), cell.status == "done"
@@ -288,7 +288,7 @@ def junit(run: results.Run) -> str:
     """
     suites: list[tuple[str, list[writing.Case]]] = [
         (scene, [case for cell in cells.values() for case in _cases(cell, run.strict)])
-        for scene, cells in run.by_scene().items()
+        for scene, cells in run.by_scene.items()
     ]
     faults: list[writing.Case] = [
         ("tolerances", fault, "failed", fault, "", None) for fault in run.faults
@@ -331,7 +331,7 @@ def markdown(run: results.Run) -> str:
         rest = [f"- and {more} more, in junit.xml"] if more > 0 else []
         items = [*(f"- {_plain(one)}" for one in lines[:MOST_SHOWN]), *rest]
         parts += [*heading, "\n".join(items)] if lines else []
-    cells, places = run.by_scene(), shown(run)
+    cells, places = run.by_scene, shown(run)
     rows = (
         (_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models))
         for scene in places

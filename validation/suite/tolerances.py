@@ -37,9 +37,22 @@ import math
 import re
 from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from rockcheck.scenes import Finite, Frozen, InputError, NonNegative, Scene, errors, printable
+import tomlkit
+
+from rockcheck.scenes import (
+    Finite,
+    Frozen,
+    InputError,
+    NonNegative,
+    Scene,
+    errors,
+    printable,
+    reading,
+    writing,
+)
 from rockcheck.validation.discrepancy import figures, measures
 from rockcheck.validation.suite import results
 from rockcheck.validation.uncertainty.numerical import Numerical
@@ -88,7 +101,7 @@ class Place(NamedTuple):
     what: str
 
     def __str__(self) -> str:
-        return f"{self.scene}.{self.model}.{self.against}: {self.what}"
+        return f"[{self.scene}.{self.model}.{self.against}] {self.what}"
 
 
 Tolerances = dict[Place, Tolerance]
@@ -106,8 +119,6 @@ def parse_tolerances(
     for place, line in _spread(dict(_lines(tables)), list(cells)):
         try:
             measure = measure_of(place.what)
-            if not isinstance(line, Mapping):
-                raise InputError("must be a table { expected, limit, drift, why }")
             tolerance = Tolerance(**line)
             if (measure.name in measures.FIGURES) != (place.against == OWN_FIGURES):
                 raise InputError(
@@ -116,26 +127,24 @@ def parse_tolerances(
             if measure.ideal is None and measure.sense == "at most" and tolerance.expected is None:
                 raise InputError("is missing", "expected")
         except InputError as error:
-            where = f"[{'.'.join(place[:3])}] {place.what}"
-            raise InputError(f"{printable(where)}: {error}") from None
+            raise InputError(f"{printable(place)}: {error}") from None
         found[place] = tolerance
     return found
 
 
 def _spread(
-    lines: Mapping[Place, Any], cells: Sequence[tuple[str, str]]
-) -> Iterator[tuple[Place, Any]]:
+    lines: Mapping[Place, Mapping[str, Any]], cells: Sequence[tuple[str, str]]
+) -> Iterator[tuple[Place, Mapping[str, Any]]]:
     """The lines, with those for every scene repeated for each cell of the model.
 
     A scene's own line takes precedence; what it leaves out comes from the line for every scene.
     """
     own = {place: line for place, line in lines.items() if place.scene != EVERY}
     for place, line in own.items():
-        yield place, _over(lines.get(place._replace(scene=EVERY)), line)
+        yield place, {**lines.get(place._replace(scene=EVERY), {}), **line}
     completed = {place[1:] for place in own}
     for place, line in lines.items():
-        completes = place[1:] in completed and isinstance(line, Mapping) and "limit" not in line
-        if place in own or completes:
+        if place in own or (place[1:] in completed and "limit" not in line):
             continue
         scenes = [scene for scene, model in cells if model == place.model]
         # Without a cell the line stays as it is, and is reported as a tolerance without a cell.
@@ -143,20 +152,17 @@ def _spread(
         yield from ((one, line) for one in every if one not in own)
 
 
-def _over(below: Any, line: Any) -> Any:
-    both = isinstance(below, Mapping) and isinstance(line, Mapping)
-    return {**below, **line} if both else line
-
-
-def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Any]]:
+def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Mapping[str, Any]]]:
     for name, inner in tables.items():
         path = (*above, str(name))
-        if len(path) == len(Place._fields):
-            yield Place(*path), inner
-        elif isinstance(inner, Mapping):
-            yield from _lines(inner, *path)
-        else:
-            raise InputError(f"{printable('.'.join(path))}: must be tables [scene.model.reference]")
+        whole = len(path) == len(Place._fields)
+        if not isinstance(inner, Mapping):
+            raise InputError(
+                f"{printable(Place(*path))}: must be a table {{ expected, limit, drift, why }}"
+                if whole
+                else f"{printable('.'.join(path))}: must be tables [scene.model.reference]"
+            )
+        yield from [(Place(*path), inner)] if whole else _lines(inner, *path)
 
 
 def floor_of(measure: figures.Measure, scene: Scene, numerical: Numerical | None) -> float:
@@ -289,3 +295,130 @@ def apart(value: float, expected: float, floor: float, zero: float = 0.0) -> flo
         return abs(value - expected)
     beyond = [math.copysign(max(abs(size) - floor, 0.0), size) for size in (one, other)]
     return abs(beyond[0] - beyond[1])
+
+
+# `accept`: the figures of a run become the expected ones. The file keeps its comments and order.
+
+#: Limit and drift band of a new line: multiples of a difference from the perfect value, and of a
+#: cell's own figure.
+ROOM, DRIFT = 2.0, 0.2
+OWN_ROOM, OWN_DRIFT = 0.02, 0.002
+#: The least limit and drift band of new lines: multiples of the measure's resolution, and a share
+#: of the limit.
+LEAST_LIMIT, LEAST_DRIFT, LEAST_SHARE = 10.0, 1.0, 0.01
+
+
+def accepted_in(
+    path: Path,
+    checks: Iterable[tuple[results.Cell, results.Check]],
+    reason: str | None,
+    *,
+    nested: bool,
+    write: bool,
+) -> tuple[list[str], list[str]]:
+    """Write the figures of these checks into a tolerance file; see `suites.accept`.
+
+    `nested`: into the table `[tolerances]` of a suite file. Raises `InputError` where that fails.
+    """
+    changes, refused = list[str](), list[str]()
+    document = tomlkit.parse(reading.read_text(path)) if path.exists() else tomlkit.document()
+    tables: Any = document.setdefault("tolerances", tomlkit.table()) if nested else document
+    for cell, check in checks:
+        against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
+        where = Place(cell.scene, cell.model, against, check.figure.windowed)
+        old = {name: getattr(check, name) for name in Tolerance.model_fields}
+        if isinstance(line, str):
+            refused.append(f"{where}: {line}")
+        elif line != old:
+            changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
+            entry = tomlkit.inline_table()
+            entry.update(line)
+            table = (
+                tables.setdefault(cell.scene, tomlkit.table(is_super_table=True))
+                .setdefault(cell.model, tomlkit.table(is_super_table=True))
+                .setdefault(against, tomlkit.table())
+            )
+            table[check.figure.windowed] = entry
+    if write and changes:
+        try:
+            writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
+        except OSError as error:
+            raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    return changes, refused
+
+
+def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
+    """The new line of a check, or why there is none."""
+    value, new = check.figure.value, check.limit is None
+    if value is None or not math.isfinite(value) or check.gap:
+        return check.gap or check.reason
+    worse = check.verdict in ("fail", "changed") and not new
+    if worse and not reason:
+        return f"{check.reason}; moving what is expected needs --reason"
+    why = (reason or "first accepted figure") if new else (reason if worse else check.why)
+    expected = value if check.verdict != "pass" or check.expected is None else check.expected
+    limit, drift = _bounds(check, value)
+    line: dict[str, Any] = {
+        "expected": float(f"{expected:.8g}"),
+        "limit": limit,
+        "drift": drift,
+        "why": why,
+    }
+    again = judge(
+        check.figure,
+        Tolerance(**line),
+        kind=check.kind,
+        measure=MEASURES[check.figure.measure],
+        floor=check.floor,
+    )
+    return line if again.verdict == "pass" else again.reason
+
+
+def _bounds(check: results.Check, value: float) -> tuple[float, float]:
+    """Limit and drift band of the new line: the old ones, of a better error tighter if need be.
+
+    The room of a first line where there is none, or where the limit is exceeded.
+    """
+    measure = MEASURES[check.figure.measure]
+    size, at_least = abs(value - (measure.ideal or 0.0)), measure.sense == "at least"
+    room, band = (OWN_ROOM, OWN_DRIFT) if measure.ideal is None else (ROOM, DRIFT)
+    limit = (
+        _round(0.9 * value, down=True)
+        if at_least
+        else _round(max(room * size, LEAST_LIMIT * measure.resolution))
+    )
+    drift = _round(max(band * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+    if measure.yes_no:
+        limit, drift = size, 0.0  # 0: must be yes; 1: need not be
+    tighter = check.verdict == "better" and measure.role == "error"
+    if check.limit is not None and check.verdict != "fail":
+        stricter = max if at_least else min
+        limit = stricter(check.limit, limit) if tighter else check.limit
+    if check.drift is not None:
+        drift = min(check.drift, drift) if tighter else check.drift
+    return limit, drift
+
+
+def _named(check: results.Check, line: Mapping[str, Any]) -> str:
+    if check.limit is None:
+        return "new"
+    at_least = MEASURES[check.figure.measure].sense == "at least"
+    if line["limit"] < check.limit if at_least else line["limit"] > check.limit:
+        return "loosened"
+    return "tightened" if check.weighs == "pass" else "moved"
+
+
+def _round(value: float, down: bool = False) -> float:
+    """`value` with two digits, rounded up (or down)."""
+    unit = 10.0 ** (math.floor(math.log10(abs(value) or 1.0)) - 1)
+    steps = math.floor(value / unit) if down else math.ceil(value / unit * (1.0 - 1e-12))
+    return float(f"{steps * unit:.2g}")
+
+
+def _shown(line: Mapping[str, Any]) -> str:
+    if line["limit"] is None:
+        return "none"
+    return ", ".join(
+        f"{name} {'-' if line[name] is None else line[name]}"
+        for name in ("expected", "limit", "drift")
+    )

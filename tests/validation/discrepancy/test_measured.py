@@ -85,10 +85,10 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
     t, theta = (truth.channels[name][truth.channels["t"] <= 1.6] for name in ("t", "theta"))
     write(tmp_path / "table.csv", "time_s,theta_deg", t + 0.4, np.rad2deg(theta))
     run = run_suite(suites.load_suite(path), tmp_path / "out", jobs=1)
-    assert run.cell("other", "table") is None
+    assert "table" not in run.by_scene["other"]
     assert [
         (check.figure.window, check.kind, check.verdict, check.reason)
-        for check in run.cell("tilt", "table").checks
+        for check in run.by_scene["tilt"]["table"].checks
     ] == [
         ("1.5s", "measured", "pass", ""),
         (
@@ -102,7 +102,7 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
     write(tmp_path / "table.csv", "time_s,theta_deg", [0.3, 0.9], [0.0, 0.0])
     assert (
         not run_suite(suites.load_suite(path), tmp_path / "out", jobs=1)
-        .cell("tilt", "table")
+        .by_scene["tilt"]["table"]
         .read_back
     )
     truth.save(tmp_path / "truth.csv")

@@ -11,7 +11,6 @@ from scipy.stats import ttest_1samp
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.suite import suites
-from rockcheck.validation.suite.acceptance import accept
 from rockcheck.validation.suite.runner import run_suite
 
 OWN = [
@@ -153,14 +152,14 @@ def test_a_measured_history_takes_no_part_in_an_ensemble(loaded):
 def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
     suite = loaded(SUITE.partition("[tolerances")[0])
     first = run_suite(suite, tmp_path / "out", jobs=0)
-    assert first.cell("crowd", "near").verdict == "fail"
-    changes, refused = accept(suite, first, None)
+    assert first.by_scene["crowd"]["near"].verdict == "fail"
+    changes, refused = suites.accept(suite, first, None)
     assert ([change.partition(":")[0] for change in changes], refused) == (
         ["[crowd.near.still] ks_distance", "[crowd.near.still] overturning_accuracy"],
         [],
     )
     accepted = suites.load_suite(tmp_path / "mine.toml", allow_code=OWN)
-    assert run_suite(accepted, tmp_path / "out", jobs=0).cell("crowd", "near").verdict == "pass"
+    assert run_suite(accepted, tmp_path / "out", jobs=0).by_scene["crowd"]["near"].verdict == "pass"
 
 
 def samples(

@@ -84,10 +84,10 @@ def run(suite_file):
     ],
 )
 def test_the_law_that_each_model_followed_is_in_its_cell(run, scene, laws):
-    found = [cell.impact_law for cell in run.of_scene(scene) if cell.impact_law]
+    found = [cell.impact_law for cell in run.by_scene[scene].values() if cell.impact_law]
     assert tuple(law.law for law in found) == laws
     assert len({law.t for law in found}) <= 1
-    notes = [figure.note for cell in run.of_scene(scene) for figure in cell.figures]
+    notes = [figure.note for cell in run.by_scene[scene].values() for figure in cell.figures]
     assert any("impacts = " in note for note in notes) == bool(laws)
 
 
@@ -101,7 +101,7 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run, scene, laws):
 def test_outcomes_and_peaks_are_judged_by_the_nearest_law_and_histories_until_they_part(
     run, scene, law, outcomes, near
 ):
-    reference, cell = run.cell(scene, "ebm-unilateral"), run.cell(scene, law)
+    reference, cell = run.cell(scene, "ebm-unilateral"), run.by_scene[scene][law]
     assert reference.outcome != cell.outcome
     assert outcomes in (None, (reference.outcome, cell.outcome))
     assert {check.verdict for check in cell.checks} == {"pass"}

@@ -96,7 +96,7 @@ def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run, where):
         "NotFinite": "theta is nan at t = 0.5 s",
         "Odd": "notes.0: 1 is not allowed: input should be a valid string",
     }
-    assert (done.cell("short", "Still").verdict, done.exit_code) == ("pass", 3)
+    assert (done.by_scene["short"]["Still"].verdict, done.exit_code) == ("pass", 3)
 
 
 @pytest.mark.parametrize("strict", [False, True])
@@ -162,7 +162,7 @@ def test_the_digest_of_our_code_is_kept_and_a_damaged_one_is_not_believed(tmp_pa
 def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
     path = write_suite(tmp_path, STILL, FINE.format(model="a"))
     path.write_text(path.read_text().replace("Still", "Fails", 1))
-    (check,) = run(path).cell("short", "a").checks
+    (check,) = run(path).by_scene["short"]["a"].checks
     assert (check.verdict, check.reason) == ("fail", "still failed in this scene")
 
 

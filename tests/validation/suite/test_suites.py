@@ -100,11 +100,14 @@ def test_faults_are_one_line_with_the_file(suite, fault_of, text, fault):
     assert (fault in message, message.count("mine.toml")) == (True, "gone.toml" not in message)
 
 
-def test_a_fault_names_a_file_in_a_folder_called_like_a_key(
+def test_a_fault_names_one_file_also_in_a_folder_called_like_a_key_and_in_the_working_folder(
     written, tmp_path, monkeypatch, fault_of
 ):
     (tmp_path / "scenes").mkdir()
     monkeypatch.chdir(written("scenes/mine.toml", MODELS).parents[1])
-    assert str(fault_of(suites.load_suite, "scenes/mine.toml")).startswith(
-        "scenes/mine.toml: scenes: no scene"
-    )
+    written("mine.toml", 'scenes = ["gone.toml"]\n' + MODELS)
+    faults = (str(fault_of(suites.load_suite, name)) for name in ("scenes/mine.toml", "mine.toml"))
+    assert [said.split(": ")[:2] for said in faults] == [
+        ["scenes/mine.toml", "scenes"],
+        ["gone.toml", "cannot be read"],
+    ]

@@ -9,7 +9,6 @@ import pytest
 
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.suite import results, suites, tolerances
-from rockcheck.validation.suite.acceptance import accept
 
 LINE = tolerances.Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 
@@ -89,7 +88,7 @@ def accepted(written):
         part = SimpleNamespace(
             path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
         )
-        return *accept(SimpleNamespace(parts=[part]), run, reason), path.read_text("utf-8")
+        return *suites.accept(SimpleNamespace(parts=[part]), run, reason), path.read_text("utf-8")
 
     return accept_of
 
