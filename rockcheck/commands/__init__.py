@@ -135,7 +135,7 @@ def answer(value: Any) -> None:
     Numbers that are not finite become null.
     """
     if _voice.get() == "json":
-        print(writing.json_text(value))
+        print(writing.json_text(value), flush=True)  # before what stderr has to say
 
 
 #: Time between two lines of progress, s; and before the first one, which is printed only if more
@@ -220,15 +220,18 @@ def studied(study: Study, options: Played, **how: Any) -> NoReturn:
     told(found, folder)
 
 
-def told(found: Finding, folder: Path | None = None) -> NoReturn:
-    """Write a finding's page if it has a folder, print the finding, and end with its exit code."""
+def told(found: Finding, folder: Path | None = None, value: Any = None) -> NoReturn:
+    """Write a finding's page if it has a folder, print the finding, and end with its exit code.
+
+    As JSON it is its `value`, by default all that it holds.
+    """
     from rockcheck.reports.document import publish, show
 
     page = folder and publish(found, folder)
     show(found, console())
     if page:
         console().print(f"report: {page}", soft_wrap=True)
-    answer(found.as_dict() | {"report": page})
+    answer(value or found.as_dict() | {"report": page})
     raise typer.Exit(found.exit_code)
 
 

@@ -3,17 +3,16 @@
 Each command is a function of a module of rockcheck.commands.
 """
 
-import importlib
 import inspect
 import itertools
 import os
+import pkgutil
 import re
 import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, cast, get_type_hints
@@ -25,29 +24,28 @@ from rockcheck.commands import console, report_file, speaking
 from rockcheck.scenes import InputError, ModelFailure, printable, progress
 from rockcheck.validation.suite import results
 
-#: The commands, in the order of the help: where each is below this package, a module with
-#: its function `run` or another function of one; and an example.
+#: The commands, in the order of the help: module and function below this package; an example.
 COMMANDS = {
-    "scenes": ("simulate.scenes", "rockcheck scenes"),
-    "new": ("simulate.new", "rockcheck new bookcase.toml"),
-    "record": ("record", "rockcheck record station.V2 --read component=1 --plot station.png"),
+    "scenes": ("simulate:scenes", "rockcheck scenes"),
+    "new": ("simulate:new", "rockcheck new bookcase.toml"),
+    "record": ("record:run", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
-        "simulate",
+        "simulate:run",
         "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
     ),
-    "compare": ("compare", "rockcheck compare ebm.csv mujoco.csv --until 8"),
-    "validate": ("validate", "rockcheck validate smoke --out rockcheck-report"),
-    "accept": ("validate.accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "assess": ("studies.assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
-    "spectrum": ("studies.spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
-    "benchmark": ("studies.benchmark", "rockcheck benchmark --quick"),
+    "compare": ("compare:run", "rockcheck compare ebm.csv mujoco.csv --until 8"),
+    "validate": ("validate:run", "rockcheck validate smoke --out rockcheck-report"),
+    "accept": ("validate:accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
+    "assess": ("studies:assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
+    "spectrum": ("studies:spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
+    "benchmark": ("studies:benchmark", "rockcheck benchmark --quick"),
     "conformance": (
-        "studies.conformance",
+        "studies:conformance",
         "rockcheck conformance --engine mujoco --set settings=default",
     ),
-    "stress": ("studies.stress", "rockcheck stress --quick"),
-    "report": ("validate.report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
-    "warm": ("simulate.warm", "rockcheck warm"),
+    "stress": ("studies:stress", "rockcheck stress --quick"),
+    "report": ("validate:report", "rockcheck report rockcheck-report --scene fig4a -o fig4a.pdf"),
+    "warm": ("simulate:warm", "rockcheck warm"),
 }
 
 #: Replacements of removed commands and options.
@@ -169,18 +167,6 @@ class _EachOnce(typer.core.TyperCommand):
         return super().parse_args(ctx, args)
 
 
-@cache
-def _loaded(name: str) -> Any:
-    where, example = COMMANDS[name]
-    module, _, function = where.partition(".")
-    does = getattr(importlib.import_module(f"rockcheck.commands.{module}"), function or "run")
-    alone = typer.Typer(rich_markup_mode=None, add_completion=False)
-    alone.command(name=name, cls=_EachOnce, epilog=f"Example: {example}")(
-        spoken(does, timed=name not in AT_ONCE)
-    )
-    return typer.main.get_command(alone)
-
-
 class _Commands(typer.core.TyperGroup):
     """The commands by name.
 
@@ -198,7 +184,15 @@ class _Commands(typer.core.TyperGroup):
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         if cmd_name in GONE:
             raise InputError(f"the command {cmd_name} is gone: {GONE[cmd_name]}")
-        return _loaded(cmd_name) if cmd_name in COMMANDS else None
+        if cmd_name not in COMMANDS:
+            return None
+        where, example = COMMANDS[cmd_name]
+        does = pkgutil.resolve_name(f"rockcheck.commands.{where}")
+        alone = typer.Typer(rich_markup_mode=None, add_completion=False)
+        alone.command(name=cmd_name, cls=_EachOnce, epilog=f"Example: {example}")(
+            spoken(does, timed=cmd_name not in AT_ONCE)
+        )
+        return typer.main.get_command(alone)
 
 
 app = typer.Typer(
@@ -244,7 +238,6 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
             standalone_mode=False,
             obj=time.perf_counter() if began is None else began,
         )
-        print(end="", flush=True)  # a full disk shows itself here
     except (typer.TyperException, InputError) as error:
         return _told(
             error.format_message() if isinstance(error, typer.TyperException) else str(error), 2

@@ -51,15 +51,17 @@ def run(
     Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a
     file does not say is given by --read. --plot draws acceleration, velocity and Sa(T).
     """
+    from rockcheck.reports import document
+
     if plot is not None:
         check_file(plot, "--plot")
     reading = recordings.Reading(**dict(setting_of(word, "--read") for word in read or ()))
     asked = sets.files_of(files)
     known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
     found = [(path, one) for path, components in known.items() for _, one in components]
-    values = [_values(path, record) for path, record in found]
-    for (path, record), value in zip(found, values, strict=True):
-        _show(path, record, value)
+    told = [_finding(path, record) for path, record in found]
+    for one in told:
+        document.show(one, console())
     if plot is not None and found:
         from rockcheck.reports.show.drawing import recordings_figure
 
@@ -70,15 +72,20 @@ def run(
             plot,
         )
     if found:
+        values = [one.data for one in told]
         answer(values[0] if len(values) == 1 else {"records": values})
     if faults:
         tell_left_out([*map(sets.Odd, faults[1:])])
-        more = f"; {len(faults)} files of {len(asked)} are not read" if len(faults) > 1 else ""
+        more = f"; {len(faults)} files of {len(asked)} are not read" * (len(faults) > 1)
         raise InputError(f"{faults[0]}{more}")
 
 
-def _values(path: Path, record: recordings.Recording) -> dict[str, Any]:
-    return {
+def _finding(path: Path, record: recordings.Recording) -> Finding:
+    # The largest acceleration in each part of the motion, as bars.
+    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
+    peaks = np.array([np.max(part) for part in parts])
+    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
+    value: dict[str, Any] = {
         "file": path,
         "format": record.form,
         "component": record.component,
@@ -96,14 +103,6 @@ def _values(path: Path, record: recordings.Recording) -> dict[str, Any]:
         "notes": record.notes,
     }
 
-
-def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> None:
-    from rockcheck.reports.document import show
-
-    # The largest acceleration in each part of the motion, as bars.
-    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
-    peaks = np.array([np.max(part) for part in parts])
-    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
     rows = [
         ("format", f"{value['format']}, unit {value['unit']}"),
         (
@@ -118,15 +117,8 @@ def _show(path: Path, record: recordings.Recording, value: dict[str, Any]) -> No
         *(("note", printable(note, 200)) for note in record.notes),
     ]
     title = f"{path}, {record.component}" if record.component else str(path)
-    show(
-        Finding(
-            "record",
-            title,
-            "",
-            [Text(title), Table("record", [text("record"), text("value", " ")], rows)],
-        ),
-        console(),
-    )
+    table = Table("record", [text("record"), text("value", " ")], rows)
+    return Finding("record", title, "", [Text(title), table], value)
 
 
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:

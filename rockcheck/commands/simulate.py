@@ -26,6 +26,7 @@ from rockcheck.commands import (
     save_figure,
     scene_names,
     setting_of,
+    told,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
@@ -38,7 +39,6 @@ from rockcheck.validation.finding import Column, Finding, Table, text
 
 def scenes() -> None:
     """List the named scenes, suites and models, with a line each."""
-    from rockcheck.reports.document import show
     from rockcheck.validation.suite.suites import named_suites
 
     listings = {
@@ -53,8 +53,10 @@ def scenes() -> None:
         Table(title, [text(title), text("about", " ")], list(rows.items()), most=len(rows))
         for title, rows in listings.items()
     ]
-    show(Finding("scenes", "", "", tables), console())
-    answer({f"{title}s": rows for title, rows in listings.items()})
+    told(
+        Finding("scenes", "", "", tables),
+        value={f"{title}s": rows for title, rows in listings.items()},
+    )
 
 
 def new(
@@ -217,7 +219,6 @@ def warm(jobs: JobsOption = None) -> None:
     rockcheck; what is compiled already is only looked up. Afterwards no command waits for a
     compiler.
     """
-    from rockcheck.reports.document import show
     from rockcheck.reports.drawers import side_by_side
 
     console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
@@ -230,5 +231,5 @@ def warm(jobs: JobsOption = None) -> None:
             on_progress(len(taken), len(PARTS), name)
     seconds = {name: taken[name] for name in PARTS}
     columns = [text("compiled code for"), Column("s", digits=2)]
-    show(Finding("warm", "", "", [Table("compiled", columns, list(seconds.items()))]), console())
-    answer({"seconds": seconds})
+    table = Table("compiled", columns, list(seconds.items()))
+    told(Finding("warm", "", "", [table]), value={"seconds": seconds})

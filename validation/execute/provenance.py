@@ -82,11 +82,8 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
             user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
             user.mkdir(mode=0o700, parents=True, exist_ok=True)
             kept, name = Store(user, (CODE,)), name_of(module, _of_all_sources())
-            if (found := kept.get_record(CODE, name)) is None:
-                found = {"digest": _digest_of(module, search_path)}
-                kept.put_record(CODE, name, found)
-                kept.prune()
-            return str(found["digest"])
+            kept.prune()
+            return kept.once(CODE, name, str, lambda: _digest_of(module, search_path))
     return _digest_of(module, search_path)
 
 

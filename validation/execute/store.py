@@ -19,13 +19,16 @@ import json
 import re
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter
 
 from rockcheck.scenes import History, InputError, printable, reading, writing
 
+T = TypeVar("T")
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
 RECORDS = "records"
@@ -139,9 +142,20 @@ class Store:
                 path.touch()
         return content if whole else None
 
-    def prune(self, now: float | None = None) -> None:
-        """Remove results unused for two weeks, and temporary files of killed runs after a day."""
-        now = time.time() if now is None else now
+    def once(self, kind: str, name: str, form: Any, compute: Callable[[], T]) -> T:
+        """The kept value of type `form`; computed and kept where it is missing or invalid."""
+        adapter: TypeAdapter[T] = TypeAdapter(form)
+        with contextlib.suppress(KeyError, TypeError, ValueError):
+            return adapter.validate_python((self.get_record(kind, name) or {})["kept"])
+        found = compute()
+        self.put_record(kind, name, {"kept": adapter.dump_python(found, mode="json")})
+        return found
+
+    def prune(self, now: float = 0.0) -> None:
+        """Remove results unused for two weeks, and temporary files of killed runs after a day.
+
+        `now` is a moment to be taken for today's, by `time.time`.
+        """
         for path in [
             *(path for kind in self.kinds for path in (self.folder / kind).iterdir()),
             *self.folder.glob(".*.part"),
@@ -154,7 +168,9 @@ class Store:
             used = record if record.is_file() else path
             # Another run was quicker, or it is a folder, which is not ours.
             with contextlib.suppress(OSError):
-                if now - used.lstat().st_mtime > (86400.0 if path.suffix == ".part" else KEEP):
+                if (now or time.time()) - used.lstat().st_mtime > (
+                    86400.0 if path.suffix == ".part" else KEEP
+                ):
                     path.unlink()
 
 

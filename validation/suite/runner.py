@@ -18,7 +18,6 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.horizon import may_fly, other_laws
@@ -122,16 +121,6 @@ class ComparisonRecord(Stored):
     overturned_at: float | None = None
 
 
-def kept(store: Store, name: str, kind: Any, compute: Callable[[], T]) -> T:
-    """The store's value of type `kind` under that name; computed and kept if missing or invalid."""
-    adapter: TypeAdapter[T] = TypeAdapter(kind)
-    with suppress(KeyError, TypeError, ValueError):
-        return adapter.validate_python((store.get_record(COMPARISONS, name) or {})["kept"])
-    found = compute()
-    store.put_record(COMPARISONS, name, {"kept": adapter.dump_python(found, mode="json")})
-    return found
-
-
 def _of_scene(
     store: Store,
     scene: Scene,
@@ -144,7 +133,7 @@ def _of_scene(
     """A result of type `kind` on a scene, by the code of a module; kept in the store."""
     depends = {"of": what, "code": provenance.code_digest(f"rockcheck.{module}"), **more}
     key = provenance.cell_key(scene, models.REFERENCE, depends)
-    return kept(store, name_of(scene.name, what, key), kind, compute)
+    return store.once(COMPARISONS, name_of(scene.name, what, key), kind, compute)
 
 
 def landing_of(store: Store, scene: Scene) -> impact_laws.Landing | None:
@@ -647,7 +636,7 @@ class SuiteStudy(Study):
         depends = [planned.key, against, sorted(ends.items()), provenance.code_digest(__name__)]
         name = name_of(planned.place, planned.model, provenance.digest(json.dumps(depends)))
         compute = partial(self._figures, planned, asked, ends)
-        return kept(self.store, name, ComparisonRecord, compute)
+        return self.store.once(COMPARISONS, name, ComparisonRecord, compute)
 
     def _figures(
         self,
