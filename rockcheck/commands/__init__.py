@@ -27,7 +27,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from rockcheck.reports.style import ENDINGS, Figure, kind_of, save_as
+from rockcheck.reports.style import ENDINGS, kind_of
 from rockcheck.scenes import InputError, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings import sets
@@ -220,17 +220,23 @@ def studied(study: Study, options: Played, **how: Any) -> NoReturn:
     told(found, folder)
 
 
-def told(found: Finding, folder: Path | None = None, value: Any = None) -> NoReturn:
-    """Write a finding's page if it has a folder, print the finding, and end with its exit code.
+def told(
+    found: Finding,
+    folder: Path | None = None,
+    said: Iterable[tuple[str, Path]] = (),
+    value: Any = None,
+) -> NoReturn:
+    """Print a finding, and where what was written lies; end with the finding's exit code.
 
+    Its page is written first if it has a `folder`; else `said` has the files, each with its kind.
     As JSON it is its `value`, by default all that it holds.
     """
     from rockcheck.reports.document import publish, show
 
     page = folder and publish(found, folder)
     show(found, console())
-    if page:
-        console().print(f"report: {page}", soft_wrap=True)
+    for kind, path in [("report", page)] if page else said:
+        console().print(f"{kind}: {path}", soft_wrap=True)
     answer(value or found.as_dict() | {"report": page})
     raise typer.Exit(found.exit_code)
 
@@ -283,11 +289,6 @@ def check_file(path: Path, option: str, check: Callable[[Path], Any] = kind_of) 
     if not path.parent.is_dir():
         raise InputError(f"{printable(path.parent)}: no such folder", option)
     check(path)
-
-
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure, and say so."""
-    console().print(f"figure: {save_as(figure, path)}", soft_wrap=True)
 
 
 def report_file(text: str) -> str:

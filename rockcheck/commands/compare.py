@@ -6,15 +6,8 @@ from typing import Annotated
 
 import typer
 
-from rockcheck.commands import (
-    PlotOption,
-    answer,
-    check_file,
-    console,
-    save_figure,
-    scene_names,
-    told,
-)
+from rockcheck.commands import PlotOption, check_file, scene_names, told
+from rockcheck.reports.style import save_as
 from rockcheck.scenes import History, InputError, Scene, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
 from rockcheck.validation.discrepancy import figures, measured, measures
@@ -65,8 +58,6 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
-    from rockcheck.reports import document
-
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import study
 
@@ -85,10 +76,8 @@ def run(
     shift = measured.time_shift(given, other) if align == BEST else offset
     found = compare(given, measured.shifted(other, shift), until=until, scene=what)
     finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
-    document.show(finding, console())
-    if plot is not None:
-        save_figure(found.plot(), plot)
-    answer(finding.as_dict())
+    drawn = (("figure", save_as(found.plot(), path)) for path in (plot,) if path)
+    told(finding, said=drawn, value=finding.as_dict())
 
 
 def _finding(

@@ -12,10 +12,10 @@ from rockcheck.commands import (
     answer,
     check_file,
     console,
-    save_figure,
     setting_of,
     tell_left_out,
 )
+from rockcheck.reports.style import save_as
 from rockcheck.scenes import InputError, printable, recordings
 from rockcheck.scenes.recordings import sets
 from rockcheck.validation.finding import Finding, Table, Text, text
@@ -65,12 +65,10 @@ def run(
     if plot is not None and found:
         from rockcheck.reports.show.drawing import recordings_figure
 
-        save_figure(
-            recordings_figure(
-                [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-            ),
-            plot,
+        figure = recordings_figure(
+            [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
         )
+        console().print(f"figure: {save_as(figure, plot)}", soft_wrap=True)
     if found:
         values = [one.data for one in told]
         answer(values[0] if len(values) == 1 else {"records": values})

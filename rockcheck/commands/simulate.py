@@ -9,6 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import resources
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -17,24 +18,22 @@ import typer
 from rockcheck.commands import (
     AllowCodeOption,
     JobsOption,
-    answer,
     check_file,
     console,
     model_names,
     progress,
     report_file,
-    save_figure,
     scene_names,
     setting_of,
     told,
 )
-from rockcheck.reports.style import ENDINGS, FORMATS, kind_of
+from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import LISTENER, ONE_RUN, announcing, within
 from rockcheck.validation.discrepancy.compare import motion_of
 from rockcheck.validation.execute import models, pool, store
-from rockcheck.validation.finding import Column, Finding, Table, text
+from rockcheck.validation.finding import Column, Finding, Table, Text, text
 
 
 def scenes() -> None:
@@ -83,12 +82,12 @@ def new(
     except OSError as error:
         raise errors.InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     scene = files.load_scene(path)
-    console().print(
-        f"{path}: a block of {2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m",
-        soft_wrap=True,
-    )
-    console().print(f"next: rockcheck simulate {path} --model ebm-unilateral", soft_wrap=True)
-    answer({"file": path})
+    size = f"{2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m"
+    lines = [
+        f"{path}: a block of {size}",
+        f"next: rockcheck simulate {path} --model ebm-unilateral",
+    ]
+    told(Finding("new", "", "", [Text(items=lines)]), value={"file": path})
 
 
 def run(
@@ -154,14 +153,13 @@ def run(
         f"{title}: {', '.join([history.fate, *motion.words()])},"
         f" simulated in {history.cost.wall_seconds:.2g} s"
     )
-    for note in history.notes:
-        console().print(f"note: {note}", style="yellow", soft_wrap=True)
-    for path in histories:
-        console().print(f"history: {path}", soft_wrap=True)
-    for path in figures:
-        save_figure(history.plot(), path)
-    answer(
-        {
+    notes = Text(items=[f"note: {note}" for note in history.notes], verdict="changed")
+    written = (("history", path) for path in histories)
+    drawn = (("figure", save_as(history.plot(), path)) for path in figures)
+    told(
+        Finding("simulate", title, "", [notes]),
+        said=chain(written, drawn),
+        value={
             "scene": what.name,
             "model": model,
             "outcome": history.outcome,
@@ -173,7 +171,7 @@ def run(
             "notes": history.notes,
             "history": next(iter(histories), None),
             "files": outputs,
-        }
+        },
     )
 
 

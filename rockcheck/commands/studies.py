@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, NoReturn, get_args
 
 import numpy as np
 import typer
@@ -20,22 +20,22 @@ from rockcheck.commands import (
     JobsOption,
     OutOption,
     Played,
-    answer,
     chosen_models,
     completing,
-    console,
     model_names,
     scene_names,
     setting_of,
     studied,
     tell_left_out,
     tell_missing,
+    told,
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import Scene, errors, files, printable
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models, store
+from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
 from rockcheck.validation.studies.population import answers, runs
 from rockcheck.validation.suite import motions
@@ -466,7 +466,6 @@ def conformance(
 
     if export is not None:
         _export(usable_folder(export))
-        return
     given, folders = dict(map(setting_of, sets or [])), histories or []
     known = () if folders else models.ENGINE_NAMES
     names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
@@ -501,7 +500,7 @@ def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool
             raise errors.InputError(reason, f"--engine {name}")
 
 
-def _export(folder: Path) -> None:
+def _export(folder: Path) -> NoReturn:
     from rockcheck.reports.site import write_scene_file
     from rockcheck.validation.studies.conformance.phenomena import SCENES
     from rockcheck.validation.studies.conformance.study import export
@@ -509,9 +508,11 @@ def _export(folder: Path) -> None:
     for name, scene in SCENES.items():
         write_scene_file(scene, folder, name)
     names = export(folder)
-    console().print(
-        f"{len(names)} scenes in {folder}, README.md says how they are meant; then:\n"
+    lines = [
+        f"{len(names)} scenes in {folder}, README.md says how they are meant; then:",
         f"  rockcheck conformance --histories {folder}",
-        soft_wrap=True,
+    ]
+    told(
+        Finding("export", "", "", [Text(items=lines)]),
+        value={"folder": folder, "scenes": {name: f"{name}.toml" for name in names}},
     )
-    answer({"folder": folder, "scenes": {name: f"{name}.toml" for name in names}})

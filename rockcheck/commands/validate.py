@@ -18,7 +18,6 @@ from rockcheck.commands import (
     ALL,
     AllowCodeOption,
     Played,
-    answer,
     check_file,
     chosen_models,
     completing,
@@ -152,10 +151,12 @@ def run(
             )
     else:
         site.remove_site(folder)
-    console().print(f"report: {page}", soft_wrap=True)
     left_out = {} if suite.judged else {"left_out": suite.left_out}
-    answer({**tables.summary(finished), **left_out, "report": page})
-    raise typer.Exit(finished.exit_code)
+    told(
+        Finding("validate", suite.name, "", exit_code=finished.exit_code),
+        said=[("report", page)],
+        value={**tables.summary(finished), **left_out, "report": page},
+    )
 
 
 def _suite(
@@ -315,5 +316,4 @@ def report(
                 on_progress=on_progress,
             )
     what = "report" if output is None else "figure"
-    console().print(f"{what}: {path}", soft_wrap=True)
-    answer({what: path})
+    told(Finding(what, "", ""), said=[(what, path)], value={what: path})

@@ -12,7 +12,6 @@ import pytest
 import whole_runs
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
-from rockcheck.commands.simulate import new
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
@@ -54,8 +53,8 @@ def test_the_front_picture():
     assert 1e-4 < min(off) <= max(off) < 0.01
 
 
-def test_the_tutorials_bookcase(tmp_path):
-    new(tmp_path / "bookcase.toml")
+def test_the_tutorials_bookcase(tmp_path, told):
+    told("new", str(tmp_path / "bookcase.toml"))
     scene = load_scene(tmp_path / "bookcase.toml")
     reference = UNILATERAL.simulate(scene)
     assert (rounded(reference.peak_rotation / reference.alpha, 2), reference.outcome) == (
