@@ -28,7 +28,7 @@ import numpy as np
 from pydantic import model_validator
 
 from rockcheck.scenes.base import DATA, Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, printable, refuse, suggestion, unknown_name
+from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
@@ -144,28 +144,24 @@ class Spread(Frozen):
 
     @model_validator(mode="after")
     def _one_form(self) -> Spread:
-        value, low, high = (one or 0.0 for one in (self.value, self.low, self.high))
-        missing = [name for name in ("low", "high") if getattr(self, name) is None]
-        spread = self.sd is not None
-        refuse(
-            (spread and len(missing) < 2, "cannot be given together with low and high", "sd"),
-            (spread and self.value is None, "is missing beside sd", "value"),
-            (
-                spread and self.distribution == "lognormal" and value <= 0.0,
-                f"{value:g} is not allowed: a lognormal number is positive",
-                "value",
-            ),
-            (
-                not spread and missing,
+        if self.sd is not None:
+            if self.low is not None or self.high is not None:
+                raise InputError("cannot be given together with low and high", "sd")
+            if self.value is None:
+                raise InputError("is missing beside sd", "value")
+            if self.distribution == "lognormal" and self.value <= 0.0:
+                raise InputError(
+                    f"{self.value:g} is not allowed: a lognormal number is positive", "value"
+                )
+        elif self.low is None or self.high is None:
+            raise InputError(
                 "is missing: give value and sd, or low and high",
-                "".join(missing[:1]),
-            ),
-            (
-                not spread and not low < high,
-                f"{high:g} is not allowed: must be more than low, {low:g}",
-                "high",
-            ),
-        )
+                "high" if self.low is not None else "low",
+            )
+        elif not self.low < self.high:
+            raise InputError(
+                f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high"
+            )
         return self
 
     @property
@@ -261,27 +257,18 @@ def uncertain_scene(
     matrix = np.eye(len(names))
     for key, value in correlations.items():
         pair, where = [part.strip() for part in key.split(",")], f"{CORRELATION}.{key}"
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        refuse(
-            (
-                len(pair) != 2 or pair[0] == pair[1],
-                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'",
+        if len(pair) != 2 or pair[0] == pair[1]:
+            raise InputError(
+                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
+            )
+        if unknown := [name for name in pair if name not in names]:
+            raise InputError(
+                f"{unknown[0]!r} is not an uncertain number of the scene"
+                f"{suggestion(unknown[0], names)}",
                 where,
-            ),
-            *(
-                (
-                    name not in names,
-                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
-                    where,
-                )
-                for name in pair
-            ),
-            (
-                not number or not -1.0 < value < 1.0,
-                f"{value!r} is not allowed: give a number between -1 and 1",
-                where,
-            ),
-        )
+            )
+        if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
+            raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
         i, j = (names.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = float(value)
     if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:
