@@ -31,7 +31,7 @@ class _Pipe(io.FileIO):
 
     def write(self, data: Any) -> int:
         try:
-            return super().write(data) or 0
+            return super().write(data)
         except OSError as error:  # what waits to be written would be tried again as Python ends
             os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
             if not isinstance(error, BrokenPipeError):
@@ -46,13 +46,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
-        if stream is not None and not stream.isatty():
+        # not where somebody else has put another in its place
+        if stream is not None and stream is getattr(sys, f"__{name}__") and not stream.isatty():
             pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
             how = {"errors": stream.errors, "line_buffering": stream.line_buffering}
             setattr(sys, name, io.TextIOWrapper(pipe, stream.encoding, **how))
     code = run(arguments, began=BEGAN)
     # Compiled code may still run in threads, which Python would wait for.
     if code == progress.INTERRUPTED:
+        print(end="", flush=True)
         os._exit(code)
     return code
 
