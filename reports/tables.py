@@ -268,11 +268,23 @@ def runs_table(
         else []
         for cell in cells
     }
+    whole = getattr(base.cost, of) if base else 0.0
+    costs = {
+        cell.model: [
+            duration(getattr(cell.cost, of)),
+            ratio(getattr(cell.cost, of) / whole if whole > 0.0 else None),
+            duration(cell.cost.set_up),
+            f"{cell.cost.steps:,}".replace(",", "\u202f"),
+            f"{cell.cost.evaluations:,}".replace(",", "\u202f"),
+        ]
+        for cell in cells
+        if cell.status == "done"
+    }
     rows = [
         [
             cell.model,
             ", ".join(f"{key} = {value}" for key, value in cell.settings.items()),
-            *(_costs(cell, of, base) if cell.status == "done" else [""] * 5),
+            *costs.get(cell.model, [""] * 5),
             Mark(cell.fate or cell.reason, more="; ".join([*cell.notes, *gains[cell.model]])),
             *(
                 Mark("CSV", link=f"../{path}") if path and cell.model in histories else ""
@@ -295,16 +307,6 @@ def runs_table(
         "Models, settings and run times",
         folded=histories is not None,
     )
-
-
-def _costs(cell: results.Cell, of: str, base: results.Cell | None) -> list[str]:
-    cost, whole = cell.cost, getattr(base.cost, of) if base else 0.0
-    return [
-        duration(getattr(cost, of)),
-        ratio(getattr(cost, of) / whole if whole > 0.0 else None),
-        duration(cost.set_up),
-        *(f"{count:,}".replace(",", "\u202f") for count in (cost.steps, cost.evaluations)),
-    ]
 
 
 #: One model in one scene, see `entry`.

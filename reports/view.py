@@ -281,7 +281,8 @@ class SceneView(View):
 
         All where a wall makes them differ in form, else the first; None without any.
         """
-        return (self.references if self.model_form_matters else self.references[:1]) or (None,)
+        form = self.scene.walls and self.with_pivot("bilateral")
+        return (self.references if form else self.references[:1]) or (None,)
 
     def differences(self, channel: str, against: str) -> dict[str, Floats]:
         """Candidate minus reference by model, in the channel's unit.
@@ -362,14 +363,10 @@ class SceneView(View):
     def with_pivot(self, pivot: str) -> list[str]:
         """Event-based models here with that pivot.
 
-        "bilateral" cannot leave the floor, "unilateral" can only push it.
+        "bilateral" cannot leave the floor, so it forbids the free flight into which a wall throws a
+        block; "unilateral" can only push the floor.
         """
         return [cell.model for cell in self.cells if cell.settings.get("pivot") == pivot]
-
-    @property
-    def model_form_matters(self) -> bool:
-        """Whether a wall can throw the block into free flight that one of the models forbids."""
-        return bool(self.scene.walls) and bool(self.with_pivot("bilateral"))
 
     @cached_property
     def extent(self) -> tuple[float, ...]:
