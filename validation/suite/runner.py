@@ -486,7 +486,6 @@ class SuiteStudy(Study):
             else:
                 self._compare(place)
                 cells += self._explained(place, inputs.get(place))
-        there = {(cell.scene, cell.model) for cell in cells}
         finished = results.Run(
             suite=suite.name,
             description=suite.given.description,
@@ -502,7 +501,7 @@ class SuiteStudy(Study):
             faults=tuple(
                 f"tolerance [{'.'.join(place[:3])}: {place.what}] has no cell in the suite"
                 for place in suite.tolerances
-                if (place.scene, place.model) not in there
+                if place.model not in self.planned.get(place.scene, ())
             ),
             measures=tuple(
                 {

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Container, Iterator, Mapping
+from operator import attrgetter
 from typing import Any
 
 from rockcheck.scenes import printable, writing
@@ -257,22 +258,23 @@ def files_of(run: results.Run) -> Iterator[Table]:
     """All checks, a row each; and all figures, judged or not."""
     place = ("scene", "model", "against", "measure", "window", "value", "unit")
     tolerance = ("expected", "limit", "drift", "verdict", "reason", "why")
-
-    def row(cell: results.Cell, figure: figures.Figure) -> list[Any]:
-        return [cell.scene, cell.model, *(getattr(figure, name) for name in place[2:])]
-
+    of_figure, of_check = attrgetter(*place[2:]), attrgetter("kind", *tolerance)
     yield Table(
         "checks",
         list(map(Column, (*place, "kind", *tolerance))),
         [
-            [*row(cell, check.figure), check.kind, *(getattr(check, name) for name in tolerance)]
+            [cell.scene, cell.model, *of_figure(check.figure), *of_check(check)]
             for cell, check in run.checks()
         ],
     )
     yield Table(
         "figures",
         list(map(Column, (*place, "note"))),
-        [[*row(cell, one), one.note] for cell in run.cells for one in cell.figures],
+        [
+            [cell.scene, cell.model, *of_figure(one), one.note]
+            for cell in run.cells
+            for one in cell.figures
+        ],
     )
 
 
