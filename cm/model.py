@@ -174,13 +174,12 @@ class ContinuousModel(Frozen):
         )
         happened = [
             Event(
-                t=float(t),
+                t=t,
                 kind="floor impact" if contact >= 2 * kernels.FLOOR else "wall impact",
-                impulse=float(impulse),
+                impulse=impulse,
             )
-            for t, contact, impulse in np.concatenate(strikes)
+            for t, contact, impulse in sorted(np.concatenate(strikes).tolist())
         ]
-        happened.sort(key=lambda event: event.t)
         if ending == kernels.OVERTURNED:
             happened.append(
                 Event(t=reached, kind="overturned left" if state[2] > 0.0 else "overturned right")
@@ -253,20 +252,19 @@ class ContinuousModel(Frozen):
             if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
                 surface = kernels.LEFT_WALL if wall.side == "left" else kernels.RIGHT_WALL
                 memory[2 * surface : 2 * surface + 2, kernels.LAST_CLOSED] = 0.0
-        sunk = 0.0
+        placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
         if scene.initial_height < TOUCHING:
             standing = [2 * kernels.FLOOR] * (tilt >= 0.0) + [2 * kernels.FLOOR + 1] * (tilt <= 0.0)
             memory[standing, kernels.CLOSED] = 1.0
             sunk = scene.gravity / (k * len(standing))
+            # The corner nearer to the mass's centre carries more.
+            if tilt == 0.0 and scene.block.offset[0] != 0.0:
+                left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
+                placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
+                sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
+            placed[1] -= sunk
         energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
         gross = energy + 0.01 * scene.gravity * scene.block.half_width
-        placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
-        # The corner nearer to the mass's centre carries more.
-        if sunk > 0.0 and tilt == 0.0 and scene.block.offset[0] != 0.0:
-            left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
-            placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
-            sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
-        placed[1] -= sunk
         return np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross)), memory
 
 

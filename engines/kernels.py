@@ -46,13 +46,14 @@ OVER, GOES_ON, LOST = 0, 1, 2
 #: Columns of a row of the march: time, state (6), felt acceleration (2).
 COLUMNS = 9
 # The state: pose, velocity; mean acceleration and length of the step before, and whether they are
-# known; time, velocity of the base then; whether the step ends where slip stops, and the velocity
-# at which a contact is carried along its arc.
+# known; time, velocity of the base then; whether the step ends where slip stops, the velocity at
+# which a contact is carried along its arc, and whether the acceleration goes on: it is known, and
+# the closed contacts are those of the step before.
 X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T = range(12)
-BASE_X, BASE_Y, STOPS, CARRY_X, CARRY_Y = range(12, 17)
+BASE_X, BASE_Y, STOPS, CARRY_X, CARRY_Y, SMOOTH = range(12, 18)
 # The request to the engine: mean pose, velocity, length of the step, felt acceleration, and whether
 # the step is an impact.
-POSE, VELOCITY, DT, FELT_X, FELT_Y, IMPACT = 0, 3, 6, 7, 8, 9
+DT, FELT, IMPACT = 6, 7, 9
 
 
 class Course(NamedTuple):
@@ -115,7 +116,7 @@ def begun(scene: Scene, longest: float, short: float) -> tuple[Course, March]:
         long_approach=LONG_APPROACH * moment,
         resting=RESTING * longest * scene.gravity,
     )
-    state = np.zeros(CARRY_Y + 1)
+    state = np.zeros(SMOOTH + 1)
     state[:6] = kinematics.of_mass(scene.block, scene.initial_state)
     closed, before = np.zeros((2, len(course.corners)), dtype=bool)
     return course, March(state, closed, before, np.zeros(IMPACT + 1))
@@ -237,7 +238,8 @@ def drift(run: March, corners: Floats, dt: float) -> None:
     remembers that velocity. The engine's contacts know nothing of arcs, but in a frame that moves
     with it they are right.
     """
-    z, (ax, ay, spin) = run.state, smooth(run)[:3]
+    z = run.state
+    ax, ay, spin = (z[AX], z[AY], z[SPIN]) if z[SMOOTH] != 0.0 else (0.0, 0.0, 0.0)
     half, sixth, later = 0.5 * dt, dt * dt / 6.0, z[W] + dt * spin
     px, py, mean = (
         z[X] + half * z[VX] + sixth * ax,
@@ -261,24 +263,7 @@ def drift(run: March, corners: Floats, dt: float) -> None:
             z[CARRY_X] = -later * (ends[1] - arm[1])
             if nz != 0.0:
                 z[CARRY_Y] = later * (ends[0] - arm[0])
-    run.asked[POSE], run.asked[POSE + 1], run.asked[POSE + 2] = px, py, mean
-    run.asked[VELOCITY], run.asked[VELOCITY + 1], run.asked[VELOCITY + 2] = (
-        z[VX] + z[CARRY_X],
-        z[VY] + z[CARRY_Y],
-        z[W],
-    )
-
-
-@inner_kernel
-def smooth(run: March) -> tuple[float, float, float, bool]:
-    """Last step's acceleration and True if the closed contacts are unchanged, else 0 and False."""
-    z = run.state
-    if z[KNOWN] == 0.0:
-        return 0.0, 0.0, 0.0, False
-    for i in range(len(run.closed)):
-        if run.closed[i] != run.before[i]:
-            return 0.0, 0.0, 0.0, False
-    return z[AX], z[AY], z[SPIN], True
+    run.asked[:DT] = px, py, mean, z[VX] + z[CARRY_X], z[VY] + z[CARRY_Y], z[W]
 
 
 @kernel
@@ -289,14 +274,15 @@ def plan(run: March, course: Course) -> int:
         return OVER
     start = starts[np.searchsorted(starts, z[T] + 1e-9, side="right")]
     dt, impact = length(run, course, min(course.end - z[T], start - z[T]))
+    going_on = z[KNOWN] != 0.0
+    for i in range(len(run.closed)):
+        going_on = going_on and run.closed[i] == run.before[i]
+    z[SMOOTH] = going_on
     z[T] += dt
     base_x = _velocity_at(z[T], *course.across)
     base_y = _velocity_at(z[T], *course.up)
-    run.asked[DT], run.asked[IMPACT] = dt, impact
-    run.asked[FELT_X], run.asked[FELT_Y] = (
-        (z[BASE_X] - base_x) / dt,
-        (z[BASE_Y] - base_y) / dt - course.gravity,
-    )
+    felt = (z[BASE_X] - base_x) / dt, (z[BASE_Y] - base_y) / dt - course.gravity
+    run.asked[DT:] = dt, felt[0], felt[1], 1.0 if impact else 0.0
     z[BASE_X], z[BASE_Y] = base_x, base_y
     drift(run, course.corners, dt)
     return GOES_ON
@@ -317,9 +303,7 @@ def step(run: March, course: Course, kicked: Velocity, row: Floats) -> int:
     z[KNOWN] = run.asked[IMPACT] == 0.0 and z[STOPS] == 0.0
     z[PAST_DT] = dt
     run.before[:] = run.closed
-    row[0], row[7], row[8] = z[T], run.asked[FELT_X], run.asked[FELT_Y]
-    for i in range(6):
-        row[1 + i] = z[i]
+    row[0], row[1:7], row[7:] = z[T], z[:6], run.asked[FELT:IMPACT]
     if not math.sqrt(z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W]) < 1e6:  # nan, too
         return LOST
     return plan(run, course)
@@ -333,13 +317,12 @@ def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
     over both steps. The drift is then dt/2 (v + v_new) - dt^2/12 (change of the acceleration over
     the step); for the mean pose the last acceleration suffices.
     """
-    z, (ax, ay, spin, same) = run.state, smooth(run)
-    bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if same else 0.0
-    half = 0.5 * dt
+    z, half = run.state, 0.5 * dt
+    bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if z[SMOOTH] != 0.0 else 0.0
     new_ax, new_ay, new_spin = (vx - z[VX]) / dt, (vy - z[VY]) / dt, (w - z[W]) / dt
-    z[X] = z[X] + half * (z[VX] + vx) - bend * (new_ax - ax)
-    z[Y] = z[Y] + half * (z[VY] + vy) - bend * (new_ay - ay)
-    z[THETA] = z[THETA] + half * (z[W] + w) - bend * (new_spin - spin)
+    z[X] = z[X] + half * (z[VX] + vx) - bend * (new_ax - z[AX])
+    z[Y] = z[Y] + half * (z[VY] + vy) - bend * (new_ay - z[AY])
+    z[THETA] = z[THETA] + half * (z[W] + w) - bend * (new_spin - z[SPIN])
     z[VX], z[VY], z[W], z[AX], z[AY], z[SPIN] = vx, vy, w, new_ax, new_ay, new_spin
 
 

@@ -1,20 +1,48 @@
 """MuJoCo as a model of the rocking block."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
 from rockcheck.engines import steps
-from rockcheck.engines.contacts import Contact, Surface, contacts_of, corners_of, surfaces_of
-from rockcheck.engines.engine import Engine
+from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
+from rockcheck.engines.engine import Engine, Worlds
 from rockcheck.scenes import Floor, ModelFailure, Scene, printable
+
+# of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
+CORNER_RADIUS = 1e-8
+PUSHED_OUT = 0.01  # share of a penetration that one step removes
+IMPEDANCE = 0.9999  # share of an impact that a contact takes up
+SOLIMP = f'solimp="{IMPEDANCE!r} {IMPEDANCE!r} 0.001 0.5 1.0"'
+# inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
+RIGID = 1e7
+#: Without warm start Newton's method needs fewer iterations, and it does not get stuck on the edge
+#: of a stiff cone. The 50 iterations of a line search that MuJoCo allows are too few there:
+#: Newton's method would stop short of its solution.
+SOLVER = """
+<option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" \
+iterations="100" tolerance="1e-15"
+  ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
+"""
+# block radii per second: how well a slip rate has to be known for the correction of the cone
+SLIDING = 1e-7
+FLATTEST = -0.05  # slope that the secant method trusts
+MOST_CORRECTIONS = 20
 
 
 class MuJoCoWorld(steps.World):
-    """A compiled model with its data, stepped by Euler's method."""
+    """A compiled model with its data: a box on a plane, with planes for the walls.
 
-    def __init__(self, model_text: str) -> None:
+    The planar body of unit mass moves in the plane x, z, counterclockwise positive. Without
+    `settings`, MuJoCo's default contact parameters, solver and cone apply.
+    """
+
+    #: How far walls lie behind the scene's, and by how much the body is raised above the floor's
+    #: origin, m.
+    inset = 0.0
+
+    def __init__(self, scene: Scene, settings: str = "") -> None:
         import mujoco
 
         self.mujoco: Any = mujoco
@@ -22,12 +50,39 @@ class MuJoCoWorld(steps.World):
         self.warnings: list[str] = []
         self.former_handler = mujoco.get_mju_user_warning()
         mujoco.set_mju_user_warning(self.warnings.append)
-        self.model: Any = mujoco.MjModel.from_xml_string(model_text)
+        planes, geoms, more = self.shapes(scene)
+        inertia = scene.block.gyration_squared
+        self.model: Any = mujoco.MjModel.from_xml_string(
+            f"""<mujoco><option gravity="0 0 0"/>{settings or more}<worldbody>{planes}
+<body pos="0 0 {self.inset!r}">
+  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>\
+<joint type="hinge" axis="0 -1 0"/>
+  <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
+  {geoms}
+</body></worldbody></mujoco>"""
+        )
         self.data: Any = mujoco.MjData(self.model)
         # Views of the data, which are dear to make anew in each step.
         self.qpos, self.qvel, self.qacc = self.data.qpos, self.data.qvel, self.data.qacc
         self.force = self.data.qfrc_applied[:2]
         self.dt = 0.0
+
+    def shapes(self, scene: Scene) -> tuple[str, str, str]:
+        """The planes, what the body is made of, and what is set beside them, as XML."""
+        block, mu = scene.block, scene.floor.friction
+        planes = "".join(
+            plane_of(
+                surface,
+                0.0,
+                f'condim="3" friction="{mu!r} 0 0"' if surface.surface == "floor" else 'condim="1"',
+            )
+            for surface in surfaces_of(scene)
+        )
+        dx, dz = block.offset
+        size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
+        place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
+        box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
+        return planes, box, ""
 
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         self.qpos[:] = x, y, theta
@@ -56,21 +111,6 @@ class MuJoCoWorld(steps.World):
         self.mujoco.set_mju_user_warning(self.former_handler)
 
 
-def model_of(scene: Scene, planes: str, geoms: str, settings: str = "", raised: float = 0.0) -> str:
-    """A MuJoCo model (XML) of planes and a planar body of unit mass, counterclockwise positive.
-
-    The body moves in the plane x, z; its origin is `raised` m above the floor's.
-    """
-    inertia = scene.block.gyration_squared
-    return f"""<mujoco><option gravity="0 0 0"/>{settings}<worldbody>{planes}
-<body pos="0 0 {raised!r}">
-  <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>\
-<joint type="hinge" axis="0 -1 0"/>
-  <inertial pos="0 0 0" mass="1" diaginertia="{inertia!r} {inertia!r} {inertia!r}"/>
-  {geoms}
-</body></worldbody></mujoco>"""
-
-
 def plane_of(surface: Surface, inset: float, attributes: str) -> str:
     """The floor, or a wall `inset` m behind its surface.
 
@@ -83,51 +123,18 @@ def plane_of(surface: Surface, inset: float, attributes: str) -> str:
     return f'<geom name="{name}" type="plane" size="0 0 1" {place}{axis} {attributes}/>'
 
 
-def stock_model(scene: Scene, settings: str = "") -> str:
-    """A MuJoCo model (XML) of a box on a plane, with planes for the walls.
-
-    Without `settings`, MuJoCo's default contact parameters, solver and cone apply.
-    """
-    block, mu = scene.block, scene.floor.friction
-    planes = "".join(
-        plane_of(
-            surface,
-            0.0,
-            f'condim="3" friction="{mu!r} 0 0"' if surface.surface == "floor" else 'condim="1"',
-        )
-        for surface in surfaces_of(scene)
-    )
-    dx, dz = block.offset
-    size = f"{block.half_width!r} {block.half_width!r} {block.half_height!r}"
-    place = "" if block.centre_of_mass is None else f'pos="{-dx!r} 0 {-dz!r}" '
-    box = f'<geom type="box" {place}size="{size}" condim="1" friction="0 0 0"/>'
-    return model_of(scene, planes, box, settings)
-
-
-# of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
-CORNER_RADIUS = 1e-8
-PUSHED_OUT = 0.01  # share of a penetration that one step removes
-IMPEDANCE = 0.9999  # share of an impact that a contact takes up
-SOLIMP = f'solimp="{IMPEDANCE!r} {IMPEDANCE!r} 0.001 0.5 1.0"'
-# inverse regularisation of a contact, kg, where MuJoCo gives at most 1.5e4 to a block of 1 kg
-RIGID = 1e7
-# block radii per second: how well a slip rate has to be known for the correction of the cone
-SLIDING = 1e-7
-FLATTEST = -0.05  # slope that the secant method trusts
-MOST_CORRECTIONS = 20
-
-
 class _RigidMuJoCoWorld(MuJoCoWorld):
     """Contacts that end a step with -e times their initial normal velocity.
 
     Friction obeys Coulomb's cone if corrected.
     """
 
-    def __init__(
-        self, model_text: str, contacts: Sequence[Contact], corrected_friction: float
-    ) -> None:
-        super().__init__(model_text)
-        self.friction = corrected_friction
+    inset = CORNER_RADIUS
+
+    def __init__(self, scene: Scene, corrected: bool = True) -> None:
+        super().__init__(scene)
+        contacts = contacts_of(scene)
+        self.friction = scene.floor.friction if corrected else 0.0
         self.stiffness, self.damping = self.model.pair_solref.T
         self.stiffness[:] = 0.0
         # Friction stops a slip, whatever the restitution: MuJoCo would turn it round, too.
@@ -144,6 +151,25 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             -PUSHED_OUT,
             0.0,
         )
+
+    def shapes(self, scene: Scene) -> tuple[str, str, str]:
+        """Corners as tiny spheres, and a contact pair per contact of the scene, in their order."""
+        off = 'contype="0" conaffinity="0"'
+        corners = {corner: f"corner {number}" for number, corner in enumerate(corners_of(scene))}
+        spheres = "".join(
+            f'<geom name="{name}" type="sphere" size="{self.inset!r}" pos="{bx!r} 0 {bz!r}" {off}/>'
+            for (bx, bz), name in corners.items()
+        )
+        planes = "".join(plane_of(surface, self.inset, off) for surface in surfaces_of(scene))
+        # A frictionless surface is a frictionless contact: MuJoCo would raise a coefficient of zero
+        # to 1e-5.
+        frictionless, rough = 'condim="1"', 'condim="3" friction="{0!r} {0!r} 0 0 0"'
+        pairs = "".join(
+            f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" {SOLIMP}'
+            f" {rough.format(contact.friction) if contact.friction else frictionless}/>"
+            for contact in contacts_of(scene)
+        )
+        return planes, spheres, f"{SOLVER}<contact>{pairs}</contact>"
 
     def ready(self, dt: float) -> None:
         # Reference acceleration: -(1+e)/dt times the velocity, less a share of the penetration.
@@ -225,34 +251,6 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
             last = now
 
 
-def _point_contact_model(scene: Scene) -> str:
-    """Corners as tiny spheres, and one contact pair per contact of the scene, in their order."""
-    off = 'contype="0" conaffinity="0"'
-    corners = {corner: f"corner {number}" for number, corner in enumerate(corners_of(scene))}
-    spheres = "".join(
-        f'<geom name="{name}" type="sphere" size="{CORNER_RADIUS!r}" pos="{bx!r} 0 {bz!r}" {off}/>'
-        for (bx, bz), name in corners.items()
-    )
-    planes = "".join(plane_of(surface, CORNER_RADIUS, off) for surface in surfaces_of(scene))
-    # A frictionless surface is a frictionless contact: MuJoCo would raise a coefficient of zero to
-    # 1e-5.
-    frictionless, rough = 'condim="1"', 'condim="3" friction="{0!r} {0!r} 0 0 0"'
-    pairs = "".join(
-        f'<pair geom1="{contact.surface}" geom2="{corners[contact.corner]}" {SOLIMP}'
-        f" {rough.format(contact.friction) if contact.friction else frictionless}/>"
-        for contact in contacts_of(scene)
-    )
-    # Without warm start Newton's method needs fewer iterations, and it does not get stuck on the
-    # edge of a stiff cone. The 50 iterations of a line search that MuJoCo allows are too few there:
-    # Newton's method would stop short of its solution.
-    settings = f"""
-<option integrator="Euler" cone="elliptic" impratio="1" jacobian="dense" solver="Newton" \
-iterations="100" tolerance="1e-15"
-  ls_tolerance="1e-6" ls_iterations="200"><flag island="disable" warmstart="disable"/></option>
-<contact>{pairs}</contact>"""
-    return model_of(scene, planes, spheres, settings, CORNER_RADIUS)
-
-
 class MuJoCo(Engine):
     """MuJoCo.
 
@@ -265,16 +263,12 @@ class MuJoCo(Engine):
 
     name: ClassVar[str] = "mujoco"
     bounces_with: ClassVar[tuple[str, ...]] = ("best",)
+    worlds: ClassVar[Worlds] = (_RigidMuJoCoWorld, MuJoCoWorld)
     cone_correction: bool = True
 
     def rigid_world(self, scene: Scene) -> steps.World:
         """The scene as MuJoCo holds it: point contacts of the corners."""
-        friction = scene.floor.friction if self.cone_correction else 0.0
-        return _RigidMuJoCoWorld(_point_contact_model(scene), contacts_of(scene), friction)
-
-    def stock_world(self, scene: Scene) -> steps.World:
-        """The scene as MuJoCo holds it: a box among planes."""
-        return MuJoCoWorld(stock_model(scene))
+        return _RigidMuJoCoWorld(scene, self.cone_correction)
 
     def tuned_world(
         self, scene: Scene, parameters: Mapping[str, float], step: float
@@ -286,7 +280,7 @@ class MuJoCo(Engine):
         sliding = scene.model_copy(update={"floor": Floor(friction=parameters["friction"])})
         solref = f"{-PUSHED_OUT / step**2!r} {-parameters['restitution'] / step!r}"
         stops = f'<default><geom solref="{solref}" {SOLIMP}/></default>'
-        return MuJoCoWorld(stock_model(sliding, f'<option cone="elliptic"/>{stops}'))
+        return MuJoCoWorld(sliding, f'<option cone="elliptic"/>{stops}')
 
     def tuned(self, step: float) -> dict[str, float]:
         """The share of a penetration that one step removes."""

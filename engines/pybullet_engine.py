@@ -35,49 +35,48 @@ def _bullet() -> Any:
 class _PyBulletWorld(steps.World):
     """A physics server with block, floor and walls, at PyBullet's default parameters."""
 
+    depth = SLAB  # m: how far behind a surface the centre of its shape is
+
     def __init__(self, scene: Scene) -> None:
         self.bullet = pybullet = _bullet()
         self.client: int = pybullet.connect(pybullet.DIRECT)
         self.options: dict[str, Any] = {"physicsClientId": self.client}
-        self.body = self.make_block(scene)
+        shape, made, dynamics = self.block_of(scene)
+        # Friction and restitution of two bodies multiply: the block's are 1, so that those of floor
+        # and walls count.
+        self.body: int = pybullet.createMultiBody(
+            1.0, shape, basePosition=[0.0, 0.0, ALOFT * scene.block.radius], **made, **self.options
+        )
+        pybullet.changeDynamics(
+            self.body, -1, lateralFriction=1.0, restitution=1.0, **dynamics, **self.options
+        )
         self.dt = 0.0
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
         for surface in contacts.surfaces_of(scene):
-            shape, depth = self.make_shape(surface)
-            x, z = surface.behind(depth)
-            body = pybullet.createMultiBody(0.0, shape, basePosition=[x, 0.0, z], **self.options)
+            x, z = surface.behind(self.depth)
+            body = pybullet.createMultiBody(
+                0.0, self.shape_of(surface), basePosition=[x, 0.0, z], **self.options
+            )
             contact = {"lateralFriction": surface.friction, "restitution": surface.restitution}
             pybullet.changeDynamics(body, -1, **contact, **self.options)
 
-    def make_block(self, scene: Scene) -> int:
-        """A box.
-
-        Friction and restitution of two bodies multiply: the block's are 1, so that those of floor
-        and walls count.
-        """
+    def block_of(self, scene: Scene) -> tuple[int, dict[str, Any], dict[str, Any]]:
+        """A box as a shape, how its body is made, and what is changed in it."""
         half = [scene.block.half_width, scene.block.half_width, scene.block.half_height]
-        dx, dz = scene.block.offset
-        placed = {} if scene.block.homogeneous else {"collisionFramePosition": [-dx, 0.0, -dz]}
+        (dx, dz), inertia = scene.block.offset, scene.block.gyration_squared
+        loaded = not scene.block.homogeneous  # of a plain box Bullet finds the inertia itself
+        placed = {"collisionFramePosition": [-dx, 0.0, -dz]} if loaded else {}
         shape = self.bullet.createCollisionShape(
             self.bullet.GEOM_BOX, halfExtents=half, **placed, **self.options
         )
-        body: int = self.bullet.createMultiBody(
-            1.0, shape, basePosition=[0.0, 0.0, ALOFT * scene.block.radius], **self.options
-        )
-        self.bullet.changeDynamics(body, -1, lateralFriction=1.0, restitution=1.0, **self.options)
-        if not scene.block.homogeneous:  # of a plain box Bullet finds the inertia itself
-            inertia = scene.block.gyration_squared
-            self.bullet.changeDynamics(
-                body, -1, mass=1.0, localInertiaDiagonal=[inertia] * 3, **self.options
-            )
-        return body
+        return shape, {}, {"mass": 1.0, "localInertiaDiagonal": [inertia] * 3} if loaded else {}
 
-    def make_shape(self, surface: contacts.Surface) -> tuple[int, float]:
-        """A thick box whose face is the surface, and how far behind that its centre is, m."""
+    def shape_of(self, surface: contacts.Surface) -> Any:
+        """A thick box whose face is the surface."""
         return self.bullet.createCollisionShape(
             self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
-        ), SLAB
+        )
 
     # The y axis points into the plane: its angles are clockwise.
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
@@ -115,6 +114,8 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     small; on boxes it would lose them.
     """
 
+    depth = CORNER_RADIUS
+
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self.bounces = contacts.rebounds(scene)
@@ -129,7 +130,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             **self.options,
         )
 
-    def make_block(self, scene: Scene) -> int:
+    def block_of(self, scene: Scene) -> tuple[int, dict[str, Any], dict[str, Any]]:
         """The block as tiny spheres at its corners.
 
         A huge inertia about the other axes keeps it in its plane.
@@ -141,36 +142,24 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             collisionFramePositions=places,
             **self.options,
         )
-        body: int = self.bullet.createMultiBody(
-            1.0,
-            shape,
-            basePosition=[0.0, 0.0, ALOFT * scene.block.radius],
-            useMaximalCoordinates=1,
-            **self.options,
-        )
         inertia = scene.block.gyration_squared
-        self.bullet.changeDynamics(
-            body,
-            -1,
-            mass=1.0,  # given again: the inertia alone would set it to zero
-            localInertiaDiagonal=[1e6 * inertia, inertia, 1e6 * inertia],
-            linearDamping=0.0,
-            angularDamping=0.0,
-            lateralFriction=1.0,
-            spinningFriction=0.0,
-            rollingFriction=0.0,
-            restitution=1.0,
-            contactProcessingThreshold=0.0,  # of a corner that touches, not of one that is about to
-            **self.options,
-        )
-        return body
+        changed = {
+            "mass": 1.0,  # given again: the inertia alone would set it to zero
+            "localInertiaDiagonal": [1e6 * inertia, inertia, 1e6 * inertia],
+            "linearDamping": 0.0,
+            "angularDamping": 0.0,
+            "spinningFriction": 0.0,
+            "rollingFriction": 0.0,
+            "contactProcessingThreshold": 0.0,  # of a corner that touches, not of one near
+        }
+        return shape, {"useMaximalCoordinates": 1}, changed
 
-    def make_shape(self, surface: contacts.Surface) -> tuple[int, float]:
+    def shape_of(self, surface: contacts.Surface) -> Any:
         """A plane, behind the surface by the radius of the corners."""
         normal = [surface.normal[0], 0.0, surface.normal[1]]
         return self.bullet.createCollisionShape(
             self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
-        ), CORNER_RADIUS
+        )
 
     def ready(self, dt: float) -> None:
         self.bounce(True)
