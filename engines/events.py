@@ -103,7 +103,7 @@ class _Motion:
             return impacts
         return impacts + [
             (t[end], "release", end, 0.0)
-            for end in _falls(closed)
+            for end in _rises(~closed)
             if t[end] - t[max((i for i in strikes if i < end), default=0)] > HOLD
         ]
 
@@ -120,13 +120,13 @@ class _Motion:
         places = {
             "uplift": [
                 (_start(highest, i, noise), i)
-                for i in _falls(_held(flat, t, REST, value=True))
+                for i in _rises(~_held(flat, t, REST, value=True))
                 if not flight[i]
             ],
             "lift-off": [(_start(lowest, i, noise), i) for i in _rises(flight)],
-            "landing": [(i, i) for i in _falls(flight)],
+            "landing": [(i, i) for i in _rises(~flight)],
             "slip": [(_start(speed, i, SLIP_NOISE * SLIPPING), i) for i in _rises(slipping)],
-            "stick": [(i, i) for i in _falls(slipping) if not flight[i]],
+            "stick": [(i, i) for i in _rises(~slipping) if not flight[i]],
             "settled": [(i, i) for i in _rises(_held(still, t, REST, value=True))],
         }
         return [(t[start], kind, i, 0.0) for kind, found in places.items() for start, i in found]
@@ -175,10 +175,6 @@ class _Motion:
 
 def _rises(flags: Flags) -> list[int]:
     return [int(i) for i in np.flatnonzero(flags[1:] & ~flags[:-1]) + 1]
-
-
-def _falls(flags: Flags) -> list[int]:
-    return _rises(~flags)
 
 
 def _start(values: Floats, index: int, noise: float) -> int:
