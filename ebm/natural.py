@@ -88,9 +88,8 @@ def side_of(block: Block, side: Literal["left", "right"]) -> np.record:
 
 def base_of(scene: Scene) -> Base:
     """Horizontal and vertical ground motion in natural units."""
-    unit = time_unit(scene)
-    sideways = ground_of(scene.excitation, scene.gravity, unit)
-    return Base(sideways, ground_of(scene.vertical, scene.gravity, unit))
+    both = scene.excitation, scene.vertical
+    return Base(*(ground_of(one, scene.gravity, time_unit(scene)) for one in both))
 
 
 def state_of(scene: Scene) -> Floats:

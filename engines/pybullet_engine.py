@@ -35,7 +35,8 @@ def _bullet() -> Any:
 class _PyBulletWorld(steps.World):
     """A physics server with block, floor and walls, at PyBullet's default parameters."""
 
-    depth = SLAB  # m: how far behind a surface the centre of its shape is
+    #: Whether surfaces are planes, behind them by the radius of the corners; else thick boxes.
+    planes = False
 
     def __init__(self, scene: Scene) -> None:
         self.bullet = pybullet = _bullet()
@@ -54,10 +55,17 @@ class _PyBulletWorld(steps.World):
         # A step in the air, in which Bullet takes notice of an inertia that was changed.
         pybullet.stepSimulation(**self.options)
         for surface in contacts.surfaces_of(scene):
-            x, z = surface.behind(self.depth)
-            body = pybullet.createMultiBody(
-                0.0, self.shape_of(surface), basePosition=[x, 0.0, z], **self.options
+            (x, z), (nx, nz) = (
+                surface.behind(CORNER_RADIUS if self.planes else SLAB),
+                surface.normal,
             )
+            face = (
+                {"shapeType": pybullet.GEOM_PLANE, "planeNormal": [nx, 0.0, nz]}
+                if self.planes
+                else {"shapeType": pybullet.GEOM_BOX, "halfExtents": surface.extent(SLAB, REACH)}
+            )
+            shape = pybullet.createCollisionShape(**face, **self.options)
+            body = pybullet.createMultiBody(0.0, shape, basePosition=[x, 0.0, z], **self.options)
             contact = {"lateralFriction": surface.friction, "restitution": surface.restitution}
             pybullet.changeDynamics(body, -1, **contact, **self.options)
 
@@ -72,34 +80,24 @@ class _PyBulletWorld(steps.World):
         )
         return shape, {}, {"mass": 1.0, "localInertiaDiagonal": [inertia] * 3} if loaded else {}
 
-    def shape_of(self, surface: contacts.Surface) -> Any:
-        """A thick box whose face is the surface."""
-        return self.bullet.createCollisionShape(
-            self.bullet.GEOM_BOX, halfExtents=surface.extent(SLAB, REACH), **self.options
-        )
-
     # The y axis points into the plane: its angles are clockwise.
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
         turn = (0.0, -math.sin(0.5 * theta), 0.0, math.cos(0.5 * theta))
-        self.bullet.resetBasePositionAndOrientation(
-            self.body, (x, 0.0, y), turn, physicsClientId=self.client
-        )
-        self.bullet.resetBaseVelocity(
-            self.body, (vx, 0.0, vy), (0.0, -w, 0.0), physicsClientId=self.client
-        )
+        self.bullet.resetBasePositionAndOrientation(self.body, (x, 0.0, y), turn, self.client)
+        self.bullet.resetBaseVelocity(self.body, (vx, 0.0, vy), (0.0, -w, 0.0), self.client)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         if dt != self.dt:
-            self.bullet.setTimeStep(dt, physicsClientId=self.client)
+            self.bullet.setTimeStep(dt, self.client)
             self.dt = dt
-        self.bullet.setGravity(felt[0], 0.0, felt[1], physicsClientId=self.client)
-        self.bullet.stepSimulation(physicsClientId=self.client)
+        self.bullet.setGravity(felt[0], 0.0, felt[1], self.client)
+        self.bullet.stepSimulation(self.client)
 
     def state(self) -> steps.State:
         (x, _, z), (_, turn, _, whole) = self.bullet.getBasePositionAndOrientation(
-            self.body, physicsClientId=self.client
+            self.body, self.client
         )
-        (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, physicsClientId=self.client)
+        (vx, _, vz), (_, w, _) = self.bullet.getBaseVelocity(self.body, self.client)
         return x, z, -2.0 * math.atan2(turn, whole), vx, vz, -w
 
     def close(self) -> None:
@@ -114,7 +112,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     small; on boxes it would lose them.
     """
 
-    depth = CORNER_RADIUS
+    planes = True
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
@@ -153,13 +151,6 @@ class _RigidPyBulletWorld(_PyBulletWorld):
             "contactProcessingThreshold": 0.0,  # of a corner that touches, not of one near
         }
         return shape, {"useMaximalCoordinates": 1}, changed
-
-    def shape_of(self, surface: contacts.Surface) -> Any:
-        """A plane, behind the surface by the radius of the corners."""
-        normal = [surface.normal[0], 0.0, surface.normal[1]]
-        return self.bullet.createCollisionShape(
-            self.bullet.GEOM_PLANE, planeNormal=normal, **self.options
-        )
 
     def ready(self, dt: float) -> None:
         self.bounce(True)
