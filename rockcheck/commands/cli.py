@@ -103,17 +103,15 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     }
 
     def command(context: typer.Context, *, quiet: bool, as_json: bool, **given: Any) -> None:
-        code = 0
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
         with speaking("json" if as_json else "quiet" if quiet else "tables"):
             try:
                 does(**given)
-            except typer.Exit as error:
-                code = error.exit_code
-            if timed:
-                console().print(f"total: {time.perf_counter() - context.obj:.1f} s")
-        raise typer.Exit(code)
+            except typer.Exit:  # by `told`
+                if timed:
+                    console().print(f"total: {time.perf_counter() - context.obj:.1f} s")
+                raise
 
     every = [
         *(option for one in own for option in _options(one)),

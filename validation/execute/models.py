@@ -134,15 +134,10 @@ def family(name: str) -> Family:
 def not_installed(name: str) -> str:
     """How to install the engine of that model; empty if it is installed, or none is needed."""
     return (
-        str(_class_of(name).hint())
-        if (family(name).module == ENGINES and not _class_of(name).installed())
+        str(class_of(name).hint())
+        if (family(name).module == ENGINES and not class_of(name).installed())
         else ""
     )
-
-
-def has_wheel(name: str) -> bool:
-    """Whether that model can be installed on this Python without a compiler."""
-    return family(name).module != ENGINES or bool(_class_of(name).has_wheel())
 
 
 def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
@@ -186,10 +181,11 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
 
 def home(name: str) -> str:
     """The module that defines the model of that name; for "module:Class" the named module."""
-    return family(name).module if is_own(name) else str(_class_of(name).__module__)
+    return family(name).module if is_own(name) else str(class_of(name).__module__)
 
 
-def _class_of(name: str) -> Any:
+def class_of(name: str) -> Any:
+    """The class of the model of that name, imported. Raises `InputError` where there is none."""
     kind = family(name)
     try:
         return getattr(importlib.import_module(kind.module), kind.class_name)
@@ -217,7 +213,7 @@ def build(
         )
     check_allowed(name, (name,))
     sys.path.extend(path for path in search_path or () if path not in sys.path)
-    kind, model_class, settings = family(name), _class_of(name), dict(settings or {})
+    kind, model_class, settings = family(name), class_of(name), dict(settings or {})
     if not isinstance(model_class, type) or not callable(getattr(model_class, "simulate", None)):
         raise InputError(
             f"{printable(name)!r} is no model: it must be a class with a method `simulate`"

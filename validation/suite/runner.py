@@ -531,7 +531,7 @@ class SuiteStudy(Study):
         first, variant = parts[0], parts[0].variant
         status = "failed" if reason else "done"
         if missing := models.not_installed(variant.family):
-            status = "absent" if models.has_wheel(variant.family) else "unavailable"
+            status = "absent" if models.class_of(variant.family).has_wheel() else "unavailable"
         traced = [
             f"{FAULTS}/{part.name}.txt"
             for part in parts
