@@ -7,6 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rockcheck.scenes import writing
+
 KEPT = Path(__file__).parents[1] / "nightly.json"
 PLACE = "<!-- the last nights -->"
 KINDS = {"whole": "The whole night", "short": "Its short form"}
@@ -26,17 +28,20 @@ def tables(kept: dict[str, Any]) -> str:
             lines += [f"{words}: no result is kept yet.", ""]
             continue
         night = kept[kind]
+        rows = [
+            (
+                part["name"],
+                part["result"],
+                f"{part['seconds']:.0f}",
+                part["figures"].replace("<", "&lt;"),
+            )
+            for part in night["parts"]
+        ]
         lines += [
             f"{words}: {night['date']}, commit {night['commit']}, seed {night['seed']}, Python"
             f" {night['python']}, {night['machine']}.",
             "",
-            "| part | result | time, s | figures |",
-            "|---|---|---|---|",
+            writing.markdown_table(("part", "result", "time, s", "figures"), rows),
+            "",
         ]
-        for part in night["parts"]:
-            figures = part["figures"].replace("|", "\\|").replace("<", "&lt;")
-            lines.append(
-                f"| {part['name']} | {part['result']} | {part['seconds']:.0f} | {figures} |"
-            )
-        lines.append("")
     return "\n".join(lines)
