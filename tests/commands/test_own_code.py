@@ -210,16 +210,17 @@ MAKES_CODE = {
     *("eval", "exec", "compile", "__import__", "input", "os.system", "os.popen", "shell="),
     *("pd.eval", "pd.read_pickle", "yaml.load", "np.load", "numpy.load", "allow_pickle="),
     *("pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"),
-    *("importlib.import_module", "runpy.run_path", "runpy.run_module"),
+    *("importlib.import_module", "pkgutil.resolve_name", "runpy.run_path", "runpy.run_module"),
 }
 #: Where it is needed, and why.
 ALLOWED = {
     # the user's own private folder, owner and mode checked, each file hashed
     "pickle": {"scenes/compiled.py"},
     # arrays without objects
-    # rockcheck's own commands; models by rockcheck's own names, one's own only as the command line
-    # allows, in a worker
-    "importlib.import_module": {"rockcheck/commands/cli.py", "validation/execute/models.py"},
+    # rockcheck's own commands
+    "pkgutil.resolve_name": {"rockcheck/commands/cli.py"},
+    # models by rockcheck's own names, one's own only as the command line allows, in a worker
+    "importlib.import_module": {"validation/execute/models.py"},
 }
 
 
