@@ -166,8 +166,7 @@ def progress(
         speed_estimate_period=600.0,
         disable=_voice.get() != "tables" or not screen.is_terminal,
     )
-    bar.add_task(title, total=None, what="")
-    (task,) = bar.tasks
+    task = bar.tasks[bar.add_task(title, total=None, what="")]
 
     def on_progress(done: float, total: float, what: str = "") -> None:
         bar.update(

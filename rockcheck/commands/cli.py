@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any, cast, get_type_hints
+from typing import Annotated, Any, cast
 
 import typer
 import typer.core
@@ -130,10 +130,9 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
 def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
     if not is_dataclass(given.annotation):
         return [given.replace(kind=_NAMED)]
-    hints, values = get_type_hints(given.annotation, include_extras=True), vars(given.default)
     return [
-        inspect.Parameter(name, _NAMED, default=values[name], annotation=hint)
-        for name, hint in hints.items()
+        one.replace(kind=_NAMED, default=getattr(given.default, one.name))
+        for one in inspect.signature(cast(Any, given.annotation), eval_str=True).parameters.values()
     ]
 
 
