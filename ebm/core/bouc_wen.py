@@ -23,7 +23,7 @@ has not (ROCK, LEAN).
 import math
 
 from rockcheck.ebm.core import contacts, coulomb, ground, modes, series
-from rockcheck.ebm.core.motion import flat_series, tilt_series
+from rockcheck.ebm.core.motion import mode_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, note
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -36,11 +36,7 @@ _NEARLY = 10.0
 def expand(block, base, run, reach):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     state, mode, a, last = run.state, run.state.mode, run.a, run.state.last_term_rad
-    order = series.ORDER
-    if mode.family == Family.FLAT:
-        order = flat_series(block, base, run, order)
-    else:
-        order = tilt_series(block, base, run, order, 0.0, reach)
+    order = state.order = mode_series(block, base, run, series.ORDER, reach)
     h = series.step_size(a, Row.U, Row.G, order - 1, last, reach)
     if mode.pivot == Pivot.SLIPPING:
         if state.winds:
@@ -48,7 +44,7 @@ def expand(block, base, run, reach):
         h = series.step_size(a, Row.XI, Row.XI, order - 1, last, h)
         if mode.family == Family.TILT:
             h = series.step_size(a, Row.PHI, Row.COS, order, last, h)
-    state.order, state.place, state.length = order, mode.sense * state.motion.x - a[Row.SIN, 0], h
+    state.length = h
 
 
 #: The first event of the step. One more guard: z comes to the sense of slip.

@@ -30,7 +30,7 @@ import numpy as np
 
 from rockcheck.ebm.core.block import record, side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
-from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Found, Friction, Kind, Law
+from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Friction, Kind, Law, Rule
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -370,26 +370,26 @@ def _choose(law, impact, number, rounding):
 
 @called_kernel
 def contact_impact(block, state):
-    """All stages of the state's IMPACT; returns what came of it, a Found.
+    """All stages of the state's IMPACT.
 
     The state gathers the normal impulses, counts the stages that added energy and keeps the largest
-    relative gain.
+    relative gain. It counts an impact in which no set of contacts fits, or whose stages do not end.
     """
     impact, v = state.impact, state.impact.v
     contact_rows(block, impact.sense, impact.phi, impact.rows)
     impact.part[:], impact.after[:] = 0.0, 0.0
     rounding = ROUNDING * _size(v)
-    found = Found.FITS
+    fits = True
     for number in range(_MOST_STAGES):
         # Impacts that alternate between floor and wall without end become plastic.
         plastic = 2 * number >= _MOST_STAGES
         if not _approaches(block, impact, plastic, rounding):
             _close(block, impact)
-            return found
+            state.rules[Rule.LEAST_CONTRADICTION] += not fits
+            return
         _choose(Law.MOREAU if plastic else block.law, impact, number, rounding)
         before = kinetic_energy(block.spin, v)
-        if not _strike(block, impact):
-            found = Found.LEAST_WRONG
+        fits = _strike(block, impact) and fits
         noise = 2.0 * ROUNDING * before
         gains = kinetic_energy(block.spin, impact.after) - before > noise
         if block.energy_cap and not plastic and gains:
@@ -404,7 +404,7 @@ def contact_impact(block, state):
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.
         v[0] = v[2] = 0.0
-    return Found.ENDLESS
+    state.rules[Rule.ENDLESS_STAGES] += 1
 
 
 @inner_kernel

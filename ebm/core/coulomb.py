@@ -42,7 +42,6 @@ def expand(block, base, run, reach):
     # The tolerance is relative to a motion that is still tiny, since it may grow.
     enough = 0.01 * state.tolerance_rad * min(1.0, 1e2 * (abs(motion.theta) + abs(motion.w)))
     order = state.order = tilt_series(block, base, run, series.ORDER, enough, reach)
-    state.place = mode.sense * motion.x - a[Row.SIN, 0]
     state.length = reach
     if order == series.ORDER:
         last = series.size_of(a, Row.PHI, Row.COS, order)

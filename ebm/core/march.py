@@ -114,8 +114,7 @@ def resolve(block, base, run):
     modes.leave(state, KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
         state.impulse = 0.0
-        resting = settle.settling_speed(state)
-        strike(block, base, run, resting)
+        strike(block, base, run, settle.settling_speed(state))
         if state.impulse > 0.0:
             modes.forget(state)  # a new motion: all modes may be tried again
         elif block.unilateral:

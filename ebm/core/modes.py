@@ -19,7 +19,7 @@ from collections import namedtuple
 import numpy as np
 
 from rockcheck.ebm.core import contacts, ground, guards, series
-from rockcheck.ebm.core.motion import flat_series, tilt_series
+from rockcheck.ebm.core.motion import mode_series
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
 from rockcheck.ebm.core.state import MODE, code_of, on_wall, rests
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -119,12 +119,8 @@ def wrong_by(block, base, run, measured):
     """
     # The plain constant would make numba compile all series once more, for it alone.
     look = min(_LOOK, series.WIDTH)
-    state, mode, t, a = run.state, run.state.mode, run.state.t, run.a
-    if mode.family == Family.FLAT:
-        order = flat_series(block, base, run, look)
-    else:
-        order = tilt_series(block, base, run, look, 0.0, 0.0)
-        state.place = mode.sense * state.motion.x - a[Row.SIN, 0]
+    state, t, a = run.state, run.state.t, run.a
+    order = mode_series(block, base, run, look, 0.0)
     guards.fill_guards(block, run.state, run.a)
     smooth = ground.smooth_until(base, t) - t
     worst = 0.0

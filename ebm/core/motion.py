@@ -65,9 +65,18 @@ def base_series(base, t, sign, order, a):
 
 
 @inner_kernel
+def mode_series(block, base, run, order, reach):
+    """Fills the workspace with the whole series of the mode's motion; returns their order."""
+    if run.state.mode.family == Family.FLAT:
+        return flat_series(block, base, run, order)
+    return tilt_series(block, base, run, order, 0.0, reach)
+
+
+@inner_kernel
 def tilt_series(block, base, run, order, enough, reach):
     """Fills the workspace with the series of a tilted block's motion; returns their order.
 
+    In the state it notes the place of a pivot that sticks.
     The series begin now. The order is `order`, or less where the terms fall below `enough` within
     `reach` (the longest step there can be). ROCK, whose motion does not depend on P and Q, has them
     where the setting needs a guard on them.
@@ -78,6 +87,7 @@ def tilt_series(block, base, run, order, enough, reach):
     side = side_of(block, mode.sense)
     sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
     a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
+    run.state.place = sign * motion.x - a[Row.SIN, 0]
     if rocks(mode):
         still = base.vertical.form.kind == Shape.STILL
         forces = block.unilateral or not block.no_slip

@@ -137,9 +137,6 @@ CONTACT_SETS = [some for n in range(4) for some in itertools.combinations(range(
 #: Friction in a set of contacts: none, sticking, slip to either side.
 Friction = IntEnum("Friction", "FREE HELD PLUS MINUS", start=0)
 
-#: What came of an impact: its stages do not end, all obey the law, or one violates it least.
-Found = IntEnum("Found", "ENDLESS FITS LEAST_WRONG", start=0)
-
 
 #: The modelling choices of the event-based models. They are made where rigid-body mechanics, or
 #: rounding, leaves more than one answer or none. Each has one home in the code, is counted in every

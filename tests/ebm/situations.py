@@ -143,7 +143,6 @@ class Core:
         run = run_of(mode, state)
         order = motion.tilt_series(self.setting, self.base, run, 8, 0.0, 0.0)
         a = run.a
-        run.state.place = mode.side * state[0] - a[Row.SIN, 0]
         guards.fill_guards(self.setting, run.state, a)
         found = {
             name: Polynomial(a[Row.GUARD, : degree + 1].copy())
