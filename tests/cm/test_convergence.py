@@ -84,8 +84,14 @@ def test_paper_rule_is_further_off():
     ("omega", "amplitude", "mu"), [(4.5, 2.5, 0.3), (6.0, 2.5, 0.6), (3.0, 1.8, 0.3)]
 )
 def test_pulses_beside_a_wall(gap, e, omega, amplitude, mu):
-    ends = {"duration": 4.0 * ricker(omega, amplitude).period + 3.0, "output_step": 0.001}
-    scene = pulse_scene(omega, amplitude, mu, ("left", gap, e), **ends)
+    scene = pulse_scene(
+        omega,
+        amplitude,
+        mu,
+        ("left", gap, e),
+        duration=4.0 * ricker(omega, amplitude).period + 3.0,
+        output_step=0.001,
+    )
     assert rms(ContinuousModel().simulate(scene), rigid(scene)) < 1e-3
 
 

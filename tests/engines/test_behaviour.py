@@ -211,11 +211,11 @@ def test_small_and_large_blocks_move_alike(stock):
     )
     assert np.max(np.abs(one.channels["theta"] - other.channels["theta"])) < 1e-6
     assert np.max(np.abs(one.channels["x"] - 100 * other.channels["x"])) < 1e-5
-    assert impacts(one) == impacts(other)
-
-
-def impacts(history):
-    return [event.kind for event in history.event_list if "impact" in event.kind][:6]
+    kinds, others = (
+        [event.kind for event in history.event_list if "impact" in event.kind][:6]
+        for history in (one, other)
+    )
+    assert kinds == others
 
 
 def test_record_with_kinks(model):

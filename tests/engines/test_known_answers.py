@@ -68,8 +68,9 @@ def test_quarter_period(model):
         0.0,
         math.sqrt(tilt),
     )[0]
-    known = quarter / scene.frequency_parameter
-    assert impact.t == pytest.approx(known, abs=within(model, 2e-4, 1e-6))
+    assert impact.t == pytest.approx(
+        quarter / scene.frequency_parameter, abs=within(model, 2e-4, 1e-6)
+    )
 
 
 @pytest.mark.parametrize(("speed", "friction"), [(1.0, 0.2), (-1.5, 0.5)])
