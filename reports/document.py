@@ -33,7 +33,6 @@ from rockcheck.reports.style import (
     LOOKS,
     label_of,
     looks,
-    save,
     save_as,
     stamp_in,
     stamp_of,
@@ -167,8 +166,8 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return "\n\n".join(filter(None, [block.title and f"## {block.title}", *parts]))
 
 
-def _draw(plot: Plot, stem: Path, stamp: str) -> None:
-    save(figure_of(plot), stem, ["svg"], stamp=stamp)
+def _draw(plot: Plot, path: Path, stamp: str) -> None:
+    save_as(figure_of(plot), path, stamp=stamp, named=False)
 
 
 def _draw_again(data: Path, path: Path) -> None:
@@ -213,11 +212,11 @@ def publish(found: Finding, folder: Path) -> Path:
     calls = []
     for plot in plots:
         drawn = replace(plot, played=None)
-        data, stem = writing.json_text(asdict(drawn)), figures / plot.name
-        writing.write_whole(stem.with_suffix(".json"), data)
+        data, path = writing.json_text(asdict(drawn)), figures / f"{plot.name}.svg"
+        writing.write_whole(path.with_suffix(".json"), data)
         stamp = stamp_of(data)
-        if stamp_in(stem.with_suffix(".svg")) != stamp:
-            calls.append(Call(_draw, (drawn, stem, stamp)))
+        if stamp_in(path) != stamp:
+            calls.append(Call(_draw, (drawn, path, stamp)))
     list(side_by_side(calls))
     write_assets(folder)
     if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:

@@ -253,7 +253,7 @@ class _Pages:
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
-        save(thumbnail(curves), figures / f"{view.slug}-small", ["svg"])
+        save_as(thumbnail(curves), figures / f"{view.slug}-small.svg", named=False)
         stems = {
             against: f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", str(against))
             if number
@@ -288,7 +288,7 @@ class _Pages:
             for model, look in view.looks.items()
             if model in view.curves
         ]
-        save(thumbnail(curves, step=True), figures / f"{view.slug}-small", ["svg"])
+        save_as(thumbnail(curves, step=True), figures / f"{view.slug}-small.svg", named=False)
         for plot in page.plots():
             save(figure_of(plot), figures / plot.name)
         for table in page.tables():

@@ -195,12 +195,10 @@ def save_as(figure: Figure, path: Path, *, stamp: str = "", named: bool = True) 
     return writing.write_whole(path, content.getvalue(), named=named)
 
 
-def save(
-    figure: Figure, stem: Path, formats: Iterable[str] = FORMATS, *, stamp: str = ""
-) -> list[Path]:
+def save(figure: Figure, stem: Path) -> list[Path]:
     """Write a figure as `<stem>.svg`, `.png` and `.pdf` (see `save_as`)."""
-    paths = (stem.with_name(f"{stem.name}.{kind}") for kind in formats)
-    return [save_as(figure, path, stamp=stamp, named=False) for path in paths]
+    paths = (stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS)
+    return [save_as(figure, path, named=False) for path in paths]
 
 
 def stamp_of(shown: object) -> str:

@@ -13,7 +13,7 @@ from importlib import resources
 from importlib.metadata import entry_points
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +83,7 @@ class Shown:
 
     def plot(self) -> Figure:
         """The object as a matplotlib figure."""
-        figure: Figure = resolve_name(_view_of(type(self)).figure)(self)
-        return figure
+        return cast("Figure", resolve_name(_view_of(type(self)).figure)(self))
 
     def _repr_html_(self) -> str:
         return _view_of(type(self)).html(self)

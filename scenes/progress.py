@@ -72,8 +72,7 @@ def announce(words: str) -> None:
 def announcing(say: Callable[[str], None] | None) -> Iterator[None]:
     """Within this block `say` receives this process's announcements; None: nobody does."""
     global announcer
-    before = announcer
-    announcer = say
+    before, announcer = announcer, say
     try:
         yield
     finally:

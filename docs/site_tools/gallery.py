@@ -16,7 +16,7 @@ from rockcheck.ebm import EventBasedModel, overturning_spectrum
 from rockcheck.engines import MuJoCo, PyBullet
 from rockcheck.reports.show.drawing import draw_block
 from rockcheck.reports.show.spectrum import draw
-from rockcheck.reports.style import PAGE, STYLE, looks, save
+from rockcheck.reports.style import PAGE, STYLE, looks, save_as
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height
 
@@ -223,7 +223,8 @@ def make(folder: Path) -> list[Path]:
     written = []
     for picture in PICTURES:
         with rc_context(STYLE):
-            written += save(picture(), folder / picture.__name__, ["png"])
+            path = folder / f"{picture.__name__}.png"
+            written.append(save_as(picture(), path, named=False))
     return written
 
 
