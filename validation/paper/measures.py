@@ -115,31 +115,34 @@ def share(mask: Mask | float) -> str:
 
 def pairs(paper: Paper, axis: str, free: bool = False) -> Measured:
     """Compare each value of a parameter, which the paper calls safer, with the next one."""
-    rows = [_pair(paper, "no wall", *paper.safe_alone)] if free else []
+    compared = [("no wall", *paper.safe_alone)] if free else []
     k = list(AXES).index(axis)
     for place in np.ndindex(*SIZES[:k], 1, *SIZES[k + 1 :]):
         before, after = place[:k], place[k + 1 :]
         along = paper.safe[(*before, slice(None), *after)]
-        for (one, safe), (other, next_safe) in pairwise(zip(AXES[axis], along, strict=True)):
-            two = f": {one:g} against {other:g} mm" if len(along) > 2 else ""
-            rows.append(_pair(paper, about((*before, None, *after)) + two, safe, next_safe))
+        where = about((*before, None, *after))
+        compared += [
+            (where + (f": {one:g} against {other:g} mm" if len(along) > 2 else ""), *both)
+            for (one, other), both in zip(pairwise(AXES[axis]), pairwise(along), strict=True)
+        ]
+    rows = []
+    for what, safer, other in compared:
+        i, j = np.nonzero(~safer & other)
+        f, a = paper.frequencies[j], paper.amplitudes[i]
+        opposite = (
+            f"the opposite at {share(len(i) / safer.size)} of the nodes,"
+            f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
+            if len(i)
+            else "nowhere the opposite"
+        )
+        rows.append(
+            Row(
+                what,
+                f"safe area {share(safer)} against {share(other)}; {opposite}",
+                bool(safer.mean() > other.mean()),
+            )
+        )
     return rows, {}
-
-
-def _pair(paper: Paper, what: str, safer: Mask, other: Mask) -> Row:
-    i, j = np.nonzero(~safer & other)
-    f, a = paper.frequencies[j], paper.amplitudes[i]
-    opposite = (
-        f"the opposite at {share(len(i) / safer.size)} of the nodes,"
-        f" ω_p/p {f.min():.1f} to {f.max():.1f}, amplitude {a.min():.1f} to {a.max():.1f}"
-        if len(i)
-        else "nowhere the opposite"
-    )
-    return Row(
-        what,
-        f"safe area {share(safer)} against {share(other)}; {opposite}",
-        bool(safer.mean() > other.mean()),
-    )
 
 
 def against_none(
