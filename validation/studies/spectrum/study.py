@@ -561,8 +561,8 @@ def agreement_blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> I
         on="page",
     )
     model = Column("model", kind="model")
-    yield _table("agreement", found["shares"], [model])
-    yield _table(
+    yield _table_of_shares("agreement", found["shares"], [model])
+    yield _table_of_shares(
         "agreement-by-spectrum",
         found["shares"],
         [text("spectrum"), model],
@@ -603,7 +603,7 @@ def agreement_blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> I
         )
 
 
-def _table(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
+def _table_of_shares(name: str, shares: Sequence[Any], by: Sequence[Column], **more: Any) -> Table:
     """The shares of equal outcomes, summed up by some columns."""
     columns = [
         Column(f"{side}_{short}", f"{side}, {short}", kind="percent")
