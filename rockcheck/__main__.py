@@ -6,7 +6,6 @@ import io
 import os
 import sys
 import time
-from collections.abc import Sequence
 from typing import Any
 
 #: Start of the program, by `time.perf_counter`.
@@ -39,7 +38,7 @@ class _Pipe(io.FileIO):
         return len(data)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main() -> int:
     """Run the command line; returns the exit code."""
     from rockcheck.commands.cli import main as run
     from rockcheck.scenes import progress
@@ -51,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
             how = {"errors": stream.errors, "line_buffering": stream.line_buffering}
             setattr(sys, name, io.TextIOWrapper(pipe, stream.encoding, **how))
-    code = run(arguments, began=BEGAN)
+    code = run(began=BEGAN)
     # Compiled code may still run in threads, which Python would wait for.
     if code == progress.INTERRUPTED:
         print(end="", flush=True)
