@@ -156,6 +156,7 @@ def test_noise_is_no_sign(noise):
         ([2.0 * noise], 1),
         ([-0.5 * noise, 1.0], 1),
         ([0.0, -0.5 * noise / series.AHEAD, 1.0], 1),
+        ([0.7 * noise, 0.7 * noise / series.AHEAD], 0),
     ):
         assert [leading(side * np.array(terms), noise) for side in (1, -1)] == [sign, -sign], terms
     for terms, root in (([0.5, 0.0, -1.0 / noise], 0.0), ([-0.5, 0.0, 1.0 / noise], None)):
