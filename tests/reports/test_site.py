@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from rockcheck.commands import OUT, studies
+from rockcheck.reports.drawers import GREY, colours
 from rockcheck.reports.figures import EnsembleView
 from rockcheck.reports.show.words import number
 from rockcheck.reports.site import PAGES, STUDIES, write_site
@@ -292,6 +293,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
         rows["peak_rotation_alpha ebm-unilateral"], np.array(record.peaks["ebm-unilateral"])
     )
     above, below = view.distributions().panels
+    assert colours(below)[-1] == GREY  # the band of no difference has no model's colour
     curve = next(one for one in above.series if one.label == "CM")
     sample = view.record.samples["cm"]
     np.testing.assert_allclose(
