@@ -166,7 +166,7 @@ def write_site(
             pool.Call(pages.write, one)
             if few
             else pool.Call(_write_page, (folder, pages.wanted, *one))
-            for one in (*waiting.items(), (INDEX, ""))
+            for one in (*waiting.items(), ("", ""))
         ]
         written = side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
         for done, _ in enumerate(written, 1):
@@ -228,7 +228,7 @@ class _Pages:
         }
 
     def write(self, name: str, stamp: str) -> None:
-        """Write figures and data, and last the page, with its `stamp`; or the index (`INDEX`)."""
+        """Write figures and data, and last the page, with its `stamp`; without a name the index."""
         view, address = self.views.get(name), self.links.get(name, INDEX)
         page = self.folder / address
         before = belongings(page)
