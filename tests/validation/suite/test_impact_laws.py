@@ -101,7 +101,7 @@ def test_the_law_that_each_model_followed_is_in_its_cell(run, scene, laws):
 def test_outcomes_and_peaks_are_judged_by_the_nearest_law_and_histories_until_they_part(
     run, scene, law, outcomes, near
 ):
-    reference, cell = run.cell(scene, "ebm-unilateral"), run.by_scene[scene][law]
+    reference, cell = (run.by_scene[scene][one] for one in ("ebm-unilateral", law))
     assert reference.outcome != cell.outcome
     assert outcomes in (None, (reference.outcome, cell.outcome))
     assert {check.verdict for check in cell.checks} == {"pass"}
