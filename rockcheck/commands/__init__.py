@@ -166,7 +166,8 @@ def progress(
         speed_estimate_period=600.0,
         disable=_voice.get() != "tables" or not screen.is_terminal,
     )
-    task = bar.tasks[bar.add_task(title, total=None, what="")]
+    bar.add_task(title, total=None, what="")
+    (task,) = bar.tasks
 
     def on_progress(done: float, total: float, what: str = "") -> None:
         bar.update(
