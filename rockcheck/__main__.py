@@ -48,12 +48,14 @@ def main() -> int:
         # not where somebody else has put another in its place
         if stream is not None and stream is getattr(sys, f"__{name}__") and not stream.isatty():
             pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
-            how = {"errors": stream.errors, "line_buffering": stream.line_buffering}
-            setattr(sys, name, io.TextIOWrapper(pipe, stream.encoding, **how))
+            at_once = stream.line_buffering or stream.write_through
+            text = io.TextIOWrapper(pipe, stream.encoding, stream.errors, line_buffering=at_once)
+            setattr(sys, name, text)
     code = run(began=BEGAN)
     # Compiled code may still run in threads, which Python would wait for.
     if code == progress.INTERRUPTED:
-        print(end="", flush=True)
+        sys.stdout.flush()
+        sys.stderr.flush()
         os._exit(code)
     return code
 
