@@ -202,7 +202,7 @@ class _Pages:
         slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
         if unknown := [name for name in wanted if name not in slugs]:
             raise errors.unknown_name("scene of the run", unknown[0], slugs)
-        self.scenes = scene_views(self.run, folder, {*shown(self.run)[0], *wanted})
+        self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
             EnsembleView(self.run, one.name, slugs[one.name], one) for one in self.run.ensembles
         ]

@@ -21,11 +21,10 @@ OUTCOMES = (
 )
 
 
-def shown(run: results.Run) -> tuple[tuple[str, ...], list[str]]:
+def shown(run: results.Run) -> tuple[str, ...]:
     """The scenes and ensembles shown one by one, in the suite's order: at most `MOST_SHOWN` scenes.
 
     Those with the worst verdict, and of these the nearest to a limit. Ensembles are always shown.
-    Also a line with the number of scenes that are not; none where all are.
     """
     cells, ensembles = run.by_scene, {ensemble.name for ensemble in run.ensembles}
     badness = {
@@ -37,9 +36,14 @@ def shown(run: results.Run) -> tuple[tuple[str, ...], list[str]]:
         if place not in ensembles
     }
     chosen = ensembles.union(sorted(badness, key=badness.__getitem__, reverse=True)[:MOST_SHOWN])
-    more = len(cells.keys() - chosen)
+    return tuple(place for place in cells if place in chosen)
+
+
+def not_shown(run: results.Run) -> list[str]:
+    """A line with the number of scenes that are not `shown`; empty if there are none."""
+    more = len(run.by_scene) - len(shown(run))
     said = f"and {more} more scenes, none of them worse; their figures are in figures.csv"
-    return tuple(place for place in cells if place in chosen), [said] if more else []
+    return [said] if more else []
 
 
 def finding_of(run: results.Run) -> Finding:
@@ -49,10 +53,10 @@ def finding_of(run: results.Run) -> Finding:
         return Finding(
             "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), wrong]
         )
-    cells, (places, more) = run.by_scene, shown(run)
+    cells = run.by_scene
     rows = [
         ["" if n else scene, *_verdict_row(cell)]
-        for scene in places
+        for scene in shown(run)
         for n, cell in enumerate(cells[scene].values())
     ]
     columns = [
@@ -64,7 +68,7 @@ def finding_of(run: results.Run) -> Finding:
     makes = "`rockcheck accept` makes today's the expected ones"
     blocks: list[Block] = [
         Table("verdicts", columns, rows, most=len(rows)),
-        Text(items=more),
+        Text(items=not_shown(run)),
         wrong,
         Text(f"better than expected; {makes}:" if better else ""),
         Text(items=better, verdict="fail" if run.strict == "both" else "pass"),
@@ -329,12 +333,12 @@ def markdown(run: results.Run) -> str:
         rest = [f"- and {more} more, in junit.xml"] if more > 0 else []
         items = [*(f"- {_plain(one)}" for one in lines[:MOST_SHOWN]), *rest]
         parts += [*heading, "\n".join(items)] if lines else []
-    cells, (places, hidden) = run.by_scene, shown(run)
+    cells, places = run.by_scene, shown(run)
     rows = (
         (_plain(scene), *(_entry(cells[scene].get(model), run.judged) for model in run.models))
         for scene in places
     )
-    parts += [writing.markdown_table(("scene", *map(_plain, run.models)), rows), *hidden]
+    parts += [writing.markdown_table(("scene", *map(_plain, run.models)), rows), *not_shown(run)]
     return "\n\n".join([*parts, *_laws(run, places)]) + "\n"
 
 

@@ -155,8 +155,8 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     drawn = results.EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
     worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", check(0.75)))
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
-    assert tables.shown(run)[0] == tuple(one.scene for one in worst)
-    assert tables.shown(run_of(*near))[0] == tuple(one.scene for one in near)
+    assert tables.shown(run) == tuple(one.scene for one in worst)
+    assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
     assert len(tables.finding_of(run).table("verdicts").rows) == tables.MOST_SHOWN + 1
     text = tables.markdown(run)
     # the number of the others is not a row of the table
