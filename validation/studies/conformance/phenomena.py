@@ -175,15 +175,15 @@ ROCK = Scene(
     duration=2.5,
     output_step=1e-3,
 )
-#: By name, a block that is set in motion so that it just falls, or just does not: at a part of the
-#: angular velocity from rest that just reaches the balance point.
+#: Angular velocity from rest that just reaches the balance point.
+CRITICAL = math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter
+#: By name, a block that is set in motion so that it just falls, or just does not.
 FLICKED = {
     name: Scene(
         name=name,
         block=SLENDER,
         floor=Floor(friction=0.6),
-        initial_angular_velocity=part
-        * (math.sqrt(2.0 * (1.0 - math.cos(SLENDER.alpha))) * SLENDER.frequency_parameter),
+        initial_angular_velocity=part * CRITICAL,
         duration=6.0,
     )
     for name, part in (("tip", 1.03), ("return", 0.97))
@@ -299,6 +299,14 @@ SIZES = {0.25: True, 0.5: True, 1.0: False, 2.0: False, 4.0: False}  # R, m
 
 def _wrong(must: Iterable[bool], seen: Callable[[Motion], float], *motions: Motion) -> float:
     return float(sum(seen(m) != one for m, one in zip(motions, must, strict=True)))
+
+
+def _integral(scene: Scene) -> bool:
+    """Whether the sine overturns the needle before its first impact."""
+    t = np.linspace(0.0, scene.excitation.quiet_after, 20001)
+    return overturns_without_impact(
+        NEEDLE_P * t, scene.excitation.acceleration(t) / (G * NEEDLE.alpha)
+    )
 
 
 COULOMB, NEWTON, HOUSNER = "Coulomb 1785; momentum", "Newton's law of impact", "Housner 1963"
@@ -672,13 +680,7 @@ PHENOMENA: dict[str, Phenomenon] = {
             "overturning without impact",
             SINES,
             lambda *ms: _wrong(
-                (
-                    overturns_without_impact(
-                        NEEDLE_P * t, base.acceleration(t) / (G * NEEDLE.alpha)
-                    )
-                    for base in (scene.excitation for scene in SINES)
-                    for t in (np.linspace(0.0, base.quiet_after, 20001),)
-                ),
+                map(_integral, SINES),
                 # whether it overturns without having tipped to the other side
                 lambda m: (
                     falls(m) * float(min(-np.min(m.theta), np.max(m.theta)) < 0.01 * NEEDLE.alpha)

@@ -45,8 +45,9 @@ STEPS = "numerical error"
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
 #: Units as readers know them, where these are other words.
 UNITS = {"alpha": "α"}
-#: Of a probability.
+#: Of a probability; and what identifies a hand method.
 INTERVAL = ("probability", "low", "high")
+METHOD = ("name", "formula", "event", "source", "holds")
 #: A slip (m) or rotation (alpha) below this is none.
 MOVED = 1e-9
 #: Points of a history on the page.
@@ -652,7 +653,7 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
         runs = [(*said[k], getattr(run, figure)) for run, said in cases]
         pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
         yield {
-            **{key: getattr(one, key) for key in ("name", "formula", "event", "source", "holds")},
+            **{key: getattr(one, key) for key in METHOD},
             "predicts": sum(says for says, *_ in runs),
             "of": len(runs),
             "simulated": sum(far > least for *_, far in runs),

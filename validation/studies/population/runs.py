@@ -678,19 +678,14 @@ class Asked(Study):
     @cached_property
     def at_gaps(self) -> dict[float, dict[str, list[Task]]]:
         """The runs at each gap, without the walls at an infinite one."""
-        return {
-            gap: self._runs(
-                "without the wall" if gap == np.inf else f"gap {gap:g} m",
-                self.swift,
-                [
-                    tuple(
-                        {**dict(one), **{f"walls.{side}.gap": gap for side in self.sides}}.items()
-                    )
-                    for one in self.draws or ((),)
-                ],
+        found = {}
+        for gap in (*self.gaps, np.inf) if self.sides else ():
+            walls = {f"walls.{side}.gap": gap for side in self.sides}
+            variants = [tuple({**dict(one), **walls}.items()) for one in self.draws or ((),)]
+            found[gap] = self._runs(
+                "without the wall" if gap == np.inf else f"gap {gap:g} m", self.swift, variants
             )
-            for gap in ((*self.gaps, np.inf) if self.sides else ())
-        }
+        return found
 
     @cached_property
     def parts(self) -> dict[Any, dict[str, list[Task]]]:

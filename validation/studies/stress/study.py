@@ -135,15 +135,13 @@ def scene_at(axis: str, value: float) -> Scene:
     """A block of the paper's shape beside a wall under a pulse, with one parameter changed."""
     at = {name: usual for name, (_, usual, _) in AXES.items()} | {axis: value}
     radius, unit = at["size"], math.sqrt(at["size"] / 9.81)
+    own = 2.0 * math.pi * unit / math.sqrt(0.75)
     return Scene(
         name=f"{axis} {value:g}",
         block=Block(half_width=radius * math.sin(0.25), half_height=radius * math.cos(0.25)),
         floor=Floor(friction=at["friction"]),
         walls=(Wall(side="left", gap=0.03 * radius, restitution=at["restitution"]),),
-        excitation=Ricker(
-            amplitude=9.81 * SLOPE * at["shaking"],
-            period=0.3 * (2.0 * math.pi * unit / math.sqrt(0.75)),
-        ),
+        excitation=Ricker(amplitude=9.81 * SLOPE * at["shaking"], period=0.3 * own),
         duration=8.0 * unit,
         output_step=0.02 * unit,
     )
