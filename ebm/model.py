@@ -69,7 +69,7 @@ class EventBasedModel(Frozen):
         errors.check_kind(scene, Scene, "load_scene", "scene")
         floor, height, speed = scene.floor, scene.initial_height, scene.initial_velocity
         bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
-        refusals = (
+        errors.refuse(
             (
                 bouc_wen and not bilateral,
                 f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is',
@@ -106,9 +106,6 @@ class EventBasedModel(Frozen):
                 "floor.restitution",
             ),
         )
-        for refused, reason, key in refusals:
-            if refused:
-                raise errors.InputError(reason, key)
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene on its output grid.

@@ -342,19 +342,18 @@ def _axis(values: ArrayLike, key: str) -> Floats:
         axis = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("numbers are asked for", key) from None
-    refusals = (
+    errors.refuse(
         (
             axis.ndim != 1 or axis.size == 0,
             f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked"
             " for",
+            key,
         ),
         (
             not np.all(np.isfinite(axis)) or np.any(axis[:1] <= 0.0),
             "positive finite numbers are asked for",
+            key,
         ),
-        (np.any(np.diff(axis) <= 0.0), "increasing numbers are asked for"),
+        (np.any(np.diff(axis) <= 0.0), "increasing numbers are asked for", key),
     )
-    for refused, reason in refusals:
-        if refused:
-            raise InputError(reason, key)
     return axis

@@ -178,26 +178,24 @@ def check_tried(
     begins = (scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity)
     rests = scene.excitation.kind == scene.vertical.kind == "rest"
     besides = " besides the excitation that the records replace" if given.spreads else ""
-    for wrong, option, said in (
+    errors.refuse(
         (
             rests and not (recorded or any(begins) or scene.initial_height),
-            "records",
             "are needed: the base of the scene is at rest",
+            "records",
         ),
         (
             tried.samples is not None and not drawn.spreads,
-            "--samples",
             f"no number of the scene{besides} is uncertain: write one as"
             " { value = 0.3, sd = 0.03 }",
+            "--samples",
         ),
         (
             tried.capacity and not (recorded and tried.levels),
-            "--capacity",
             "needs records and --levels",
+            "--capacity",
         ),
-    ):
-        if wrong:
-            raise errors.InputError(said, option)
+    )
 
 
 def population_of(

@@ -414,17 +414,15 @@ def _check_names(
 ) -> None:
     known = ", ".join(models) or "none"
     count = Counter((*scenes, *(one.name for one in given.ensemble)))
-    for wrong, key, said in (
+    errors.refuse(
         *(
-            (one and one not in models, key, f"{one!r} is not among the suite's models: {known}")
+            (one and one not in models, f"{one!r} is not among the suite's models: {known}", key)
             for key, one in (("reference", given.reference), ("model_form", given.model_form))
         ),
-        (not models, "models", "no model; at least the reference is needed"),
-        (not scenes and not ensembles, "scenes", "no scene; at least one is needed"),
-        *((n > 1, "ensemble.name", f"{one!r} is named twice") for one, n in count.items()),
-    ):
-        if wrong:
-            raise errors.InputError(said, key)
+        (not models, "no model; at least the reference is needed", "models"),
+        (not scenes and not ensembles, "no scene; at least one is needed", "scenes"),
+        *((n > 1, f"{one!r} is named twice", "ensemble.name") for one, n in count.items()),
+    )
     for key, texts in given.require:
         book = {"figures": measures.FIGURES, "ensemble": measures.STATISTICS}.get(
             key, measures.DIFFERENCES

@@ -745,15 +745,14 @@ def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...
         gaps = sorted({float(word) for word in numbers.split(",")})
     except ValueError:
         gaps = [-1.0]
-    for wrong, said in (
-        (colon and side not in get_args(Side), f"{side!r} is not allowed: left or right"),
+    errors.refuse(
+        (colon and side not in get_args(Side), f"{side!r} is not allowed: left or right", "--gaps"),
         (
             not all(0.0 <= gap < np.inf for gap in gaps),
             f"{text!r} is not allowed: clear gaps in m, 0 or more, with commas between",
+            "--gaps",
         ),
-        (not sides, f"the scene has no wall: say on which side, as in left:{numbers}"),
-    ):
-        if wrong:
-            raise InputError(said, "--gaps")
+        (not sides, f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"),
+    )
     new = [Wall(side=one, gap=gaps[-1]) for one in sides if one not in known]
     return tuple(gaps), sides, scene.replace(walls=[*scene.walls, *new])
