@@ -350,10 +350,10 @@ def _axis(values: ArrayLike, key: str) -> Floats:
             key,
         ),
         (
-            not np.all(np.isfinite(axis)) or np.any(axis[:1] <= 0.0),
+            not np.all(np.isfinite(axis)) or np.any(axis.ravel()[:1] <= 0.0),
             "positive finite numbers are asked for",
             key,
         ),
-        (np.any(np.diff(axis) <= 0.0), "increasing numbers are asked for", key),
+        (np.any(np.diff(axis.ravel()) <= 0.0), "increasing numbers are asked for", key),
     )
     return axis
