@@ -6,14 +6,15 @@ Each block is rendered from one description. All pages have one look, made of th
 
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
@@ -45,6 +46,8 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Tex
 FIGURES = "figures"
 #: The data of a figure, and limits of drawing it anew: s, and MB.
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
+#: The tables of a finding in its run.json: their rows by the names of the columns.
+TABLES = TypeAdapter(dict[str, list[dict[str, Any]]])
 #: Of a verdict: its sign, and its colour on a terminal.
 VERDICTS = {
     "": ("", ""),
@@ -189,15 +192,40 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     return path
 
 
+def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
+    """Tables and figures of the run that was in the folder, which this one does not have.
+
+    No other file is taken for one: a table has the columns that its run.json says, and a figure's
+    stamp is that of the data beside it.
+    """
+    before: dict[str, list[dict[str, Any]]] = {}
+    with suppress(InputError, KeyError, TypeError, ValidationError):
+        before = TABLES.validate_python(
+            reading.read_json(reading.within(folder, "run.json"))["tables"]
+        )
+    for name in before.keys() - {table.name for table in found.tables()}:
+        path = folder / f"{name}.csv"
+        heads = tuple(writing.table_text([*row], []) for row in before[name][:1])
+        if path.parent == folder and reading.head_of(path, 10_000).startswith(heads):
+            yield path
+    drawn = {plot.name for plot in found.plots()}
+    for data in (folder / FIGURES).glob("*.json"):
+        svg = data.with_suffix(".svg")
+        if data.stem not in drawn and (
+            stamp_in(svg).split()[:1]
+            == stamp_of(reading.head_of(data, reading.MOST_BYTES)).split()[:1]
+        ):
+            yield from (data, svg)
+
+
 def publish(found: Finding, folder: Path) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
     The scenes of failures are written beside them. The folder holds one run: tables and figures of
-    another are removed, which its page shows and the new one does not. Figures are written as the
-    page shows them, and as the data that `write_figure` draws.
+    another are removed. Figures are written as the page shows them, and as the data that
+    `write_figure` draws.
     """
-    before = belongings(folder / "index.html")
-    for old in folder.glob("failures/*.toml"):
+    for old in (*_left_by_another(folder, found), *folder.glob("failures/*.toml")):
         old.unlink()
     writing.write_whole(folder / "run.json", writing.json_text(found.as_dict()) + "\n")
     for name, content in (
@@ -224,7 +252,7 @@ def publish(found: Finding, folder: Path) -> Path:
             folder / "curves.js",
             writing.script_text("window.rockcheckCurves", writing.finite(live)),
         )
-    page = write_page(
+    return write_page(
         folder,
         "index.html",
         "finding.html",
@@ -246,8 +274,6 @@ def publish(found: Finding, folder: Path) -> Path:
         row_cells=row_cells,
         formats=(),
     )
-    remove(folder, before - belongings(page))
-    return page
 
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -283,12 +309,14 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
 
 
 def belongings(page: Path) -> set[str]:
-    """The files that belong to a page, from its folder: tables beside it, its figures and data.
+    """The figures and data of a page of a run, from its folder; none of a page without a stamp.
 
     No other file is taken for one, whatever is linked by a page that somebody sent.
     """
+    if not stamp_in(page):
+        return set()
     names = re.findall(
-        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*|\w[\w.-]*\.csv)"',
+        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*)"',
         reading.head_of(page, reading.MOST_BYTES),
         re.ASCII,
     )

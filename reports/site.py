@@ -185,8 +185,7 @@ def _remove(folder: Path, kept: Collection[str] = ()) -> None:
     """Remove pages with their figures and data, by their stamps; addresses that are `kept` stay."""
     for page in (folder / INDEX, *(folder / PAGES).glob("*.html")):
         if page.relative_to(folder).as_posix() not in kept and stamp_in(page):
-            # the tables beside the index are those of the run
-            remove(page.parent, [page.name, *(one for one in belongings(page) if "/" in one)])
+            remove(page.parent, [page.name, *belongings(page)])
 
 
 class _Pages:
@@ -240,8 +239,7 @@ class _Pages:
             case None:
                 template, shown = "index.html", self._write_index()
         write_page(self.folder, address, template, view=view, stamp=stamp, **shown, **self.common)
-        # the tables beside the index are those of the run
-        remove(page.parent, [one for one in before - belongings(page) if "/" in one])
+        remove(page.parent, before - belongings(page))
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
         """Write a scene's figures and data; returns what its page shows beside the view.

@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
-from rockcheck.reports.document import FIGURES, publish
+from rockcheck.reports.document import FIGURES, belongings, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
 from rockcheck.scenes import reading
@@ -206,14 +206,21 @@ def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
 
 
 def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
-    """As nobody but a stranger writes such a page, or a user keeps figures of his own."""
+    """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
     folder = tmp_path / "sub"
     (folder / FIGURES).mkdir(parents=True)
-    links = ("../mine.csv", "figures/../../mine.csv", "figures/..", "notes.txt", "old.csv")
-    (folder / "index.html").write_text(" ".join(f'href="{link}"' for link in links), "utf-8")
-    names = ("own.csv", "notes.txt", "figures/a.json", "figures/a.svg")
-    mine = [tmp_path / "mine.csv", *(folder / name for name in names)]
-    for path in (*mine, folder / "old.csv"):
+    rows = [{"a": 1.0}]
+    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
+    (folder / "run.json").write_text(json.dumps(said), "utf-8")
+    mine = [
+        tmp_path / "mine.csv",
+        *(folder / f"{name}.csv" for name in ("empty", "odd")),
+        *(folder / FIGURES / name for name in ("a.json", "a.svg", "b.json")),
+    ]
+    for path in mine:
         path.write_text("a\n", "utf-8")
+    (folder / "own.csv").write_text("b,a\n", "utf-8")
+    (folder / "index.html").write_text('href="figures/a.svg"', "utf-8")  # without a stamp
+    assert belongings(folder / "index.html") == set()
     publish(Finding("made", "Made up", ""), folder)
-    assert [path.exists() for path in (*mine, folder / "old.csv")] == [True] * len(mine) + [False]
+    assert all(path.exists() for path in (*mine, folder / "own.csv"))
