@@ -252,10 +252,9 @@ class _Pages:
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
         save_as(thumbnail(curves), figures / f"{view.slug}-small.svg", named=False)
+        slugs = slugs_of([str(against) for against in view.figure_references])
         stems = {
-            against: f"{view.slug}-against-" + re.sub(r"[^\w.-]", "-", str(against))
-            if number
-            else view.slug
+            against: f"{view.slug}-against-{slugs[str(against)]}" if number else view.slug
             for number, against in enumerate(view.figure_references)
         }
         for against, stem in stems.items() if view.printed else ():

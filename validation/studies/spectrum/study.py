@@ -62,7 +62,7 @@ REFERENCES = {"ebm": "bilateral", "ebm-unilateral": "unilateral"}
 #: A node is near the boundary if a node of another outcome is among those at most this many nodes
 #: away, diagonals included.
 NEAR = 2
-#: The paper's figure of which every model draws a map, and the map's nodes an axis.
+#: The paper's figure of which every model draws a map, and the map's nodes an axis, at the most.
 MAPPED, MAP_SIZE = 8, 25
 #: All shares and maps, as JSON keeps them (`agree`).
 Agreement = Mapping[str, Any]
@@ -443,7 +443,7 @@ def agree(
         for panel, one in spectra.items()
     ]
     coarse = {
-        model: replace(one, size=MAP_SIZE, refine=False)
+        model: replace(one, size=min(MAP_SIZE, one.size), refine=False)
         for model, one in requests.items()
         if model not in PLAYED_SHARE
     }
