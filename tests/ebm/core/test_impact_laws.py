@@ -73,9 +73,13 @@ def test_floor_impact_balances_momentum(least, most, lopsided):
     assert forms == {Landing.HELD_FAST, Landing.SLID, Landing.FLAT_END}
 
 
-@pytest.mark.parametrize(("more", "form"), [(1e-12, Landing.HELD_FAST), (-1e-12, Landing.SLID)])
+@pytest.mark.parametrize(
+    ("more", "form"),
+    [(1e-12, Landing.HELD_FAST), (-1e-14, Landing.HELD_FAST), (-1e-12, Landing.SLID)],
+)
 @pytest.mark.parametrize("alpha", [0.1, 0.25, 0.5])
 def test_floor_impact_sticks_above_its_friction(alpha, more, form):
+    """And where it has as much to rounding."""
     t, b = math.tan(alpha), setting_of(alpha)
     mu = 3.0 * t / (4.0 + t * t) + more
     assert impacts.floor_impact(b, 1, -0.5, 0.0, mu, mu)[0] == form
