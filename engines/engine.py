@@ -9,7 +9,7 @@ from dataclasses import astuple
 from importlib.util import find_spec
 from typing import Any, ClassVar, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import model_validator
 
 from rockcheck.engines import contacts, events
 from rockcheck.engines.steps import AdaptiveStep, FixedStep, World, at_output_times, in_units_of
@@ -74,34 +74,28 @@ class Engine(Frozen):
     def _steps_given(cls, given: Any) -> Any:
         if not isinstance(given, dict):
             return given
-        if isinstance(step := given.get("time_step"), FixedStep | AdaptiveStep):
-            fields = zip(step.knobs, astuple(step), strict=True)
-            given = {**given, "time_step": "adaptive", **dict(fields)}
-        fixed = cls.fixed_because or given.get("settings") == "default"
-        return {"time_step": STOCK_STEP, **given} if fixed else given
-
-    @field_validator("time_step", mode="plain")
-    @classmethod
-    def _step_or_adaptive(cls, value: object) -> float | Literal["adaptive"]:
-        if value == "adaptive":
-            return "adaptive"
-        if (
-            isinstance(value, int | float)
-            and not isinstance(value, bool)
-            and 0.0 < value < math.inf
-        ):
-            return float(value)
-        raise errors.InputError(
-            f'{printable(value)} is not allowed: give a step above 0 s, or "adaptive"'
+        stock = given.get("settings") == "default"
+        usual = STOCK_STEP if stock or cls.fixed_because else "adaptive"
+        given = {"time_step": usual, **given}
+        if isinstance(steps := given["time_step"], FixedStep | AdaptiveStep):
+            fields = zip(steps.knobs, astuple(steps), strict=True)
+            given |= {"time_step": "adaptive", **dict(fields)}
+        step = given["time_step"]
+        number = isinstance(step, int | float) and not isinstance(step, bool)
+        why = ' with settings = "default":' if stock else f": {cls.fixed_because};"
+        errors.refuse(
+            (
+                step != "adaptive" and not (number and 0.0 < step < math.inf),
+                f'{printable(step)} is not allowed: give a step above 0 s, or "adaptive"',
+                "time_step",
+            ),
+            (
+                step == "adaptive" != usual,
+                f'"adaptive" is not allowed{why} give a step in s',
+                "time_step",
+            ),
         )
-
-    @model_validator(mode="after")
-    def _possible(self) -> Self:
-        stock = self.settings == "default"
-        if self.time_step == "adaptive" and (stock or self.fixed_because):
-            why = ' with settings = "default":' if stock else f": {self.fixed_because};"
-            raise errors.InputError(f'"adaptive" is not allowed{why} give a step in s', "time_step")
-        return self
+        return given
 
     @property
     def steps(self) -> FixedStep | AdaptiveStep:

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
+    AfterValidator,
     SerializerFunctionWrapHandler,
-    field_validator,
     model_serializer,
     model_validator,
 )
@@ -77,13 +77,11 @@ class Block(Frozen):
     half_width: Positive
     half_height: Positive
     mass: Positive | None = None
-    centre_of_mass: tuple[Finite, Finite] | None = None
+    centre_of_mass: Annotated[
+        tuple[Finite, Finite] | None,
+        AfterValidator(lambda centre: None if centre == (0.0, 0.0) else centre),
+    ] = None
     moment_of_inertia: Positive | None = None
-
-    @field_validator("centre_of_mass")
-    @classmethod
-    def _off_centre(cls, centre: tuple[float, float] | None) -> tuple[float, float] | None:
-        return None if centre == (0.0, 0.0) else centre
 
     @model_validator(mode="after")
     def _possible(self) -> Block:

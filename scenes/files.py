@@ -28,7 +28,7 @@ import numpy as np
 from pydantic import model_validator
 
 from rockcheck.scenes.base import DATA, Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
+from rockcheck.scenes.errors import InputError, printable, refuse, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
@@ -144,23 +144,25 @@ class Spread(Frozen):
 
     @model_validator(mode="after")
     def _one_form(self) -> Spread:
-        if self.sd is not None:
-            if self.low is not None or self.high is not None:
-                raise InputError("cannot be given together with low and high", "sd")
-            if self.value is None:
-                raise InputError("is missing beside sd", "value")
-            if self.distribution == "lognormal" and self.value <= 0.0:
-                raise InputError(
-                    f"{self.value:g} is not allowed: a lognormal number is positive", "value"
-                )
-        elif self.low is None or self.high is None:
-            raise InputError(
+        normal, (low, high) = self.sd is not None, self._ends
+        refuse(
+            (
+                normal and (low, high) != (None, None),
+                "cannot be given together with low and high",
+                "sd",
+            ),
+            (normal and self.value is None, "is missing beside sd", "value"),
+            (
+                not normal and None in (low, high),
                 "is missing: give value and sd, or low and high",
-                "high" if self.low is not None else "low",
-            )
-        elif not self.low < self.high:
+                "low" if low is None else "high",
+            ),
+        )
+        if not normal and not low < high:
+            raise InputError(f"{high:g} is not allowed: must be more than low, {low:g}", "high")
+        if normal and self.distribution == "lognormal" and self.nominal <= 0.0:
             raise InputError(
-                f"{self.high:g} is not allowed: must be more than low, {self.low:g}", "high"
+                f"{self.nominal:g} is not allowed: a lognormal number is positive", "value"
             )
         return self
 
@@ -257,18 +259,27 @@ def uncertain_scene(
     matrix = np.eye(len(names))
     for key, value in correlations.items():
         pair, where = [part.strip() for part in key.split(",")], f"{CORRELATION}.{key}"
-        if len(pair) != 2 or pair[0] == pair[1]:
-            raise InputError(
-                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
-            )
-        if unknown := [name for name in pair if name not in names]:
-            raise InputError(
-                f"{unknown[0]!r} is not an uncertain number of the scene"
-                f"{suggestion(unknown[0], names)}",
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        refuse(
+            (
+                len(pair) != 2 or pair[0] == pair[1],
+                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'",
                 where,
-            )
-        if isinstance(value, bool) or not isinstance(value, int | float) or not -1.0 < value < 1.0:
-            raise InputError(f"{value!r} is not allowed: give a number between -1 and 1", where)
+            ),
+            *(
+                (
+                    name not in names,
+                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
+                    where,
+                )
+                for name in pair
+            ),
+            (
+                not number or not -1.0 < value < 1.0,
+                f"{value!r} is not allowed: give a number between -1 and 1",
+                where,
+            ),
+        )
         i, j = (names.index(name) for name in pair)
         matrix[i, j] = matrix[j, i] = float(value)
     if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:

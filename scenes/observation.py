@@ -2,27 +2,19 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Floats
-from rockcheck.scenes.history import Cost, Event, History, outcome_of
+from rockcheck.scenes.history import Event, History, outcome_of
 from rockcheck.scenes.scene import Scene
 
 #: Size from which a note warns of lengths in mm, m.
 LARGE = 100.0
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
-
-
-class About(TypedDict, total=False):
-    """Fields of `History` that a model reports beside the motion."""
-
-    cost: Cost
-    settings: Mapping[str, Any]
-    notes: Sequence[str]
 
 
 def observe(
@@ -33,14 +25,16 @@ def observe(
     mode: NDArray[Any] | None = None,
     events: Sequence[Event] = (),
     outcome: str | None = None,
-    **about: Unpack[About],
+    notes: Sequence[str] = (),
+    **about: Any,
 ) -> History:
     """The History of a run, from its `state` at the output times.
 
     `state` has one row per output time: x, y, theta, x_dot, y_dot, theta_dot (SI). Fewer rows than
     `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are
     left out. `mode` and `outcome` are derived from the motion where the model does not know them;
-    `about` holds the fields of `About`. Adds a note where the record is shorter than the scene.
+    `about` are further fields of `History`, such as its cost and settings. Adds a note where the
+    record is shorter than the scene.
     Raises `ValueError` where the block overturned and the model neither reported the event nor
     knows the outcome.
     """
@@ -67,10 +61,9 @@ def observe(
         channels=channels,
         event_list=tuple(events),
         outcome=outcome,
-        cost=about.get("cost", Cost()),
-        settings=dict(about.get("settings", {})),
-        notes=(*scene_notes(scene), *about.get("notes", ())),
+        notes=(*scene_notes(scene), *notes),
         block=scene.block.per_unit_mass,
+        **about,
     )
 
 
