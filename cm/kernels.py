@@ -44,7 +44,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Floats
+from rockcheck.scenes import Floats, Scene, kinematics
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Integers = NDArray[np.int64]
@@ -84,6 +84,11 @@ SWEPT, MOST_SWEEPS = 1e-5, 50
 SHALLOW, GENTLE = 0.1, 0.01
 #: A run whose energy exceeds the work done on it by this share has blown up.
 ENERGY = 0.02
+#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff that friction follows the
+#: normal force without lag.
+FRICTION_DAMPING = 1000.0
+#: A surface within this distance (m) of the block at the start is touched already.
+TOUCHING = 1e-9
 #: How a stretch of motion ended.
 DONE, OVERTURNED, BLOWN_UP = 0, 1, 2
 
@@ -198,6 +203,65 @@ def damping_ratio(restitution: float, least: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if restitution_of(middle) > aim else (low, middle)
     return 0.5 * (low + high)
+
+
+def parameters_of(scene: Scene, stiffness: float, time_step: float, calibrated: bool) -> Parameters:
+    """The constants of a run of a scene; of contacts that are `calibrated` or the paper's."""
+    least = least_restitution(stiffness, scene.frequency_parameter)
+    walls = scene.wall("left"), scene.wall("right")
+    b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
+    restitution = (*(wall.restitution if wall else 0.0 for wall in walls), scene.floor.restitution)
+    return Parameters(
+        reach=(b + dx, b - dx, h + dz, h - dz),
+        inverse_inertia=3.0 / (b * b + h * h)
+        if scene.block.homogeneous
+        else 1.0 / scene.block.gyration_squared,
+        gravity=scene.gravity,
+        stiffness=stiffness,
+        friction_damping=FRICTION_DAMPING * math.sqrt(stiffness),
+        mu_s=scene.floor.mu_s,
+        mu_k=scene.floor.friction,
+        restitution=restitution,
+        damping_ratio=tuple(
+            damping_ratio(one, least) if calibrated else damping_ratio_of_paper(one)
+            for one in restitution
+        ),
+        distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
+        calibrated=calibrated,
+        time_step=time_step,
+    )
+
+
+def begun(scene: Scene, parameters: Parameters) -> tuple[Floats, Contacts]:
+    """State (see `advance`) and contacts at t = 0.
+
+    A block on the floor starts sunk in by its weight, so that it does not bounce.
+    """
+    x, y, tilt, *rates = scene.initial_state
+    k = parameters.stiffness
+    memory = np.zeros((2 * len(SURFACES), len(COLUMNS)))
+    memory[:, [STRUCK, LAST_CLOSED, STIFFNESS]] = math.inf, -math.inf, k
+    memory[:, DAMPING] = np.repeat(2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2)
+    for wall in scene.walls:
+        if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
+            surface = LEFT_WALL if wall.side == "left" else RIGHT_WALL
+            memory[2 * surface : 2 * surface + 2, LAST_CLOSED] = 0.0
+    placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
+    if scene.initial_height < TOUCHING:
+        standing = [2 * FLOOR] * (tilt >= 0.0) + [2 * FLOOR + 1] * (tilt <= 0.0)
+        memory[standing, CLOSED] = 1.0
+        sunk = scene.gravity / (k * len(standing))
+        # The corner nearer to the mass's centre carries more.
+        if tilt == 0.0 and scene.block.offset[0] != 0.0:
+            left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
+            placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
+            sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
+        placed[1] -= sunk
+    energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
+    gross = energy + 0.01 * scene.gravity * scene.block.half_width
+    state = np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross))
+    surfaces = np.flatnonzero(np.isfinite(parameters.distance))
+    return state, Contacts(memory, np.zeros(4), parameters, surfaces)
 
 
 @inner_kernel

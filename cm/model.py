@@ -1,11 +1,9 @@
 """The Continuous Model as a model of a scene: settings, set-up, run."""
 
-from __future__ import annotations
-
 import math
 import time
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -28,9 +26,6 @@ from rockcheck.scenes import (
     progress,
 )
 
-if TYPE_CHECKING:
-    from rockcheck.cm import kernels
-
 #: Most steps of a run: at 0.1 to 0.3 microseconds each, some ten minutes.
 MOST_STEPS = 4_000_000_000
 #: Samples of a period of a pulse; the straight lines between them are off by 2e-8 of its amplitude.
@@ -38,11 +33,6 @@ SAMPLES_A_PERIOD = 16384
 #: Longest stretch of motion (s) in one call of the compiled loop: it bounds the memory for events,
 #: and Ctrl-C is heard between.
 SLAB = 5.0
-#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff that friction follows the
-#: normal force without lag.
-FRICTION_DAMPING = 1000.0
-#: A surface within this distance (m) of the block at the start is touched already.
-TOUCHING = 1e-9
 
 
 class ContinuousModel(Frozen):
@@ -85,7 +75,7 @@ class ContinuousModel(Frozen):
     damping_rule: Literal["calibrated", "paper"] = "calibrated"
 
     @model_validator(mode="after")
-    def _one_stiffness(self) -> ContinuousModel:
+    def _one_stiffness(self) -> Self:
         if self.stiffness is not None and "penetration" in self.model_fields_set:
             raise errors.InputError("cannot be given together with penetration", "stiffness")
         return self
@@ -126,25 +116,20 @@ class ContinuousModel(Frozen):
         from rockcheck.cm import kernels
 
         times = scene.output_times
-        parameters = self._parameters(scene)
-        dt = parameters.time_step
+        calibrated, dt = self.damping_rule == "calibrated", self.time_step_in(scene)
+        parameters = kernels.parameters_of(scene, self.stiffness_in(scene), dt, calibrated)
         if times[-1] / dt > MOST_STEPS:
             raise errors.ModelFailure(
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
         base = _samples(scene.excitation, scene.duration), _samples(scene.vertical, scene.duration)
-        state, memory = self._initial(scene, parameters)
+        state, contacts = kernels.begun(scene, parameters)
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
-        events = np.empty(
-            (len(memory) * (math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2), 3)
-        )
-
-        surfaces = np.flatnonzero(np.isfinite(parameters.distance))
-        contacts = kernels.Contacts(memory, np.zeros(4), parameters, surfaces)
-
+        strikes_a_slab = math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2
+        events = np.empty((len(contacts.memory) * strikes_a_slab, 3))
         advance = partial(kernels.advance, contacts, base, scene.output_step, state, events)
         advance(1, output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
@@ -164,7 +149,7 @@ class ContinuousModel(Frozen):
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
                 f" with a step of {dt:.3g} s and a stiffness of {parameters.stiffness:.3g} 1/s^2"
             )
-        strikes.append(events[: kernels.gather(memory, 0.0, reached, events, 0)[0]])
+        strikes.append(events[: kernels.gather(contacts.memory, 0.0, reached, events, 0)[0]])
         cost = Cost(
             wall_seconds=time.perf_counter() - ready,
             cpu_seconds=time.process_time() - ready_cpu,
@@ -197,75 +182,6 @@ class ContinuousModel(Frozen):
                 "damping_rule": self.damping_rule,
             },
         )
-
-    def _parameters(self, scene: Scene) -> kernels.Parameters:
-        from rockcheck.cm import kernels
-
-        k = self.stiffness_in(scene)
-        calibrated = self.damping_rule == "calibrated"
-        least = kernels.least_restitution(k, scene.frequency_parameter)
-        walls = scene.wall("left"), scene.wall("right")
-        b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
-        restitution = (
-            *(wall.restitution if wall else 0.0 for wall in walls),
-            scene.floor.restitution,
-        )
-        return kernels.Parameters(
-            reach=(b + dx, b - dx, h + dz, h - dz),
-            inverse_inertia=3.0 / (b * b + h * h)
-            if scene.block.homogeneous
-            else 1.0 / scene.block.gyration_squared,
-            gravity=scene.gravity,
-            stiffness=k,
-            friction_damping=FRICTION_DAMPING * math.sqrt(k),
-            mu_s=scene.floor.mu_s,
-            mu_k=scene.floor.friction,
-            restitution=restitution,
-            damping_ratio=tuple(
-                kernels.damping_ratio(one, least)
-                if calibrated
-                else kernels.damping_ratio_of_paper(one)
-                for one in restitution
-            ),
-            distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
-            calibrated=calibrated,
-            time_step=self.time_step_in(scene),
-        )
-
-    def _initial(self, scene: Scene, parameters: kernels.Parameters) -> tuple[Floats, Floats]:
-        """State and contact memory at t = 0.
-
-        A block on the floor starts sunk in by its weight, so that it does not bounce.
-        """
-        from rockcheck.cm import kernels
-
-        x, y, tilt, *rates = scene.initial_state
-        k = parameters.stiffness
-        memory = np.zeros((2 * len(kernels.SURFACES), len(kernels.COLUMNS)))
-        memory[:, kernels.STRUCK] = math.inf
-        memory[:, kernels.LAST_CLOSED] = -math.inf
-        memory[:, kernels.STIFFNESS] = k
-        memory[:, kernels.DAMPING] = np.repeat(
-            2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2
-        )
-        for wall in scene.walls:
-            if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
-                surface = kernels.LEFT_WALL if wall.side == "left" else kernels.RIGHT_WALL
-                memory[2 * surface : 2 * surface + 2, kernels.LAST_CLOSED] = 0.0
-        placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
-        if scene.initial_height < TOUCHING:
-            standing = [2 * kernels.FLOOR] * (tilt >= 0.0) + [2 * kernels.FLOOR + 1] * (tilt <= 0.0)
-            memory[standing, kernels.CLOSED] = 1.0
-            sunk = scene.gravity / (k * len(standing))
-            # The corner nearer to the mass's centre carries more.
-            if tilt == 0.0 and scene.block.offset[0] != 0.0:
-                left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm
-                placed[2] += 2.0 * sunk * (right - left) / (left + right) ** 2
-                sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
-            placed[1] -= sunk
-        energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
-        gross = energy + 0.01 * scene.gravity * scene.block.half_width
-        return np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross)), memory
 
 
 def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[Floats, float]:

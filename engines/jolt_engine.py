@@ -16,17 +16,17 @@ ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num
 
 
 class _JoltWorld(steps.World):
-    """A box, floor and walls, with Jolt's default parameters; the y axis points up.
+    """A box, floor and walls, with Jolt's default parameters; the y axis points up."""
 
-    `scale`: lengths in this world per length in the scene.
-    """
+    #: Lengths in this world per length in the scene, and whether the block stays in its plane.
+    scale, planar = 1.0, False
 
-    def __init__(self, scene: Scene, scale: float = 1.0, planar: bool = False) -> None:
+    def __init__(self, scene: Scene) -> None:
         import culverin
 
         if not scene.block.homogeneous:
             raise InputError("Jolt holds a homogeneous block only", "block.centre_of_mass")
-        self.scale, self.jolt = scale, culverin
+        self.jolt = culverin
         self.world = culverin.PhysicsWorld(settings={"gravity": (0.0, 0.0, 0.0), **ROOM})
         # Of two frictions the geometric mean counts, of two restitutions the larger.
         for face in contacts.surfaces_of(scene):
@@ -34,7 +34,7 @@ class _JoltWorld(steps.World):
             size = face.extent(SLAB, REACH)
             self._box(face.behind(SLAB), size, motion=culverin.MOTION_STATIC, **fixed)
         b, h = scene.block.half_width, scene.block.half_height
-        freedom = culverin.DOF_PLANE_2D if planar else culverin.DOF_ALL
+        freedom = culverin.DOF_PLANE_2D if self.planar else culverin.DOF_ALL
         moved = {"friction": scene.floor.friction, "mass": 1.0, "allowed_dofs": freedom}
         self.body = self._box((0.0, h), (b, b, h), motion=culverin.MOTION_DYNAMIC, **moved)
         self.world.step(0.0)  # what is made takes part from the next step on
@@ -71,8 +71,7 @@ class _RigidJoltWorld(_JoltWorld):
     Jolt's damping is compensated.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        super().__init__(scene, SCALE, planar=True)
+    scale, planar = SCALE, True
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
         kept = 1.0 - DAMPING * dt  # Jolt makes (v + g dt) (1 - c dt) of a velocity v

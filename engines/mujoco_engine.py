@@ -196,8 +196,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
         bouncing: bool,
     ) -> steps.Vector:
         model, data = self.model, self.data
-        self.qpos[:] = pose
-        self.qvel[:] = velocity
+        self.place(*pose, *velocity)
         self.force[:] = felt
         if (dt, bouncing) != self.tuned:
             self.damping[:] = (self.bouncing if bouncing else self.stopping) * (IMPEDANCE / dt)

@@ -90,7 +90,10 @@ def _cache_folder(package: Path) -> Path | None:
             if _is_private(folder, package.stat().st_uid):
                 with tempfile.TemporaryFile(dir=folder):
                     pass
-                _remove_old(folder, package.name)
+                # Code of other sources goes; another process may be using it while it is young.
+                for old in base.absolute().glob(f"{package.name}-kernels-*"):
+                    if old != folder and time.time() - old.stat().st_mtime > _KEPT:
+                        shutil.rmtree(old, ignore_errors=True)
                 return folder
     print(
         "rockcheck: no private folder for compiled code, each run compiles anew: set"
@@ -116,16 +119,6 @@ def _is_private(folder: Path, owner: int) -> bool:
         and above.st_uid in (me, owner, 0)
         and (not above.st_mode & others_write or bool(above.st_mode & stat.S_ISVTX))
     )
-
-
-def _remove_old(folder: Path, package: str) -> None:
-    """Remove folders of code compiled from other sources, once older than `_KEPT`.
-
-    Another process may be using a younger one.
-    """
-    for old in folder.parent.glob(f"{package}-kernels-*"):
-        if old != folder and time.time() - old.stat().st_mtime > _KEPT:
-            shutil.rmtree(old, ignore_errors=True)
 
 
 def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
