@@ -3,11 +3,9 @@
 Mass properties are the centre of mass and the moment of inertia.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     AfterValidator,
@@ -84,7 +82,7 @@ class Block(Frozen):
     moment_of_inertia: Positive | None = None
 
     @model_validator(mode="after")
-    def _possible(self) -> Block:
+    def _possible(self) -> Self:
         if self.homogeneous:
             return self
         (x, z), b, h = self.offset, self.half_width, self.half_height
@@ -203,18 +201,18 @@ class Block(Frozen):
         return 2.0 * math.sqrt(j * (1.0 + j))
 
     @property
-    def per_unit_mass(self) -> Block:
+    def per_unit_mass(self) -> Self:
         """The same block without its mass; the moment of inertia is per unit mass, m^2."""
         return self.replace(
             mass=None, moment_of_inertia=self.moment_of_inertia and self.gyration_squared
         )
 
-    def mirrored(self) -> Block:
+    def mirrored(self) -> Self:
         """The same block with left and right exchanged."""
         x, z = self.offset
         return self if self.centre_of_mass is None else self.replace(centre_of_mass=(-x, z))
 
-    def scaled(self, factor: float) -> Block:
+    def scaled(self, factor: float) -> Self:
         """The block with all lengths `factor` times as long, and the same mass."""
         inertia = self.moment_of_inertia
         return self.replace(

@@ -3,10 +3,8 @@
 It knows nothing of the models that play it.
 """
 
-from __future__ import annotations
-
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field, StringConstraints, field_validator, model_validator
@@ -37,7 +35,7 @@ class Floor(Frozen):
     restitution: Restitution = 0.0
 
     @model_validator(mode="after")
-    def _coulomb(self) -> Floor:
+    def _coulomb(self) -> Self:
         refuse(
             *(
                 (
@@ -110,7 +108,7 @@ class Scene(Shown, Frozen):
         return tuple(sorted(walls, key=lambda wall: wall.side))
 
     @model_validator(mode="after")
-    def _consistent(self) -> Scene:
+    def _consistent(self) -> Self:
         x, _, tilt, *_ = self.initial_state
         clear = {
             wall.side: kinematics.clearance(self.block, wall.side, wall.gap, x, tilt)
@@ -181,7 +179,7 @@ class Scene(Shown, Frozen):
             spin,
         )
 
-    def mirrored(self) -> Scene:
+    def mirrored(self) -> Self:
         """The same scene with left and right exchanged."""
         swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
         return self.replace(
