@@ -46,7 +46,7 @@ class Experience(Frozen):
 
 
 class Expected(NamedTuple):
-    """A figure corrected by the model's bias, and its 95 % interval."""
+    """A figure M corrected by the model's bias delta, M/delta, and 1.96 sigma to either side."""
 
     value: float
     low: float
@@ -82,12 +82,6 @@ def _within(own: object, value: object) -> bool:
     """Whether a setting is this value, or a number below it."""
     numbers = isinstance(own, float) and isinstance(value, float)
     return own <= value * (1.0 + 1e-9) if numbers else own == value  # type: ignore[operator]
-
-
-def expected(trust: Trust, value: float) -> Expected:
-    """A model's figure M corrected by its bias delta: M/delta, and 1.96 sigma to either side."""
-    best, width = value / trust.bias, WIDTH * trust.scatter
-    return Expected(best, best * (1.0 - width), best * (1.0 + width))
 
 
 def axes_of(scene: Scene) -> dict[str, list[float]]:

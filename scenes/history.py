@@ -21,7 +21,7 @@ from pydantic import ConfigDict
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable, refuse
-from rockcheck.scenes.experience import Expected, expected, trust_of
+from rockcheck.scenes.experience import WIDTH, Expected, trust_of
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.writing import columns_text, json_text, write_together
 
@@ -185,7 +185,9 @@ class History(Shown):
                 f" {', '.join(known_of) or 'nothing'}",
                 "quantity",
             )
-        return expected(known_of[quantity], float(getattr(self, quantity)))
+        trust = known_of[quantity]
+        best, width = float(getattr(self, quantity)) / trust.bias, WIDTH * trust.scatter
+        return Expected(best, best * (1.0 - width), best * (1.0 + width))
 
     def save(self, path: str | Path) -> None:
         """Write a file in the format of its ending; CSV without an ending, as /dev/stdout.

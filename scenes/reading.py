@@ -169,9 +169,8 @@ def _check_lines(stream: IO[bytes], shown: str) -> None:
 
     Raises `InputError`.
     """
-    number = size = 0
-    while line := stream.readline(MOST_LINE + 1):
-        number += 1
+    size = 0
+    for number, line in enumerate(iter(lambda: stream.readline(MOST_LINE + 1), b""), 1):
         size += len(line)
         if size > MOST_TABLE_BYTES:  # a small compressed file may hold very much
             raise InputError(f"{shown}: larger than {MOST_TABLE_BYTES} bytes")

@@ -7,12 +7,12 @@ import math
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, StringConstraints, field_validator, model_validator
+from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block
-from rockcheck.scenes.errors import InputError, refuse
+from rockcheck.scenes.errors import refuse
 from rockcheck.scenes.excitations import Excitation, Rest
 
 __all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
@@ -85,7 +85,10 @@ class Scene(Shown, Frozen):
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.,+=()-]{0,99}$")]
     block: Block
     floor: Floor
-    walls: tuple[Wall, ...] = ()
+    walls: Annotated[
+        tuple[Wall, ...],
+        AfterValidator(lambda walls: tuple(sorted(walls, key=lambda wall: wall.side))),
+    ] = ()
     excitation: Excitation = Rest()
     vertical: Excitation = Rest()
     duration: Positive
@@ -97,16 +100,6 @@ class Scene(Shown, Frozen):
     gravity: Positive = 9.81
     description: Annotated[str, StringConstraints(max_length=500)] = ""
 
-    @field_validator("walls")
-    @classmethod
-    def _one_wall_a_side(cls, walls: tuple[Wall, ...]) -> tuple[Wall, ...]:
-        if len({wall.side for wall in walls}) < len(walls):
-            raise InputError(
-                "two walls on one side; at most one wall on the left and one on the right are"
-                " allowed"
-            )
-        return tuple(sorted(walls, key=lambda wall: wall.side))
-
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         x, _, tilt, *_ = self.initial_state
@@ -115,6 +108,12 @@ class Scene(Shown, Frozen):
             for wall in self.walls
         }
         refuse(
+            (
+                len(clear) < len(self.walls),
+                "two walls on one side; at most one wall on the left and one on the right are"
+                " allowed",
+                "walls",
+            ),
             (
                 self.floor.mu_s >= self.block.least_painleve_friction,
                 f"{self.floor.mu_s:g} is not allowed: must be below"
