@@ -72,16 +72,25 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
     header, match = next((pair for pair in enumerate(found, 1) if pair[1]), (0, None))
     if match is None:
         raise fault("no header line with NPTS and DT within the first 20 lines")
-    for n, line in enumerate(lines[:header], 1):
-        if other := _OTHER_KIND.search(line[:_WIDE]):
-            raise fault(f"{printable(other[0], 30)!r}; only accelerations can be read", n)
     words = (word for line in lines[:header] for word in _UNITS.findall(line))
     stated = next(filter(None, map(known_unit, words)), "")
-    if not stated and reading.unit is None:
-        raise fault(
+    refuse(
+        *(
+            (
+                other,
+                f"{printable(other[0], 30)!r}; only accelerations can be read",
+                f"line {n}",
+            )
+            for n, line in enumerate(lines[:header], 1)
+            for other in _OTHER_KIND.finditer(line[:_WIDE])
+        ),
+        (
+            not stated and reading.unit is None,
             "no header line that states UNITS OF G or another; give the unit:"
             f" {option('unit', 'cm/s2')}",
-        )
+            "",
+        ),
+    )
     unit = settled_unit(stated, reading)
     count = checked_count(header, "NPTS", match[1])
     step = settled_step(checked_step(header, "DT", match[2]), reading)
@@ -106,21 +115,27 @@ def read_esm(lines: list[str], reading: Reading) -> list[Recording]:
     said = [match for match in takewhile(bool, map(_ESM_LINE.match, lines)) if match]
     header = {match[1]: (n, match[2].strip()) for n, match in enumerate(said, 1)}
     first = min(len(said) + 1, len(lines))
-
-    def stated(key: str) -> tuple[int, str]:
-        if not header.get(key, (0, ""))[1]:
-            raise fault(f"no header line that states {key}")
-        return header[key]
-
-    kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
-    if kind[1].upper() != "ACCELERATION":
-        raise fault(f"DATA_TYPE {printable(kind[1], 30)!r}; only ACCELERATION can be read", kind[0])
-    place, count_word = stated("NDATA")
-    if not re.fullmatch(r"[0-9]++", count_word):
-        raise fault(f"NDATA {printable(count_word, 30)!r} is not a count", place)
-    count = checked_count(place, "NDATA", count_word)
-    line, word = stated("SAMPLING_INTERVAL_S")
-    step = settled_step(checked_step(line, "SAMPLING_INTERVAL_S", word), reading)
+    needed = ("NDATA", "SAMPLING_INTERVAL_S")
+    (place, counted), (line, interval) = (header.get(key, (0, "")) for key in needed)
+    kind_line, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
+    refuse(
+        (
+            kind.upper() != "ACCELERATION",
+            f"DATA_TYPE {printable(kind, 30)!r}; only ACCELERATION can be read",
+            f"line {kind_line}",
+        ),
+        *(
+            (not word, f"no header line that states {key}", "")
+            for key, word in zip(needed, (counted, interval), strict=True)
+        ),
+        (
+            not re.fullmatch(r"[0-9]++", counted),
+            f"NDATA {printable(counted, 30)!r} is not a count",
+            f"line {place}",
+        ),
+    )
+    count = checked_count(place, "NDATA", counted)
+    step = settled_step(checked_step(line, "SAMPLING_INTERVAL_S", interval), reading)
     unit = settled_unit(known_unit(header.get("UNITS", (0, ""))[1]), reading)
     values = numbers(enumerate(lines[first - 1 :], first))
     if len(values) != count:
@@ -142,13 +157,10 @@ def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
     Names of the header stand in the first 18 columns. The counts have an offset: their mean is
     taken out, as it is for the Max. Acc. that the file states.
     """
-    header: dict[str, tuple[int, str]] = {}
-    for n, line in enumerate(lines[:40], 1):
-        header[line[:18].strip()] = n, line[18:].strip()
-        if line.startswith("Memo"):
-            break
-    else:
+    end = next((n for n, line in enumerate(lines[:40], 1) if line.startswith("Memo")), None)
+    if end is None:
         raise fault("no header line Memo. within the first 40 lines")
+    header = {line[:18].strip(): (n, line[18:].strip()) for n, line in enumerate(lines[:end], 1)}
     scale = _KNET_SCALE.match(header.get("Scale Factor", (0, ""))[1])
     rate = _KNET_RATE.match(header.get("Sampling Freq(Hz)", (0, ""))[1])
     if not scale or not rate:
@@ -157,13 +169,16 @@ def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
         )
     place = header["Scale Factor"][0]
     factor, counts = number(place, scale[1]), number(place, scale[2])
-    if counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST:
-        raise fault(f"Scale Factor {printable(scale[0], 40)} is not usable", place)
     hertz = checked_step(header["Sampling Freq(Hz)"][0], "Sampling Freq(Hz)", rate[1])
-    values = np.array(numbers(enumerate(lines[n:], n + 1)))
+    values = np.array(numbers(enumerate(lines[end:], end + 1)))
     line_of, length = header.get("Duration Time(s)", (0, ""))
     expected = number(line_of, length) * hertz if line_of else float(len(values))
     refuse(
+        (
+            counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST,
+            f"Scale Factor {printable(scale[0], 40)} is not usable",
+            f"line {place}",
+        ),
         (not len(values), "no samples after the line Memo.", ""),
         (
             abs(expected - len(values)) > 0.5,
