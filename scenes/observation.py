@@ -69,18 +69,17 @@ def observe(
 
 def scene_notes(scene: Scene) -> tuple[str, ...]:
     """Notes for a reader of any history of this scene."""
-    said: list[str] = []
     size = 2.0 * max(scene.block.half_width, scene.block.half_height)
-    if size > LARGE:
-        said.append(f"the block is {size:g} m large: lengths are in m, not mm")
+    notes = {f"the block is {size:g} m large: lengths are in m, not mm": size > LARGE}
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
-        if excitation.kind != "record":
-            continue
-        said += [f"the {which} record: {note}" for note in excitation.notes]
-        if excitation.quiet_after < scene.duration:
+        if excitation.kind == "record":
             end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"
-            said.append(f"the {which} record ends at {end}; the base is at rest after it")
-    return tuple(said)
+            notes |= {f"the {which} record: {note}": True for note in excitation.notes} | {
+                f"the {which} record ends at {end}; the base is at rest after it": (
+                    excitation.quiet_after < scene.duration
+                )
+            }
+    return tuple(note for note, applies in notes.items() if applies)
 
 
 def modes_of(scene: Scene, channels: Mapping[str, NDArray[Any]]) -> NDArray[Any]:

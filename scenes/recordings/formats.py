@@ -10,7 +10,7 @@ Only the blocks of acceleration are read. Source: COSMOS Strong Motion Data Form
 import math
 import re
 from dataclasses import dataclass
-from itertools import takewhile
+from itertools import islice, takewhile
 
 import numpy as np
 
@@ -62,7 +62,7 @@ _CSMIP_FORMAT = re.compile(_FORMAT.replace(r"\(?", r"\("), re.IGNORECASE)
 _CSMIP_UNIT = re.compile(r"\b(?:in\s++|units\s*+:\s*+)([a-z/0-9^]++)", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGNORECASE)
 _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
-_UP = {400: "up", 401: "down"}
+_DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down"}
 NO_FIELDS = "a format without fields"
 
 
@@ -269,19 +269,18 @@ def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) ->
     across, width = int(header[4]), int(header[5])
     refuse((across < 1 or width < 1, NO_FIELDS, f"line {index}"))
     end = min(index + int(header[3][:6]), len(lines))
-
-    def word(place: int) -> tuple[int, str]:
-        row, column = divmod(place - 1, across)
-        line = "".join(lines[index + row : min(index + row + 1, end)])
-        return index + row + 1, line[column * width : (column + 1) * width].strip()
-
+    fields = (
+        (n, line[k * width : (k + 1) * width].strip())
+        for n, line in enumerate(lines[index:end], index + 1)
+        for k in range(across)
+    )
+    words = dict(enumerate(islice(fields, 62), 1))
     if header[2].lower() == "integer":
-        if re.fullmatch(r"[0-9]{1,3}", word(54)[1]):
-            degrees = int(word(54)[1])
-            block.name = _UP.get(degrees, f"{degrees} deg" if degrees <= 360 else block.name)
+        if re.fullmatch(r"[0-9]{1,3}", words.get(54, (0, ""))[1]):
+            block.name = _DIRECTIONS.get(int(words[54][1]), block.name)
     else:
         for place, seconds in ((62, 1e-3), (34, 1.0)):
-            n, text = word(place)
+            n, text = words.get(place, (0, ""))
             if text and (value := number(n, text)) > 0.0:
                 block.step = n, float(f"{value * seconds:.12g}")
                 break

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from rockcheck.scenes.base import DATA
-from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.recordings import Reading, Recording, read_components
 
 #: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net)
@@ -141,22 +141,27 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
         for path, components in across.items()
         if components
     }
-    found: dict[str, Recording] = {}
-    for path, source in sources.items():
-        up = upward[source] if source else []
-        if len(up) != 1:
-            raise InputError(
+    ups = {path: upward[source] if source else [] for path, source in sources.items()}
+    refuse(
+        *(
+            (
+                len(up) != 1,
                 f"{printable(path)}: {len(up)} vertical components in it or in a file of the set"
                 " that is named alike: give exactly one",
                 "vertical",
             )
-        found |= {name: up[0][1] for name, _ in across[path]}
-    if unused := [path for path in alone if path not in sources.values()]:
-        raise InputError(
-            f"{printable(unused[0])}: a vertical component, and no horizontal one is named alike",
-            "vertical",
-        )
-    return found
+            for path, up in ups.items()
+        ),
+        *(
+            (
+                path not in sources.values(),
+                f"{printable(path)}: a vertical component, and no horizontal one is named alike",
+                "vertical",
+            )
+            for path in alone
+        ),
+    )
+    return {name: up[0][1] for path, up in ups.items() for name, _ in across[path]}
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
