@@ -74,10 +74,9 @@ def _cache_folder(package: Path) -> Path | None:
     write to it: it belongs to the user, is closed to all others, and lies in a folder that only the
     user, the package's owner or root may change.
     """
-    digest = hashlib.sha256()
-    for source in [Path(__file__), *sorted(package.rglob("*.py"))]:
-        digest.update(source.name.encode() + b"\0" + source.read_bytes())
-    name = f"{package.name}-kernels-{digest.hexdigest()[:16]}"
+    sources = [Path(__file__), *sorted(package.rglob("*.py"))]
+    content = b"".join(one.name.encode() + b"\0" + one.read_bytes() for one in sources)
+    name = f"{package.name}-kernels-{hashlib.sha256(content).hexdigest()[:16]}"
     user_wide = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
     for base in (
         (Path(config.CACHE_DIR),) if config.CACHE_DIR else (package / "__pycache__", user_wide)

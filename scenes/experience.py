@@ -46,7 +46,7 @@ class Experience(Frozen):
 
 
 class Expected(NamedTuple):
-    """A figure M corrected by the model's bias delta, M/delta, and 1.96 sigma to either side."""
+    """A figure corrected by the model's bias, and its 95 % interval."""
 
     value: float
     low: float
@@ -84,6 +84,12 @@ def _within(own: object, value: object) -> bool:
     return own <= value * (1.0 + 1e-9) if numbers else own == value  # type: ignore[operator]
 
 
+def expected(trust: Trust, value: float) -> Expected:
+    """A model's figure M corrected by its bias delta: M/delta, and 1.96 sigma to either side."""
+    best, width = value / trust.bias, WIDTH * trust.scatter
+    return Expected(best, best * (1.0 - width), best * (1.0 + width))
+
+
 def axes_of(scene: Scene) -> dict[str, list[float]]:
     """The values of a scene on the axes of the domain.
 
@@ -91,18 +97,19 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
     over g tan alpha. An axis without a value is left out.
     """
     block = scene.block
+    peak = float(np.max(np.abs(scene.excitation.acceleration(scene.output_times))))
     found = {
         "alpha": [block.alpha],
         "R": [block.radius],
         "friction": [scene.floor.friction],
         "wall restitution": [wall.restitution for wall in scene.walls],
         "gap / R": [wall.gap / block.radius for wall in scene.walls],
+        "peak acceleration / (g tan alpha)": (
+            [peak / (scene.gravity * math.tan(block.alpha))]
+            if scene.excitation.kind != "rest"
+            else []
+        ),
     }
-    if scene.excitation.kind != "rest":
-        peak = float(np.max(np.abs(scene.excitation.acceleration(scene.output_times))))
-        found["peak acceleration / (g tan alpha)"] = [
-            peak / (scene.gravity * math.tan(block.alpha))
-        ]
     return {axis: values for axis, values in found.items() if values}
 
 

@@ -21,7 +21,7 @@ from pydantic import ConfigDict
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable, refuse
-from rockcheck.scenes.experience import WIDTH, Expected, trust_of
+from rockcheck.scenes.experience import Expected, expected, trust_of
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.writing import columns_text, json_text, write_together
 
@@ -185,9 +185,7 @@ class History(Shown):
                 f" {', '.join(known_of) or 'nothing'}",
                 "quantity",
             )
-        trust = known_of[quantity]
-        best, width = float(getattr(self, quantity)) / trust.bias, WIDTH * trust.scatter
-        return Expected(best, best * (1.0 - width), best * (1.0 + width))
+        return expected(known_of[quantity], float(getattr(self, quantity)))
 
     def save(self, path: str | Path) -> None:
         """Write a file in the format of its ending; CSV without an ending, as /dev/stdout.
@@ -480,10 +478,9 @@ def _channels(frame: pd.DataFrame, shown: str) -> tuple[dict[str, NDArray[Any]],
 def _numbers(column: pd.Series[Any], shown: str) -> Floats:
     import pandas as pd
 
+    words = column.astype(str) if column.dtype == bool else column  # True is no number
     try:
-        if column.dtype == bool:
-            raise ValueError("True is no number")
-        values = pd.to_numeric(column).to_numpy(dtype=float)
+        values = pd.to_numeric(words).to_numpy(dtype=float)
     except (TypeError, ValueError):
         raise InputError(f"{shown}: column {column.name!r} is not numeric") from None
     bad = np.flatnonzero(~(np.abs(values) <= MOST))

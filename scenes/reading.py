@@ -8,10 +8,12 @@ import os
 import re
 import stat
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from rockcheck.scenes.errors import InputError, inert, printable
+from rockcheck.scenes.errors import InputError, inert, printable, refuse
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,43 +37,41 @@ def within(folder: Path, *parts: str) -> Path:
     return path
 
 
-def open_regular(path: Path, most: int = MOST_BYTES) -> IO[bytes]:
+@contextmanager
+def open_regular(path: Path, most: int = MOST_BYTES) -> Iterator[IO[bytes]]:
     """A regular file of at most `most` bytes, open for reading.
 
     Raises `InputError` for anything else, such as a pipe or a device, which may have no end or wait
-    for ever, and does not open it.
+    for ever, and does not open it; also where the system cannot read the file.
     """
     shown = printable(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
             raise InputError(f"{shown}: cannot be read: not a file")
-        handle = os.open(
-            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-        )
+        at_once = getattr(os, "O_NONBLOCK", 0)
+        with open(path, "rb", opener=lambda name, how: os.open(name, how | at_once)) as stream:
+            about = os.fstat(stream.fileno())
+            refuse(
+                (
+                    not stat.S_ISREG(about.st_mode),
+                    f"{shown}: cannot be read: not a file",
+                    "",
+                ),
+                (about.st_size > most, f"{shown}: larger than {most} bytes", ""),
+            )
+            yield stream
     except InputError:
         raise
     except (OSError, ValueError) as error:  # a path that holds a null character is a ValueError
         raise InputError(
             f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}"
         ) from None
-    about = os.fstat(handle)
-    if stat.S_ISREG(about.st_mode) and about.st_size <= most:
-        return os.fdopen(handle, "rb")
-    os.close(handle)
-    raise InputError(
-        f"{shown}: larger than {most} bytes"
-        if stat.S_ISREG(about.st_mode)
-        else f"{shown}: cannot be read: not a file"
-    )
 
 
 def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     """The content of a file. Raises `InputError` where it is no file, or too large."""
     with open_regular(path, most) as stream:
-        try:
-            content = stream.read(most + 1)
-        except OSError as error:
-            raise InputError(f"{printable(path)}: cannot be read: {error.strerror}") from None
+        content = stream.read(most + 1)
     if len(content) > most:  # it has grown
         raise InputError(f"{printable(path)}: larger than {most} bytes")
     return content
@@ -82,7 +82,7 @@ def head_of(path: Path, most: int) -> str:
     try:
         with open_regular(path) as stream:
             return stream.read(most).decode(errors="replace")
-    except (InputError, OSError):
+    except InputError:
         return ""
 
 
@@ -146,22 +146,20 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
     shown = printable(path)
     if pd.__version__ < "3":  # its reader loses the last bit of a number by default
         options = {"float_precision": "round_trip", **options}
-    try:
-        with open_regular(path, MOST_TABLE_BYTES) as raw:
+    with open_regular(path, MOST_TABLE_BYTES) as raw:
+        try:
             packed = raw.read(len(_GZIP)) == _GZIP
             raw.seek(0)
             stream = cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
             _check_lines(stream, shown)
             stream.seek(0)
             return pd.read_csv(stream, comment="#", **options)
-    except (gzip.BadGzipFile, EOFError, zlib.error):
-        raise InputError(f"{shown}: a compressed file that is damaged") from None
-    except OSError as error:
-        raise InputError(f"{shown}: cannot be read: {error.strerror}") from None
-    except InputError:
-        raise
-    except (ValueError, OverflowError, RecursionError) as error:  # of pandas' parser, too
-        raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+        except (gzip.BadGzipFile, EOFError, zlib.error):
+            raise InputError(f"{shown}: a compressed file that is damaged") from None
+        except InputError:
+            raise
+        except (ValueError, OverflowError, RecursionError) as error:  # of pandas' parser, too
+            raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
 
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:

@@ -54,7 +54,6 @@ def test_a_folder_of_results_is_no_link(tmp_path, fault_of):
 @pytest.mark.parametrize(
     "read",
     [
-        reading.open_regular,
         reading.read_bytes,
         reading.read_text,
         reading.read_json,
