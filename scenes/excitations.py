@@ -6,7 +6,7 @@ m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,15 +48,12 @@ class Rest(Motion):
     """A base that does not move."""
 
     kind: Literal["rest"] = "rest"
+    #: Time after which the base is at rest, s.
+    quiet_after: ClassVar[float] = 0.0
 
     def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration at times `t` (s): zero."""
         return np.zeros_like(np.asarray(t, dtype=float))
-
-    @property
-    def quiet_after(self) -> float:
-        """Time after which the base is at rest, s."""
-        return 0.0
 
 
 class Ricker(Motion):

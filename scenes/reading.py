@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
 from rockcheck.scenes.errors import InputError, inert, printable, refuse
+from rockcheck.scenes.writing import mapped
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,17 +92,10 @@ def read_json(path: Path) -> Any:
     text = read_text(path)
     try:
         value = json.loads(text)
-        return value if text.isascii() and "\\" not in text else _inert(value)
+        plain = text.isascii() and "\\" not in text
+        return value if plain else mapped(value, lambda x: inert(x) if isinstance(x, str) else x)
     except (ValueError, RecursionError) as error:
         raise InputError(f"{printable(path)}: not JSON: {printable(error)}") from None
-
-
-def _inert(value: Any) -> Any:
-    if isinstance(value, str):
-        return inert(value)
-    if isinstance(value, dict):
-        return {inert(key): _inert(item) for key, item in value.items()}
-    return [_inert(item) for item in value] if isinstance(value, list) else value
 
 
 def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str:

@@ -8,7 +8,7 @@ import operator
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
@@ -176,13 +176,23 @@ def junit_text(name: str, suites: Iterable[tuple[str, Iterable[Case]]]) -> str:
     return bytes(document.tostring()).decode() + "\n"
 
 
-def finite(value: Any) -> Any:
-    """A value as JSON can hold it: tuples become lists, numbers that are not finite null."""
+def mapped(value: Any, leaf: Callable[[Any], Any]) -> Any:
+    """A value as JSON can hold it, with `leaf` of every key and of all that holds nothing more.
+
+    Keys become texts, tuples lists.
+    """
     if isinstance(value, Mapping):
-        return {str(key): finite(item) for key, item in value.items()}
+        return {leaf(str(key)): mapped(item, leaf) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return [mapped(item, leaf) for item in value]
+    return leaf(value)
+
+
+def finite(value: Any) -> Any:
+    """A value as JSON can hold it (see `mapped`): numbers that are not finite become null."""
+    return mapped(
+        value, lambda one: None if isinstance(one, float) and not math.isfinite(one) else one
+    )
 
 
 def script_text(place: str, value: Any) -> str:
