@@ -205,13 +205,18 @@ def damping_ratio(restitution: float, least: float) -> float:
     return 0.5 * (low + high)
 
 
-def parameters_of(scene: Scene, stiffness: float, time_step: float, calibrated: bool) -> Parameters:
-    """The constants of a run of a scene; of contacts that are `calibrated` or the paper's."""
+def begun(
+    scene: Scene, stiffness: float, time_step: float, calibrated: bool
+) -> tuple[Floats, Contacts]:
+    """State (see `advance`) and contacts at t = 0; the latter `calibrated`, or the paper's.
+
+    A block on the floor starts sunk in by its weight, so that it does not bounce.
+    """
     least = least_restitution(stiffness, scene.frequency_parameter)
     walls = scene.wall("left"), scene.wall("right")
     b, h, (dx, dz) = scene.block.half_width, scene.block.half_height, scene.block.offset
     restitution = (*(wall.restitution if wall else 0.0 for wall in walls), scene.floor.restitution)
-    return Parameters(
+    parameters = Parameters(
         reach=(b + dx, b - dx, h + dz, h - dz),
         inverse_inertia=3.0 / (b * b + h * h)
         if scene.block.homogeneous
@@ -230,18 +235,12 @@ def parameters_of(scene: Scene, stiffness: float, time_step: float, calibrated: 
         calibrated=calibrated,
         time_step=time_step,
     )
-
-
-def begun(scene: Scene, parameters: Parameters) -> tuple[Floats, Contacts]:
-    """State (see `advance`) and contacts at t = 0.
-
-    A block on the floor starts sunk in by its weight, so that it does not bounce.
-    """
     x, y, tilt, *rates = scene.initial_state
-    k = parameters.stiffness
     memory = np.zeros((2 * len(SURFACES), len(COLUMNS)))
-    memory[:, [STRUCK, LAST_CLOSED, STIFFNESS]] = math.inf, -math.inf, k
-    memory[:, DAMPING] = np.repeat(2.0 * math.sqrt(k) * np.array(parameters.damping_ratio), 2)
+    memory[:, [STRUCK, LAST_CLOSED, STIFFNESS]] = math.inf, -math.inf, stiffness
+    memory[:, DAMPING] = np.repeat(
+        2.0 * math.sqrt(stiffness) * np.array(parameters.damping_ratio), 2
+    )
     for wall in scene.walls:
         if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
             surface = LEFT_WALL if wall.side == "left" else RIGHT_WALL
@@ -250,7 +249,7 @@ def begun(scene: Scene, parameters: Parameters) -> tuple[Floats, Contacts]:
     if scene.initial_height < TOUCHING:
         standing = [2 * FLOOR] * (tilt >= 0.0) + [2 * FLOOR + 1] * (tilt <= 0.0)
         memory[standing, CLOSED] = 1.0
-        sunk = scene.gravity / (k * len(standing))
+        sunk = scene.gravity / (stiffness * len(standing))
         # The corner nearer to the mass's centre carries more.
         if tilt == 0.0 and scene.block.offset[0] != 0.0:
             left, right = scene.block.pivot("left").arm, scene.block.pivot("right").arm

@@ -116,15 +116,15 @@ class ContinuousModel(Frozen):
         from rockcheck.cm import kernels
 
         times = scene.output_times
-        calibrated, dt = self.damping_rule == "calibrated", self.time_step_in(scene)
-        parameters = kernels.parameters_of(scene, self.stiffness_in(scene), dt, calibrated)
+        stiffness, dt = self.stiffness_in(scene), self.time_step_in(scene)
         if times[-1] / dt > MOST_STEPS:
             raise errors.ModelFailure(
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
         base = _samples(scene.excitation, scene.duration), _samples(scene.vertical, scene.duration)
-        state, contacts = kernels.begun(scene, parameters)
+        calibrated = self.damping_rule == "calibrated"
+        state, contacts = kernels.begun(scene, stiffness, dt, calibrated)
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
@@ -147,7 +147,7 @@ class ContinuousModel(Frozen):
         if ending == kernels.BLOWN_UP:
             raise errors.ModelFailure(
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
-                f" with a step of {dt:.3g} s and a stiffness of {parameters.stiffness:.3g} 1/s^2"
+                f" with a step of {dt:.3g} s and a stiffness of {stiffness:.3g} 1/s^2"
             )
         strikes.append(events[: kernels.gather(contacts.memory, 0.0, reached, events, 0)[0]])
         cost = Cost(
@@ -176,8 +176,8 @@ class ContinuousModel(Frozen):
             events=happened,
             cost=cost,
             settings={
-                "penetration": scene.gravity / parameters.stiffness,
-                "stiffness": parameters.stiffness,
+                "penetration": scene.gravity / stiffness,
+                "stiffness": stiffness,
                 "time_step": dt,
                 "damping_rule": self.damping_rule,
             },
