@@ -1,6 +1,5 @@
 """The interface of every engine: its settings, its methods and the history it returns."""
 
-import math
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -85,12 +84,12 @@ class Engine(Frozen):
         why = ' with settings = "default":' if stock else f": {cls.fixed_because};"
         errors.refuse(
             (
-                step != "adaptive" and not (number and 0.0 < step < math.inf),
+                step != "adaptive" and not (number and 0.0 < step <= sys.float_info.max),
                 f'{printable(step)} is not allowed: give a step above 0 s, or "adaptive"',
                 "time_step",
             ),
             (
-                step == "adaptive" != usual,
+                step == "adaptive" and usual != "adaptive",
                 f'"adaptive" is not allowed{why} give a step in s',
                 "time_step",
             ),

@@ -74,11 +74,10 @@ def scene_notes(scene: Scene) -> tuple[str, ...]:
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
         if excitation.kind == "record":
             end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"
-            notes |= {f"the {which} record: {note}": True for note in excitation.notes} | {
-                f"the {which} record ends at {end}; the base is at rest after it": (
-                    excitation.quiet_after < scene.duration
-                )
-            }
+            notes |= {f"the {which} record: {note}": True for note in excitation.notes}
+            notes[f"the {which} record ends at {end}; the base is at rest after it"] = (
+                excitation.quiet_after < scene.duration
+            )
     return tuple(note for note, applies in notes.items() if applies)
 
 

@@ -76,6 +76,7 @@ for engine in (getattr(engines, name) for name in engines.__all__):
         ({"time_step": 0.0}, "time_step: 0.0 is not allowed"),
         ({"time_step": True}, "time_step: True is not allowed"),
         ({"time_step": math.nan}, "time_step: nan is not allowed"),
+        ({"time_step": 10**400}, "time_step: 10+... is not allowed"),
         ({"largest_step": -1.0}, "largest_step"),
         ({"settings": "worst"}, "settings"),
         (
