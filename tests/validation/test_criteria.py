@@ -138,7 +138,11 @@ def test_the_rocking_estimate_is_the_angle_whose_capacity_is_the_demand(factor):
 
     expected = next(filter(holds, block.alpha * np.arange(1, 21) / 20), math.inf)
     assert math.isinf(expected) == (factor == 10.0)
-    assert criteria.reserve_rocking(scene, base) == pytest.approx(expected)
+    said = expected / block.alpha if factor > 0.5 else 0.0  # below, the base lifts no corner
+    assert (criteria.reserve_rocking(scene, base), criteria.CRITERIA[-1].says(scene, base)) == (
+        pytest.approx(expected),
+        (factor == 10.0, pytest.approx(said)),
+    )
 
 
 @pytest.mark.parametrize("criterion", criteria.CRITERIA, ids=lambda criterion: criterion.event)

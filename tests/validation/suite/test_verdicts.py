@@ -157,7 +157,10 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
     assert tables.shown(run) == tuple(one.scene for one in worst)
     assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
-    assert len(tables.finding_of(run).table("verdicts").rows) == tables.MOST_SHOWN + 1
+    found = tables.finding_of(run)
+    rows, (wrong, better) = found.table("verdicts").rows, found.blocks[2:4]
+    assert (len(rows), rows[0][2]) == (tables.MOST_SHOWN + 1, worst[0].checks[0].figure.windowed)
+    assert (wrong.verdict, bool(better.text)) == ("fail", True)
     text = tables.markdown(run)
     # the number of the others is not a row of the table
     assert [words in text for words in ("| out |", "|\n\nand 30 more scenes", "| far 3 |")] == [
