@@ -19,7 +19,7 @@ from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import FORM, ground_of
 from rockcheck.ebm.core.names import LAWS, Shape
 from rockcheck.ebm.core.state import MOTION, STATE, Base, Rows
-from rockcheck.scenes import Block, Floats, Scene, kinematics, progress
+from rockcheck.scenes import Floats, Scene, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
 #: The event loops that are compiled, by a model's friction.
@@ -34,21 +34,15 @@ def time_unit(scene: Scene) -> float:
 def setting_of(scene: Scene, model: Any) -> np.record:
     """Block, floor and walls of a scene in natural units, as the model's settings have them."""
     radius = scene.block.radius
-    left, right = scene.wall("left"), scene.wall("right")
-    side = side_of(scene.block, "left")
     return filled(
         SETTING,
-        left=side,
-        right=side if scene.block.homogeneous else side_of(scene.block, "right"),
+        left=side_of(scene, "left"),
+        right=side_of(scene, "right"),
         height=math.cos(scene.block.alpha),
         spin=3.0 if scene.block.homogeneous else radius**2 / scene.block.gyration_squared,
         mu_s=max(scene.floor.mu_s, LEAST_FRICTION),
         mu_k=scene.floor.friction,
         e_floor=scene.floor.restitution,
-        gap_left=left.gap / radius if left else math.inf,
-        gap_right=right.gap / radius if right else math.inf,
-        e_left=left.restitution if left else 0.0,
-        e_right=right.restitution if right else 0.0,
         walls=bool(scene.walls),
         no_slip=model.friction == "no-slip",
         unilateral=model.pivot == "unilateral",
@@ -58,16 +52,20 @@ def setting_of(scene: Scene, model: Any) -> np.record:
     )
 
 
-def side_of(block: Block, side: Literal["left", "right"]) -> np.record:
-    """One side of a block, lengths in R of its weaker pivot."""
+def side_of(scene: Scene, side: Literal["left", "right"]) -> np.record:
+    """One side of a block and the wall there, lengths in R of its weaker pivot."""
+    block, unit, wall = scene.block, scene.block.radius, scene.wall(side)
     alpha = block.alpha
+    there = {
+        "gap": wall.gap / unit if wall else math.inf,
+        "e": wall.restitution if wall else 0.0,
+    }
     if block.homogeneous:
         arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
         turns = {"tip_sin": sine, "tip_cos": cosine, "far_sin": sine, "far_cos": cosine}
         corners = {"alpha": alpha, "radius": 1.0, "top_alpha": alpha, "top_radius": 1.0}
-        return filled(SIDE, **corners, **turns, arm=arm, share=0.75)
+        return filled(SIDE, **corners, **turns, **there, arm=arm, share=0.75)
     pivot, other = block.pivot(side), block.pivot("right" if side == "left" else "left")
-    unit = block.radius
     top, radius = 2.0 * block.half_height - pivot.height, pivot.radius / unit
     square = pivot.radius**2
     return filled(
@@ -83,6 +81,7 @@ def side_of(block: Block, side: Literal["left", "right"]) -> np.record:
         far_sin=pivot.height * (pivot.arm + other.arm) / square,
         far_cos=(pivot.height**2 - pivot.arm * other.arm) / square,
         share=pivot.share * (unit / pivot.radius) ** 2,
+        **there,
     )
 
 

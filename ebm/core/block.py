@@ -37,8 +37,11 @@ SIDE = record(
     far_cos="f8",
     # 1/(I + R^2): 3/4 for a homogeneous block.
     share="f8",
+    # Of the wall on this side: its gap, infinite where there is none, and its restitution.
+    gap="f8",
+    e="f8",
 )
-#: Block, floor and walls in natural units; a gap is infinite where there is no wall.
+#: Block, floor and walls in natural units.
 SETTING = record(
     left=SIDE,
     right=SIDE,
@@ -48,10 +51,6 @@ SETTING = record(
     mu_s="f8",
     mu_k="f8",
     e_floor="f8",
-    gap_left="f8",
-    gap_right="f8",
-    e_left="f8",
-    e_right="f8",
     walls="?",
     # The pivot sticks whatever the friction force (Housner's block): no slip guard.
     no_slip="?",
@@ -73,6 +72,15 @@ LEAST_FRICTION = 1e-9
 def side_of(block, sense):
     """The side to which a block tips whose rotation has this sign."""
     return block.left if sense > 0 else block.right
+
+
+@inner_kernel
+def wall_corner(faces, tips):
+    """Distance from the mass's centre and angle of the corner that a wall meets.
+
+    It is on the side that faces the wall: the top one where the block tips to that side.
+    """
+    return (faces.top_radius, faces.top_alpha) if tips else (faces.radius, faces.alpha)
 
 
 @inner_kernel

@@ -36,7 +36,7 @@ _NEARLY = 10.0
 def expand(block, base, run, reach):
     """Series of the motion: their order, the place of the pivot, and the step they are good for."""
     state, mode, a, last = run.state, run.state.mode, run.a, run.state.last_term_rad
-    order = state.order = mode_series(block, base, run, series.ORDER, reach)
+    order = state.order = mode_series(block, base, run, series.ORDER, 0.0, reach)
     h = series.step_size(a, Row.U, Row.G, order - 1, last, reach)
     if mode.pivot == Pivot.SLIPPING:
         if state.winds:

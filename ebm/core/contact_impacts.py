@@ -34,28 +34,37 @@ from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Friction, 
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
-# Every set of at most three contacts: their number, the contacts, behind them the floor's tangent,
-# and the contacts as bits.
-_SETS = np.array(
+# A solution to try: the contacts that push, as bits and by their number; the unknowns, which are
+# these and, where the pivot sticks, the floor's tangent; a Friction, and the direction of slip.
+_TRIAL = record(bits="i8", count="i8", n="i8", rows=("i8", (3,)), friction="i8", slip="f8")
+_SLIPS = {Friction.PLUS: 1.0, Friction.MINUS: -1.0}
+# Every set of contacts with every friction, of at most three unknowns.
+_TRIALS = np.array(
     [
-        [len(some), *[*some, *[Contact.TANGENT] * 3][:3], sum(1 << j for j in some)]
+        (sum(1 << j for j in some), len(some), n, rows, friction, _SLIPS.get(friction, 0.0))
         for some in CONTACT_SETS
-    ]
+        for friction in Friction
+        if (n := len(some) + (friction == Friction.HELD)) <= 3
+        for rows in [[*some, *[Contact.TANGENT] * 3][:3]]
+    ],
+    _TRIAL,
 )
-_LARGEST_FIRST = np.argsort(-_SETS[:, 0], kind="stable")
-# By the contacts that take part, as bits: the sets of no others, by their numbers, and then -1.
-_WITHIN = np.full((1 << CONTACTS, len(_SETS) + 1), -1, dtype=np.int8)
+_BITS, _FREE = _TRIALS["bits"], _TRIALS["friction"] == Friction.FREE
+_ON_FLOOR = _BITS & (1 << Contact.FOOT | 1 << Contact.OTHER) != 0
+_LARGEST_FIRST = np.flatnonzero(_FREE)[np.argsort(-_TRIALS["count"][_FREE], kind="stable")]
+# By the contacts that take part, as bits: the trials of no others, with friction where the floor is
+# among them, by their numbers; and then -1.
+_WITHIN = np.full((1 << CONTACTS, len(_TRIALS) + 1), -1, dtype=np.int16)
 for _bits in range(1 << CONTACTS):
-    _inside = np.flatnonzero(_SETS[:, 4] & ~_bits == 0)
+    _inside = np.flatnonzero((_BITS & ~_bits == 0) & (_ON_FLOOR != _FREE))
     _WITHIN[_bits, : len(_inside)] = _inside
-# The horizontal part of each contact's row (see `contact_rows`), and the two on the floor.
+# The horizontal part of each contact's row (see `contact_rows`).
 _ALONG = np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
-_ON_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
 # than this give no solution.
 ROUNDING, _PARALLEL = NOISE[Kind.POSITION], CLOSED
 _MOST_STAGES = 40
-_HALVINGS, _FRICTIONS = 45, len(Friction)
+_HALVINGS = 45
 
 
 #: Contacts that touch at one instant, and what their stages work on.
@@ -165,19 +174,6 @@ def _pivots(system, n, k):
 
 
 @inner_kernel
-def _fits(number, friction, slippery):
-    """Whether a set is to be tried with this friction.
-
-    It has at most three unknowns, and friction where a floor contact is in it. Where the floor is
-    slippery (mu_s = 0), it is tried without friction, too.
-    """
-    on_floor = _SETS[number, 4] & _ON_FLOOR != 0
-    if friction == Friction.HELD:
-        return on_floor and _SETS[number, 0] <= 2
-    return on_floor != (friction == Friction.FREE) or (slippery and friction == Friction.FREE)
-
-
-@inner_kernel
 def _push(rows, index, kappa, k):
     """The effect of a contact's unit impulse on velocity k, times the mass.
 
@@ -187,20 +183,18 @@ def _push(rows, index, kappa, k):
 
 
 @inner_kernel
-def _try_set(block, impact, number, friction):
-    """The impulses of the contacts in the set and the velocities after them; False if singular."""
+def _try(block, impact, number):
+    """The impulses of a trial's contacts and the velocities after them; False if singular."""
     rows, system, v, spin = impact.rows, impact.system, impact.v, block.spin
     lam, trial = impact.lam, impact.trial
-    n = _SETS[number, 0] + (1 if friction == Friction.HELD else 0)
-    mu_k = block.mu_k
-    kappa = mu_k if friction == Friction.PLUS else (-mu_k if friction == Friction.MINUS else 0.0)
+    n, kappa = _TRIALS[number].n, block.mu_k * _TRIALS[number].slip
     for i in range(n):
-        row = _SETS[number, 1 + i]
+        row = _TRIALS[number].rows[i]
         system[i, n] = 0.0 if row == Contact.TANGENT else impact.target[row]
         for k in range(3):
             system[i, n] -= rows[row, k] * v[k]
         for j in range(n):
-            column = _SETS[number, 1 + j]
+            column = _TRIALS[number].rows[j]
             x, y = _push(rows, column, kappa, 0), _push(rows, column, kappa, 1)
             system[i, j] = rows[row, 0] * x + rows[row, 1] * y
             system[i, j] += spin * rows[row, 2] * _push(rows, column, kappa, 2)
@@ -210,32 +204,29 @@ def _try_set(block, impact, number, friction):
         trial[k], lam[k] = v[k], 0.0
     for j in range(n):
         lam[j] = system[j, n]
-        index = _SETS[number, 1 + j]
+        index = _TRIALS[number].rows[j]
         for k in range(3):
             trial[k] += (spin if k == 2 else 1.0) * _push(rows, index, kappa, k) * lam[j]
     return True
 
 
 @inner_kernel
-def _violation(block, impact, number, friction, rounding):
+def _violation(block, impact, number, rounding):
     """By how much a solution violates the law, 0 within the rounding.
 
     Violations are a pull, a contact that still closes, friction beyond its cone or in the wrong
     sense.
     """
     rows, lam, trial = impact.rows, impact.lam, impact.trial
-    count = _SETS[number, 0]
-    worst = 0.0
+    count = _TRIALS[number].count
+    worst = max(0.0, -_TRIALS[number].slip * _dot(rows[Contact.TANGENT], trial))
     floor_normal = 0.0
     for i in range(count):
         worst = max(worst, -lam[i])
-        if _SETS[number, 1 + i] <= Contact.OTHER:
+        if _TRIALS[number].rows[i] <= Contact.OTHER:
             floor_normal += lam[i]
-    slip = _dot(rows[Contact.TANGENT], trial)
-    if friction == Friction.HELD:
+    if _TRIALS[number].friction == Friction.HELD:
         worst = max(worst, abs(lam[count]) - block.mu_s * floor_normal)
-    elif friction != Friction.FREE:
-        worst = max(worst, -slip if friction == Friction.PLUS else slip)
     for j in range(CONTACTS):
         if impact.taking[j]:
             worst = max(worst, impact.target[j] - _dot(rows[j], trial))
@@ -246,8 +237,8 @@ def _violation(block, impact, number, friction, rounding):
 def _strike(block, impact):
     """One stage over the contacts that take part: writes the velocities and impulses after it.
 
-    Every set of contacts is tried with every friction. Of those that obey the law the one that
-    leaves the least energy is taken. Where none does, by rounding or by friction that jams
+    Every set of these contacts is tried with every friction. Of those that obey the law the one
+    that leaves the least energy is taken. Where none does, by rounding or by friction that jams
     (Painleve), the one that contradicts it least is taken, and the result is False.
     """
     least, lowest = np.inf, np.inf
@@ -256,17 +247,15 @@ def _strike(block, impact):
         number = _WITHIN[bits, place]
         if number < 0:
             break
-        for friction in range(_FRICTIONS):
-            fits = _fits(number, friction, block.mu_s == 0.0)
-            if not fits or not _try_set(block, impact, number, friction):
-                continue
-            scale = _size(impact.v) + _size(impact.trial) + _size(impact.lam)
-            wrong = _violation(block, impact, number, friction, ROUNDING * scale)
-            energy = kinetic_energy(block.spin, impact.trial)
-            lower = wrong == least and energy < lowest - ROUNDING * scale * scale
-            if wrong < least or lower:
-                least, lowest = wrong, energy
-                _keep(impact, number, friction)
+        if not _try(block, impact, number):
+            continue
+        scale = _size(impact.v) + _size(impact.trial) + _size(impact.lam)
+        wrong = _violation(block, impact, number, ROUNDING * scale)
+        energy = kinetic_energy(block.spin, impact.trial)
+        lower = wrong == least and energy < lowest - ROUNDING * scale * scale
+        if wrong < least or lower:
+            least, lowest = wrong, energy
+            _keep(impact, number)
     return least == 0.0
 
 
@@ -279,13 +268,13 @@ def _bits_of(taking):
 
 
 @inner_kernel
-def _keep(impact, number, friction):
+def _keep(impact, number):
     """Keeps what was tried."""
     impact.part[:] = 0.0
-    for i in range(_SETS[number, 0]):
-        impact.part[_SETS[number, 1 + i]] = max(impact.lam[i], 0.0)
+    for i in range(_TRIALS[number].count):
+        impact.part[_TRIALS[number].rows[i]] = max(impact.lam[i], 0.0)
     impact.after = impact.trial
-    if friction == Friction.HELD:
+    if _TRIALS[number].friction == Friction.HELD:
         # Rounding only: the pivot stands.
         impact.after[0] -= _dot(impact.rows[Contact.TANGENT], impact.after)
 
@@ -399,18 +388,13 @@ def contact_impact(block, state):
             state.gains += 1
             state.largest_gain = max(state.largest_gain, gain / before)
         impact.v = impact.after
-        _gather(state, impact.part)
+        for j in range(CONTACTS):
+            state.impulse += impact.part[j]
     if impact.touching[Contact.TIP_TOP] and impact.touching[Contact.FAR_BOTTOM]:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.
         v[0] = v[2] = 0.0
     state.rules[Rule.ENDLESS_STAGES] += 1
-
-
-@inner_kernel
-def _gather(state, impulses):
-    for j in range(CONTACTS):
-        state.impulse += impulses[j]
 
 
 @called_kernel
@@ -441,7 +425,6 @@ def _close(block, impact):
         impact.taking[j] = impact.touching[j] and slow
     others = ~_bits_of(impact.taking)
     for number in _LARGEST_FIRST:
-        inside = _SETS[number, 4] & others == 0
-        if inside and _try_set(block, impact, number, Friction.FREE):
+        if _TRIALS[number].bits & others == 0 and _try(block, impact, number):
             impact.v = impact.trial
             return

@@ -6,7 +6,7 @@ position, one of velocity.
 
 import math
 
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import side_of, wall_corner
 from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -17,6 +17,12 @@ SLOW = 1e-9
 
 
 @inner_kernel
+def lean(motion):
+    """Positive where the block tips to the left, or begins to; 0 upright and at rest."""
+    return motion.theta if motion.theta != 0.0 else motion.w
+
+
+@inner_kernel
 def lower(block, motion):
     """The side of the lower corner, the pivot: that to which the block tips, or begins to tip.
 
@@ -24,7 +30,7 @@ def lower(block, motion):
     is the unit of length, so its height is right to the bit, and a mirror image has the mirrored
     corner.
     """
-    sense = motion.theta if motion.theta != 0.0 else motion.w
+    sense = lean(motion)
     return side_of(block, sense if sense != 0.0 else block.right.arm - block.left.arm)
 
 
@@ -69,15 +75,11 @@ def stop(motion):
 @inner_kernel
 def wall_gap(block, motion, side):
     """Clear gap between the wall on `side` (+1 left, -1 right) and its corner; inf if no wall."""
-    gap, faces = block.gap_left if side > 0 else block.gap_right, side_of(block, side)
-    if gap == math.inf:
-        return gap
-    radius, alpha = (
-        (faces.top_radius, faces.top_alpha)
-        if side * motion.theta > 0.0
-        else (faces.radius, faces.alpha)
-    )
-    return side * motion.x + faces.arm + gap - radius * math.sin(alpha + abs(motion.theta))
+    faces = side_of(block, side)
+    if faces.gap == math.inf:
+        return faces.gap
+    radius, alpha = wall_corner(faces, side * motion.theta > 0.0)
+    return side * motion.x + faces.arm + faces.gap - radius * math.sin(alpha + abs(motion.theta))
 
 
 @inner_kernel
@@ -89,13 +91,10 @@ def closed_wall(block, motion, side, bottom):
     """
     if not abs(wall_gap(block, motion, side)) < CLOSED:
         return False
-    # Positive: tips toward that wall, top corner.
     phi = side * motion.theta
-    faces = side_of(block, side)
-    if phi < 0.0 or (phi == 0.0 and bottom):
-        arm = -faces.radius * math.cos(faces.alpha + abs(phi))
-    else:
-        arm = faces.top_radius * math.cos(faces.top_alpha + abs(phi))
+    tips = phi > 0.0 or (phi == 0.0 and not bottom)
+    radius, alpha = wall_corner(side_of(block, side), tips)
+    arm = (radius if tips else -radius) * math.cos(alpha + abs(phi))
     return abs(motion.vx - arm * motion.w) < slowest(motion.w)
 
 
@@ -108,8 +107,7 @@ def floor_gap(block, motion):
 @inner_kernel
 def closed_floor(block, motion):
     """Whether the lower corner rests on the floor."""
-    tips_left = motion.theta > 0.0 or (motion.theta == 0.0 and motion.w > 0.0)
-    turns = motion.w if tips_left else -motion.w
+    turns = motion.w if lean(motion) > 0.0 else -motion.w
     side = lower(block, motion)
     rate = motion.vy - side.radius * math.sin(side.alpha - abs(motion.theta)) * turns
     return abs(floor_gap(block, motion)) < CLOSED and abs(rate) < slowest(motion.w)
@@ -156,6 +154,6 @@ def land_upright(block, motion, sign, on_floor):
     motion.theta = 0.0
     left, right = abs(wall_gap(block, motion, 1)), abs(wall_gap(block, motion, -1))
     if left < CLOSED and left < right:
-        motion.x = -block.gap_left
+        motion.x = -block.left.gap
     elif right < CLOSED and right < left:
-        motion.x = block.gap_right
+        motion.x = block.right.gap

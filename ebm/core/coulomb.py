@@ -10,8 +10,8 @@ How to add a law of friction: a module beside this one, with the same doors.
 - `after_event`, at the start, after an impact and after a guard: the mode that follows (`follow`),
   and the event (`tell`).
 
-Friction that is known with the motion stands in `motion.friction` and `motion.flat_series`; what a
-mode may be, in `modes._friction_allows`.
+Friction that is known with the motion stands in `motion.friction`; what a mode may be, in
+`modes._floor_allows`.
 
 Its constants stand in SETTING (`ebm.natural.setting_of`). Impacts have Coulomb's friction, mu_s and
 mu_k of SETTING: say what these are. Its loop is a `play` in `ebm.core.march` and a line in `LOOPS`;
@@ -21,7 +21,7 @@ stress study. `tests/ebm/test_another_method.py` shows how it is tested: scipy's
 """
 
 from rockcheck.ebm.core import contacts, guards, modes, series
-from rockcheck.ebm.core.motion import flat_series, tilt_series
+from rockcheck.ebm.core.motion import mode_series
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Kind, Row, Shape
 from rockcheck.ebm.core.state import code_of, mode_code, note, on_wall, rocks
 from rockcheck.scenes.compiled import inner_kernel
@@ -35,26 +35,24 @@ def expand(block, base, run, reach):
     """Series of the mode's motion: order, place of a sticking pivot, and length of the step."""
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     reach = min(reach, _FARTHER * state.stride)
-    if mode.family == Family.FLAT:
-        order = state.order = flat_series(block, base, run, series.ORDER)
-        state.length = series.step_size(a, Row.U, Row.G, order, state.last_term_rad, reach)
-        return
     # The tolerance is relative to a motion that is still tiny, since it may grow.
     enough = 0.01 * state.tolerance_rad * min(1.0, 1e2 * (abs(motion.theta) + abs(motion.w)))
-    order = state.order = tilt_series(block, base, run, series.ORDER, enough, reach)
+    order = state.order = mode_series(block, base, run, series.ORDER, enough, reach)
     state.length = reach
-    if order == series.ORDER:
-        last = series.size_of(a, Row.PHI, Row.COS, order)
-        before = series.size_of(a, Row.PHI, Row.COS, order - 1)
-        free = rocks(mode)
-        if not free:
-            last = max(last, series.size_of(a, Row.XI, Row.Y, order))
-            before = max(before, series.size_of(a, Row.XI, Row.Y, order - 1))
+    if order < series.ORDER:
+        return
+    tilts, free = mode.family == Family.TILT, rocks(mode)
+    last = before = 0.0
+    for one, other, counts in (
+        (Row.PHI, Row.COS, tilts),
+        (Row.XI, Row.Y, tilts and not free),
         # Forces follow the base acceleration.
-        if not free or base.vertical.form.kind != Shape.STILL:
-            last = max(last, series.size_of(a, Row.U, Row.G, order))
-            before = max(before, series.size_of(a, Row.U, Row.G, order - 1))
-        state.length = series.longest_step(last, before, order, state.last_term_rad, reach)
+        (Row.U, Row.G, not free or base.vertical.form.kind != Shape.STILL),
+    ):
+        if counts:
+            last = max(last, series.size_of(a, one, other, order))
+            before = max(before, series.size_of(a, one, other, order - 1))
+    state.length = series.longest_step(last, before, order, state.last_term_rad, reach)
 
 
 @inner_kernel
@@ -91,7 +89,11 @@ def follow(block, base, run):
     """Selects the mode that follows; the event is UNTOLD where the mode goes on."""
     state, ended = run.state, code_of(run.state.mode)
     if state.guard > Guard.FAR_GAP:
-        state.event = _release(block, state)
+        state.event = Event.STICKS if state.guard == Guard.SLIP else Event.RELEASE
+    if state.event == Event.STICKS:
+        if on_wall(state.mode):
+            contacts.stop(state.motion)
+        contacts.stand(block, state.motion)
     if not modes.select(block, base, run):
         state.ending, state.event = Ending.NOT_FINITE, Event.UNTOLD
     elif state.event == Event.RELEASE and code_of(state.mode) == ended:
@@ -124,14 +126,3 @@ def _change(before, now):
     if before <= HistoryMode.SLIDE and now > HistoryMode.SLIDE:
         return Event.UPLIFT
     return Event.SLIPS if before % 2 == 0 and now % 2 == 1 else Event.RELEASE
-
-
-@inner_kernel
-def _release(block, state):
-    """Prepares the motion for a change of mode without impact: STICKS, else RELEASE."""
-    if state.guard != Guard.SLIP:
-        return Event.RELEASE
-    if on_wall(state.mode):
-        contacts.stop(state.motion)
-    contacts.stand(block, state.motion)
-    return Event.STICKS

@@ -22,15 +22,10 @@ _TINIEST = math.ulp(0.0)
 @inner_kernel
 def quiet_from(base, tolerance):
     """The time from which the base stands still as far as an outcome can tell."""
-    if base.vertical.form.kind == Shape.STILL and base.horizontal.form.kind == Shape.GAUSSIAN:
-        return base.horizontal.form.centre + math.sqrt(
-            -math.log(_LEFT * tolerance) / base.horizontal.form.rate
-        )
-    return (
-        0.0
-        if base.vertical.form.kind == Shape.STILL and base.horizontal.form.kind == Shape.STILL
-        else max(base.horizontal.form.quiet, base.vertical.form.quiet)
-    )
+    along, upward = base.horizontal.form, base.vertical.form
+    if upward.kind == Shape.STILL and along.kind == Shape.GAUSSIAN:
+        return along.centre + math.sqrt(-math.log(_LEFT * tolerance) / along.rate)
+    return max(along.quiet, upward.quiet)
 
 
 @inner_kernel
@@ -69,7 +64,9 @@ def _by_energy(block, state, ahead):
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
     corner = min(side.radius, other.radius) - block.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
-    free = ahead == 0.0 and _rocks_for_good(block, mode, energy)
+    free = ahead == 0.0 and rocks(mode) and not block.walls
+    if free and not block.no_slip:
+        free = _sticks(block, block.left, energy) and _sticks(block, block.right, energy)
     if most < corner and phi < side.alpha:
         return _safe(block, state, most, corner, free)
     falls = phi > side.alpha or energy > side.radius - block.height
@@ -144,10 +141,10 @@ def _falls(block, base, state):
     all in flight. Walls it could meet are left out.
     """
     mode, motion, t = state.mode, state.motion, state.t
-    gap = block.gap_left if mode.sense > 0 else block.gap_right
-    if mode.family == Family.FLAT or mode.sense * motion.w < 0.0 or gap < np.inf:
+    side = side_of(block, mode.sense)
+    if mode.family == Family.FLAT or mode.sense * motion.w < 0.0 or side.gap < np.inf:
         return -1.0
-    steepness = math.tan(abs(motion.theta) - side_of(block, mode.sense).alpha)
+    steepness = math.tan(abs(motion.theta) - side.alpha)
     strongest = max(abs(acceleration(base.horizontal, t)), largest_ahead(base.horizontal, t))
     if (not block.no_slip and steepness <= block.mu_s) or steepness <= strongest:
         return -1.0
@@ -155,21 +152,10 @@ def _falls(block, base, state):
 
 
 @inner_kernel
-def _rocks_for_good(block, mode, energy):
-    """Whether the block rocks and neither pivot can slip in free rocking of this energy.
+def _sticks(block, side, energy):
+    """Whether this pivot sticks as the block rocks about it with this energy, and lands on it.
 
-    That is up to its balance point, impacts included.
-    """
-    if block.walls or not rocks(mode):
-        return False
-    return block.no_slip or (
-        _pivot_sticks(block, block.left, energy) and _pivot_sticks(block, block.right, energy)
-    )
-
-
-@inner_kernel
-def _pivot_sticks(block, side, energy):
-    """Whether this pivot sticks while the block rocks about it, and as it lands on it.
+    That is up to its balance point.
 
     With k = 1/(I + R^2): |Q| <= max(k s c, s w^2) and P >= 1 - k s^2 - R w^2, with w^2 <= 2 k
     energy; the landing sticks if mu >= k s c/(1 - k s^2), for a homogeneous block 3 t/(4 + t^2), t

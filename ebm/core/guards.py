@@ -26,7 +26,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import contacts, lanes, motion, series
+from rockcheck.ebm.core import contacts, lanes, series
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of, wall_turn
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import on_wall, rocks
@@ -87,6 +87,9 @@ def fill_guards(block, state, a):
     mode = state.mode
     for which in range(len(KIND)):
         drop(a, which)
+    if block.walls:
+        _fill_gap(block, state, a, True)
+        _fill_gap(block, state, a, False)
     if mode.family == Family.FLAT:
         _fill_flat(block, state, a)
         return
@@ -105,13 +108,10 @@ def fill_guards(block, state, a):
         _enter(a, Guard.SLIP, 0.0, slip, 0.0, 0.0)
     elif mode.pivot == Pivot.SLIPPING:
         _enter(a, Guard.SLIP, 0.0, 0.0, -slip, slip)
-    if block.walls:
-        _fill_gap(block, state, a, True)
-        _fill_gap(block, state, a, False)
-        if mode.tip != 0:
-            _enter(a, Guard.TIP_PUSH, 0.0, 0.0, 1.0)
-        if mode.far != 0:
-            _enter(a, Guard.FAR_PUSH, 0.0, 1.0)
+    if mode.tip != 0:
+        _enter(a, Guard.TIP_PUSH, 0.0, 0.0, 1.0)
+    if mode.far != 0:
+        _enter(a, Guard.FAR_PUSH, 0.0, 1.0)
 
 
 @inner_kernel
@@ -136,13 +136,19 @@ def _fill_friction(block, state, mu, constant, a):
 
 @inner_kernel
 def _fill_gap(block, state, a, tip):
-    """The clear gap of the corner that faces the tip wall, +-xi + delta - s', or the far wall."""
+    """The clear gap of the corner that faces the tip wall, +-xi + delta - s', or the far wall.
+
+    For a flat block the tip wall is the left one.
+    """
     mode, pivot = state.mode, state.place
-    which = Guard.TIP_GAP if tip else Guard.FAR_GAP
-    distance = motion.delta(block, mode, tip)
-    if (mode.tip if tip else mode.far) != 0 or distance == np.inf:
+    which, sense = (Guard.TIP_GAP, 1.0) if tip else (Guard.FAR_GAP, -1.0)
+    faces = side_of(block, sense * mode.sense)
+    if (mode.tip if tip else mode.far) != 0 or faces.gap == np.inf:
         return
-    sense = 1.0 if tip else -1.0
+    if mode.family == Family.FLAT:
+        _enter(a, which, faces.gap, 0.0, 0.0, sense)
+        return
+    distance = faces.arm + faces.gap
     along, across = wall_turn(side_of(block, mode.sense), tip)
     if not rocks(mode):
         _enter(a, which, distance, across, -along, sense)
@@ -160,15 +166,9 @@ def _fill_flat(block, state, a):
     """The guards of a translating block; tip means the left wall, far the right one."""
     mode = state.mode
     hangs = mode.pivot != Pivot.OFF and mode.pull < 0  # a floor that pulls at what a wall holds
-    if block.gap_left < np.inf and mode.tip == 0:
-        _enter(a, Guard.TIP_GAP, block.gap_left, 0.0, 0.0, 1.0)
-    if block.gap_right < np.inf and mode.far == 0:
-        _enter(a, Guard.FAR_GAP, block.gap_right, 0.0, 0.0, -1.0)
-    if mode.tip != mode.far and mode.pivot == Pivot.OFF:
-        _enter(a, Guard.TIP_PUSH, 0.0, 0.0, 1.0)
-    elif mode.tip != mode.far and hangs:
-        # On the floor, Q is the base acceleration that the wall takes.
-        _enter(a, Guard.TIP_PUSH, 0.0, float(mode.tip - mode.far), 0.0)
+    if mode.tip != mode.far and (mode.pivot == Pivot.OFF or hangs):
+        # On the floor, Q is the base acceleration that the wall takes; off it there is none.
+        _enter(a, Guard.TIP_PUSH, 0.0, float(mode.tip - mode.far), 1.0)
     if mode.pivot == Pivot.OFF:
         _enter(a, Guard.LANDING, -block.height, 0.0, 1.0)
         return
@@ -210,14 +210,6 @@ def _coefficients(which, half, a):
         if a[row, source] != 0.0:
             sum = sum + a[row, source] * lanes.load(a, source, half + rate)
     return sum * (lanes.ramp() + (half + 1.0)) if rate else sum
-
-
-@inner_kernel
-def _halves(which, degree, a):
-    """The two halves of a guard of the table that is no rate, without its constant."""
-    return lanes.upto(_coefficients(which, 0, a), degree), lanes.upto(
-        _coefficients(which, lanes.LANES, a), degree - lanes.LANES
-    )
 
 
 @inner_kernel
@@ -296,22 +288,20 @@ def starts_positive(which, ahead, a):
 def _stays_positive(which, order, until, slack, a):
     """A cheap proof, without writing the guard, that it is positive up to a time.
 
-    It starts higher than the sum of all its falling terms.
+    It starts higher than it falls.
     """
     row = Row.TABLE + which
     if a[row, _THERE] == 0.0:
         return True
     if KIND[which] == Kind.RATE:
         return False
-    low, high = _halves(which, order - _SHORTER[which], a)
+    degree = order - _SHORTER[which]
+    low = lanes.upto(_coefficients(which, 0, a), degree)
+    high = lanes.upto(_coefficients(which, lanes.LANES, a), degree - lanes.LANES)
     begin = a[row, _CONSTANT] + lanes.first(low)
-    fallen = lanes.total(
-        (lanes.above(lanes.falls(low), 0) + lanes.falls(high) * series.eighth(until))
-        * lanes.powers(until)
-    )
     return (
         begin > max(slack * series.NOISE[KIND[which]], contacts.CLOSED)
-        and -fallen < 0.999999 * begin
+        and -series.least_change(low, high, until) < 0.999999 * begin
     )
 
 
@@ -374,8 +364,7 @@ def rock_guards_hold(block, run):
 
     False where it proves nothing.
 
-    Each guard is bounded from below as in `first_root`, without being written. Inside the cone the
-    floor pushes.
+    The floor's guards are bounded as the others are. Inside the cone the floor pushes.
     """
     order, h, a = run.state.order, run.state.length, run.a
     if a[Row.PHI, 0] > 0.5:
@@ -384,12 +373,8 @@ def rock_guards_hold(block, run):
         for which in (Guard.TIP_GAP, Guard.FAR_GAP):
             drop(a, which)
             _fill_gap(block, run.state, a, which == Guard.TIP_GAP)
-            row = Row.TABLE + which
-            if a[row, _THERE] != 0.0:
-                low, high = _halves(which, order, a)
-                begin = lanes.first(low) + a[row, _CONSTANT]
-                if not begin + series.least_change(low, high, h) > contacts.CLOSED:
-                    return False
+            if not _stays_positive(which, order, h, 1.0, a):
+                return False
     if block.no_slip and not block.unilateral:
         return True
     mu, share = (1.0, 0.0) if block.no_slip else (block.mu_s, 1.0)

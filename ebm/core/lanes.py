@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
 
@@ -37,6 +37,7 @@ class Lanes(types.Type):
 
 
 _LANES = Lanes("Lanes")
+_IN_MATRIX = types.float64[:, ::1], types.int64, types.int64
 register_model(Lanes)(lambda manager, kind: models.PrimitiveModel(manager, kind, _VECTOR))
 
 
@@ -60,8 +61,9 @@ def _where(b: Any, how: str, place: Any) -> Any:
     )
 
 
-def _place(context: Any, b: Any, kind: Any, a: Any, row: Any, k: Any) -> Any:
+def _place(context: Any, b: Any, a: Any, row: Any, k: Any) -> Any:
     """A pointer to the lanes from a[row, k] on of a matrix."""
+    kind = _IN_MATRIX[0]
     matrix = make_array(kind)(context, b, a)
     number = cgutils.get_item_pointer(context, b, kind, matrix, [row, k], wraparound=False)
     return b.bitcast(number, ir.PointerType(_VECTOR))
@@ -77,18 +79,13 @@ def _compiled_as(
     """
 
     def tell(plain: Callable[..., Any]) -> Callable[..., Any]:
-        class _Template(AbstractTemplate):
+        class _Template(ConcreteTemplate):
             key = plain
-
-            def generic(self, args: Any, kws: Any) -> Any:
-                kinds = zip(args, given, strict=True)
-                return signature(
-                    result, *(a if isinstance(a, types.Array) else k for a, k in kinds)
-                )
+            cases = [signature(result, *given)]  # noqa: RUF012
 
         def lower(context: Any, b: Any, kinds: Any, values: Any) -> Any:
-            if types.Array in given:
-                values = [_place(context, b, kinds.args[0], *values[:3]), *values[3:]]
+            if given[:3] == _IN_MATRIX:
+                values = [_place(context, b, *values[:3]), *values[3:]]
             found = code(b, *values)
             return context.get_dummy_value() if result == types.none else found
 
@@ -99,21 +96,16 @@ def _compiled_as(
     return tell
 
 
-class _Arithmetic(AbstractTemplate):
-    """The types of sums and products: lanes with lanes, or lanes with a number.
-
-    The number then stands in all lanes.
-    """
-
-    def generic(self, args: Any, kws: Any) -> Any:
-        if _LANES in args and all(kind in (_LANES, types.float64) for kind in args):
-            return signature(_LANES, *args)
+#: Sums and products are those of lanes with lanes, or of lanes with a number, which then stands in
+#: all lanes.
+_PAIRS = (_LANES, _LANES), (_LANES, types.float64), (types.float64, _LANES)
 
 
 def _calculates(operation: Any, instruction: str) -> None:
     """Tells numba how an operator works on lanes."""
-    infer_global(operation)(type(instruction, (_Arithmetic,), {}))
-    for kinds in ((_LANES, _LANES), (_LANES, types.float64), (types.float64, _LANES)):
+    cases = [signature(_LANES, *kinds) for kinds in _PAIRS]
+    infer_global(operation)(type(instruction, (ConcreteTemplate,), {"cases": cases}))
+    for kinds in _PAIRS:
 
         def code(_: Any, b: Any, found: Any, values: Any, kinds: Any = kinds) -> Any:
             both = [
@@ -225,9 +217,6 @@ def total(v: Floats) -> float:
         half = len(v) // 2
         v = v[:half] + v[half:]
     return v[0]
-
-
-_IN_MATRIX = types.Array, types.int64, types.int64
 
 
 @_compiled_as(lambda b, place: b.load(place, align=8), _LANES, *_IN_MATRIX)

@@ -13,6 +13,7 @@ goes on with a *slack*: the noise that its guards are allowed. Each further such
 instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
 
+import itertools
 import math
 from collections import namedtuple
 
@@ -40,20 +41,15 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
     # With static friction above kinetic both rocking and sliding can be consistent. Then the pivot
     # sticks.
     rows.append((Family.TILT, first, Pivot.STICK, 0, 1, 0, 0))
+    # A flat block that slides touches no wall, and the floor pushes.
+    rows += [(Family.FLAT, 1, Pivot.OFF, 0, 1, *walls) for walls in flat[:-1]]
+    rows += [(Family.FLAT, 1, Pivot.SLIPPING, slip, 1, 0, 0) for slip in (-first, first)]
+    rows.append((Family.FLAT, 1, Pivot.OFF, 0, 1, 0, 0))
     pivots = (Pivot.STICK, 0), (Pivot.SLIPPING, -1), (Pivot.SLIPPING, 1)
-    slides = (Pivot.SLIPPING, -first), (Pivot.SLIPPING, first)
-    for family, sense, leans, floors in (
-        (Family.FLAT, 1, flat, slides),
-        (Family.TILT, first, tilted, pivots),
-        (Family.TILT, -first, tilted, pivots),
-    ):
-        for walls in leans:
-            rows += [
-                (family, sense, floor, slip, pull, *walls)
-                for pull in (1, -1)
-                for floor, slip in floors
-            ]
-            rows.append((family, sense, Pivot.OFF, 0, 1, *walls))
+    for sense, walls in itertools.product((first, -first), tilted):
+        on_floor = itertools.product((1, -1), pivots)
+        rows += [(Family.TILT, sense, *pivot, pull, *walls) for pull, pivot in on_floor]
+        rows.append((Family.TILT, sense, Pivot.OFF, 0, 1, *walls))
     return rows
 
 
@@ -120,7 +116,7 @@ def wrong_by(block, base, run, measured):
     # The plain constant would make numba compile all series once more, for it alone.
     look = min(_LOOK, series.WIDTH)
     state, t, a = run.state, run.state.t, run.a
-    order = mode_series(block, base, run, look, 0.0)
+    order = mode_series(block, base, run, look, 0.0, 0.0)
     guards.fill_guards(block, run.state, run.a)
     smooth = ground.smooth_until(base, t) - t
     worst = 0.0
@@ -170,8 +166,9 @@ def favoured(block, base, state):
     if abs(toward) <= series.NOISE[Kind.FORCE]:
         toward = ground.acceleration_after(base.horizontal, t)
     off = motion.x if abs(motion.x) > series.NOISE[Kind.POSITION] else 0.0
-    room = block.gap_left - block.gap_right if block.gap_left != block.gap_right else 0.0
-    for one in (toward, -motion.vx, off, room, block.right.arm - block.left.arm):
+    left, right = block.left, block.right
+    room = left.gap - right.gap if left.gap != right.gap else 0.0
+    for one in (toward, -motion.vx, off, room, right.arm - left.arm):
         if one != 0.0:
             return 1 if one > 0.0 else -1
     return 0
@@ -197,53 +194,36 @@ def _possible(block, state, at):
     """Whether the contacts of the mode are closed and its slip agrees with the motion."""
     mode, motion = state.mode, state.motion
     flat, mine = mode.family == Family.FLAT, mode.tip + 2 * mode.far
-    if (not block.unilateral and at.floor) if mode.pivot == Pivot.OFF else not at.floor:
+    off, stands = mode.pivot == Pivot.OFF, mode.pivot == Pivot.STICK
+    if not _floor_allows(block, state, flat, mine) or not (off or at.floor):
         return False
-    if mode.pivot != Pivot.OFF and mode.pull < 0 and not _may_pull(block, mode, flat, mine):
-        return False
-    if not _friction_allows(block, state, mine == 3 and not flat):
-        return False
-    if flat and not _flat_on(mode, mine, at.upright_walls):
+    # At rest a flat block is held on all walls that it touches; in flight it leans on both if it
+    # fills what is between them.
+    if flat and (stands or (off and at.upright_walls == 3)) and mine != at.upright_walls:
         return False
     # Near phi = 0 the far gap goes with phi^2: it lands along that wall, and does not lean on it.
     lies = mine == 2 and motion.theta * motion.theta < contacts.CLOSED
-    if not flat and mode.pivot == Pivot.STICK and lies:
+    if not flat and stands and lies:
         return False
     # Along a wall the pivot slips as the block turns.
     v = motion.vx if flat else mode.sense * (at.v if mine == 0 else motion.w)
-    if mode.pivot == Pivot.STICK:
-        return v == 0.0
-    return mode.pivot == Pivot.OFF or mode.slip * v >= 0.0
+    return v == 0.0 if stands else off or mode.slip * v >= 0.0
 
 
 @inner_kernel
-def _friction_allows(block, state, wedged):
-    """Whether the law of friction knows what the pivot does.
+def _floor_allows(block, state, flat, mine):
+    """Whether the floor and its friction do what the mode asks of them.
 
-    That which winds (Bouc-Wen's) lets it slip, however little, unless both walls hold the block.
+    A floor that can only push holds nothing down, any other one never lets go. A block that never
+    slips hangs upright only. Friction that winds (Bouc-Wen's) lets the pivot slip, however little,
+    unless both walls hold the block, `mine`.
     """
-    pivot = state.mode.pivot
+    pivot, pulls = state.mode.pivot, state.mode.pull < 0
+    if pulls if block.unilateral else pivot == Pivot.OFF:
+        return False
     if block.no_slip:
-        return pivot != Pivot.SLIPPING
-    return not state.winds or (pivot == Pivot.STICK) == wedged
-
-
-@inner_kernel
-def _may_pull(block, mode, flat, mine):
-    """Whether the floor can hold the block down in this mode."""
-    stays = (flat and (hangs_flat(mode) or mine != 0)) or (not flat and not block.no_slip)
-    return stays and not block.unilateral
-
-
-@inner_kernel
-def _flat_on(mode, mine, walls):
-    """Whether a flat block rests on the right ones of the walls that it touches.
-
-    At rest it is held on these; sliding it touches none; between two walls that it fills it leans
-    on both.
-    """
-    held = mode.pivot == Pivot.STICK or (mode.pivot == Pivot.OFF and walls == 3)
-    return (mine == walls or not held) and (mine == 0 or mode.pivot != Pivot.SLIPPING)
+        return pivot != Pivot.SLIPPING and (flat or not pulls)
+    return not state.winds or (pivot == Pivot.STICK) == (mine == 3 and not flat)
 
 
 @inner_kernel
@@ -269,14 +249,11 @@ def _clean(block, motion, floor):
     contacts.upright(block, motion)
     if floor:
         contacts.stand_if_slow(block, motion)
-    if not floor or not block.walls or (motion.theta == 0.0 and motion.w == 0.0):
+    if not floor or not block.walls or contacts.lean(motion) == 0.0:
         return
-    side = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
-    near = contacts.closed_wall(block, motion, side, False)
-    away = contacts.closed_wall(block, motion, -side, True)
-    if (near and away) or (
-        motion.theta != 0.0 and abs(motion.w) < contacts.SLOW and (near or away)
-    ):
+    walls = touched_walls(block, motion, 1 if contacts.lean(motion) > 0.0 else -1, False)
+    slow = motion.theta != 0.0 and abs(motion.w) < contacts.SLOW
+    if walls == 3 or (slow and walls != 0):
         contacts.stop(motion)
         contacts.upright(block, motion)
 
@@ -293,15 +270,13 @@ def _touching(block, base, state):
     motion = state.motion
     floor = not block.unilateral or contacts.closed_floor(block, motion)
     _clean(block, motion, floor)
-    v = contacts.slip_velocity(block, motion)
-    if motion.theta != 0.0 or motion.w != 0.0:
-        first = 1 if (motion.theta if motion.theta != 0.0 else motion.w) > 0.0 else -1
-        near = touched_walls(block, motion, first, False)
-        return _Touching(first, first, floor, v, 0, near, 0, near)
-    side = favoured(block, base, state)
+    v, lean = contacts.slip_velocity(block, motion), contacts.lean(motion)
+    side = int(math.copysign(1.0, lean)) if lean != 0.0 else favoured(block, base, state)
     first = side or 1
-    walls = touched_walls(block, motion, 1, True)
     near = touched_walls(block, motion, first, False)
+    if lean != 0.0:
+        return _Touching(side, first, floor, v, 0, near, 0, near)
+    walls = touched_walls(block, motion, 1, True)
     away = touched_walls(block, motion, -first, False)
     return _Touching(side, first, floor, v, walls, near, away, _FLAT_TRIES)
 
@@ -332,8 +307,8 @@ def select(block, base, run):
     state.mode = _candidate(at, chosen)
     again = least <= state.least_slack
     state.rules[Rule.MODE_AGAIN if again else Rule.LEAST_CONTRADICTION] += 1
-    state.slack = max(least, state.least_slack)
-    state.least_slack *= 2.0
+    slacken(state)
+    state.slack = max(least, state.slack)
     return True
 
 

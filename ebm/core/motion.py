@@ -29,7 +29,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from rockcheck.ebm.core.block import side_of, wall_turn
+from rockcheck.ebm.core.block import side_of, wall_corner, wall_turn
 from rockcheck.ebm.core.ground import fill_series
 from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Row, Shape
@@ -49,13 +49,6 @@ def sine_cosine(angle, a):
 
 
 @inner_kernel
-def delta(block, mode, tip):
-    """Distance from the mass's initial centre to the wall on the tip side (or the far side), R."""
-    left = (mode.sense > 0) == tip
-    return block.left.arm + block.gap_left if left else block.right.arm + block.gap_right
-
-
-@inner_kernel
 def base_series(base, t, sign, order, a):
     """Fills in the series of the base motion in the frame of this sign, u and G."""
     fill_series(base.horizontal, t, sign, order, a, Row.U)
@@ -65,23 +58,18 @@ def base_series(base, t, sign, order, a):
 
 
 @inner_kernel
-def mode_series(block, base, run, order, reach):
-    """Fills the workspace with the whole series of the mode's motion; returns their order."""
-    if run.state.mode.family == Family.FLAT:
-        return flat_series(block, base, run, order)
-    return tilt_series(block, base, run, order, 0.0, reach)
-
-
-@inner_kernel
-def tilt_series(block, base, run, order, enough, reach):
-    """Fills the workspace with the series of a tilted block's motion; returns their order.
+def mode_series(block, base, run, order, enough, reach):
+    """Fills the workspace with the series of the mode's motion; returns their order.
 
     In the state it notes the place of a pivot that sticks.
-    The series begin now. The order is `order`, or less where the terms fall below `enough` within
-    `reach` (the longest step there can be). ROCK, whose motion does not depend on P and Q, has them
-    where the setting needs a guard on them.
+    The series begin now. The order is `order`, or less where the terms of a tilted block fall below
+    `enough` within `reach` (the longest step there can be). ROCK, whose motion does not depend on P
+    and Q, has them where the setting needs a guard on them. A force has two terms fewer than the
+    order, a rate one.
     """
     mode, motion, a, sign = run.state.mode, run.state.motion, run.a, float(run.state.mode.sense)
+    if mode.family == Family.FLAT:
+        return _flat_series(block, base, run, order)
     base_series(base, run.state.t, sign, order, a)
     a[Row.PHI, 0], a[Row.OMEGA, 0] = sign * motion.theta, sign * motion.w
     side = side_of(block, mode.sense)
@@ -96,6 +84,8 @@ def tilt_series(block, base, run, order, enough, reach):
     a[Row.Y, 0], a[Row.Y, 1] = motion.y, motion.vy
     if mode.pivot == Pivot.STICK and mode.tip != mode.far:
         return _lean_series(block, side, mode.tip != 0, order, a)
+    w0, s0, c0 = a[Row.OMEGA, 0], a[Row.SIN, 0], a[Row.COS, 0]
+    a[Row.PHI, 1], a[Row.SIN, 1], a[Row.COS, 1] = w0, -w0 * c0, w0 * s0
     if mode.pivot == Pivot.SLIPPING and not on_wall(mode) and not run.state.winds:
         kappa = friction(block, run.state)
         return _slide_series(block.spin, kappa, order, enough, reach, a)
@@ -199,7 +189,6 @@ def _rock_series(share, still_vertical, order, enough, reach, need_forces, a):
             bend = (ramp() + (half + 1.0)) * (ramp() + (half + 2.0))
             store(a, Row.P, half, load(a, Row.COS, half + 2) * bend + load(a, Row.G, half))
             store(a, Row.Q, half, load(a, Row.SIN, half + 2) * bend + load(a, Row.U, half))
-        a[Row.P, order - 1] = a[Row.P, order] = a[Row.Q, order - 1] = a[Row.Q, order] = 0.0
     return order
 
 
@@ -212,11 +201,6 @@ def _slide_series(spin, kappa, order, enough, reach, a):
     sine, cosine = a[Row.SIN, 0], a[Row.COS, 0]
     arm = sine + kappa * cosine
     share = 1.0 / (1.0 + spin * sine * arm)
-    a[Row.PHI, 1], a[Row.SIN, 1], a[Row.COS, 1] = (
-        a[Row.OMEGA, 0],
-        -a[Row.OMEGA, 0] * cosine,
-        a[Row.OMEGA, 0] * sine,
-    )
     w0, s, c = a[Row.OMEGA, 0], a[Row.SIN, 1], a[Row.COS, 1]
     ds, dc, moment = -w0 * c, w0 * s, 0.0
     first_push = last_arm = 0.0
@@ -261,9 +245,6 @@ def _slide_series(spin, kappa, order, enough, reach, a):
         if small == 3:
             order = k + 2
             break
-    a[Row.OMEGA, order] = a[Row.P, order - 1] = a[Row.P, order] = a[Row.Q, order - 1] = a[
-        Row.Q, order
-    ] = 0.0
     return order
 
 
@@ -283,13 +264,10 @@ def _lean_series(block, side, tip, order, a):
         else (block.left.arm + block.right.arm) * np.sin(a[Row.PHI, 0])
     )
     push = Row.NA if tip else Row.NB
-    for k in range(order + 1):
-        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
-        if k > 0:
-            a[Row.PHI, k] = a[Row.OMEGA, k] = a[Row.SIN, k] = a[Row.COS, k] = a[Row.XI, k] = a[
-                Row.Y, k
-            ] = 0.0
     a[Row.OMEGA, 0] = 0.0
+    for k in range(1, order + 1):
+        a[Row.PHI, k] = a[Row.OMEGA, k] = a[Row.SIN, k] = a[Row.COS, k] = 0.0
+        a[Row.XI, k] = a[Row.Y, k] = 0.0
     for k in range(order - 1):
         a[Row.P, k] = a[Row.G, k]
         a[push, k] = wall * (a[Row.U, k] * c - a[Row.G, k] * s) / arm
@@ -298,8 +276,10 @@ def _lean_series(block, side, tip, order, a):
 
 
 #: The contacts of a mode: the side that the block tips to, `spin` = 1/I, the friction `kappa` of a
-#: slipping pivot (Q = -kappa P), and which contacts act: floor, tip wall, far wall.
-_Acting = namedtuple("_Acting", "side spin kappa acts")
+#: slipping pivot (Q = -kappa P), which contacts act (floor, tip wall, far wall), and the place of
+#: each among those that act. What is written there for one that does not act is overwritten by the
+#: next one, or stands behind the last one.
+_Acting = namedtuple("_Acting", "side spin kappa acts places")
 
 
 @inner_kernel
@@ -320,14 +300,12 @@ def _contact_rows(acting, a):
     tip_arm, far_arm = _wall_arms(acting.side, s, c)
     along, upward = (0.0, 1.0, -1.0), (1.0, 0.0, 0.0)
     turns, slips = (-s, -tip_arm, -far_arm), (kappa, 0.0, 0.0)
-    n = 0
+    n = acting.places[2] + acting.acts[2]
     for which in range(3):
-        if acting.acts[which]:
-            row, column = Row.CONSTRAINT + n, Row.COLUMN + n
-            a[row, 0], a[row, 1], a[row, 2] = along[which], upward[which], turns[which]
-            a[column, 0], a[column, 1] = -kappa if which == 0 else along[which], upward[which]
-            a[column, 2] = turns[which] - slips[which] * c
-            n += 1
+        row, column = Row.CONSTRAINT + acting.places[which], Row.COLUMN + acting.places[which]
+        a[row, 0], a[row, 1], a[row, 2] = along[which], upward[which], turns[which]
+        a[column, 0], a[column, 1] = -kappa if which == 0 else along[which], upward[which]
+        a[column, 2] = turns[which] - slips[which] * c
     for i in range(Row.CONSTRAINT, Row.CONSTRAINT + n):
         row = i - Row.CONSTRAINT + Row.MATRIX
         for j in range(n):
@@ -347,20 +325,13 @@ def _contact_series(block, state, order, enough, reach, a):
     The matrix of the unknown forces is the same for each term.
     """
     mode = state.mode
-    floor, tip, far = mode.pivot != Pivot.OFF, mode.tip != 0, mode.far != 0
+    floor, tip, far = int(mode.pivot != Pivot.OFF), mode.tip, mode.far
     side, kappa = side_of(block, mode.sense), friction(block, state)
-    acting = _Acting(side, block.spin, kappa, (floor, tip, far))
+    acting = _Acting(side, block.spin, kappa, (floor, tip, far), (0, floor, floor + tip))
     n = _contact_rows(acting, a)
     s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
     scale = 1.0
     small = 0
-    for k in range(order + 1):
-        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = a[Row.NB, k] = 0.0
-    a[Row.PHI, 1], a[Row.SIN, 1], a[Row.COS, 1] = (
-        a[Row.OMEGA, 0],
-        -a[Row.OMEGA, 0] * c0,
-        a[Row.OMEGA, 0] * s0,
-    )
     a[Row.Z, 0] = mode.sense * state.zeta
     for k in range(order - 1):
         i = k + 2
@@ -392,11 +363,6 @@ def _contact_series(block, state, order, enough, reach, a):
         if small == 3:
             order = i
             break
-    i = order
-    a[Row.OMEGA, i] = 0.0
-    a[Row.P, i] = a[Row.P, i - 1] = a[Row.Q, i] = a[Row.Q, i - 1] = a[Row.NA, i] = a[
-        Row.NA, i - 1
-    ] = a[Row.NB, i] = a[Row.NB, i - 1] = 0.0
     return order
 
 
@@ -429,15 +395,12 @@ def _accelerations(acting, n, free, k, a):
     s, c = a[Row.SIN, 0], a[Row.COS, 0]
     tip_arm, far_arm = _wall_arms(side, s, c)
     ax, ay, aphi = along, -a[Row.G, k], acting.spin * moment
-    r = 0
     for which in range(3):
-        if acting.acts[which]:
-            a[Row.KNOWN, r] = (
-                kc - ay + s * aphi,
-                tip_reach - ax + tip_arm * aphi,
-                far_reach + ax + far_arm * aphi,
-            )[which]
-            r += 1
+        a[Row.KNOWN, acting.places[which]] = (
+            kc - ay + s * aphi,
+            tip_reach - ax + tip_arm * aphi,
+            far_reach + ax + far_arm * aphi,
+        )[which]
     for r in range(n):
         force = 0.0
         for j in range(n):
@@ -446,11 +409,9 @@ def _accelerations(acting, n, free, k, a):
         ax += a[Row.COLUMN + r, 0] * force
         ay += a[Row.COLUMN + r, 1] * force
         aphi += acting.spin * a[Row.COLUMN + r, 2] * force
-    r = 0
     for which in range(3):
-        if acting.acts[which]:
-            a[(Row.P, Row.NA, Row.NB)[which], k] = a[Row.FOUND, r]
-            r += 1
+        force = a[Row.FOUND, acting.places[which]] if acting.acts[which] else 0.0
+        a[(Row.P, Row.NA, Row.NB)[which], k] = force
     a[Row.Q, k] = -acting.kappa * a[Row.P, k]
     a[Row.WALL_PUSH, k] = a[Row.NA, k] + a[Row.NB, k]
     return ax, ay, aphi
@@ -486,7 +447,7 @@ def inverse_of(a, matrix, inverse, n):
 
 
 @inner_kernel
-def flat_series(block, base, run, order):
+def _flat_series(block, base, run, order):
     """Fills the workspace with the series of a block that only translates; returns their order.
 
     World frame. Q is the floor's friction, P its normal force on both corners together, N_a the
@@ -511,8 +472,6 @@ def flat_series(block, base, run, order):
             a[Row.NA, k] = press * a[Row.U, k]
         a[Row.XI, k + 2] = (press * a[Row.NA, k] + a[Row.Q, k] - a[Row.U, k]) / ((k + 2) * (k + 1))
         a[Row.Y, k + 2] = (a[Row.P, k] - a[Row.G, k]) / ((k + 2) * (k + 1))
-    for k in range(order - 1, order + 1):
-        a[Row.P, k] = a[Row.Q, k] = a[Row.NA, k] = 0.0
     return order
 
 
@@ -537,15 +496,10 @@ def motion_at(block, state, a, tau, motion):
     if mode.pivot == Pivot.STICK:
         xi, v = pivot + s, -c * w
     elif on_wall(mode):
-        wall = 1.0 if mode.tip != 0 else -1.0
-        other = side_of(block, -mode.sense)
-        radius, angle = (
-            (side.top_radius, side.top_alpha + phi)
-            if mode.tip != 0
-            else (other.radius, other.alpha + phi)
-        )
-        reach, reach_rate = radius * np.sin(angle), radius * np.cos(angle)
-        xi, v = wall * (reach - delta(block, mode, mode.tip != 0)), wall * reach_rate * w
+        wall, faces = (1.0, side) if mode.tip != 0 else (-1.0, side_of(block, -mode.sense))
+        radius, alpha = wall_corner(faces, mode.tip != 0)
+        reach, reach_rate = radius * np.sin(alpha + phi), radius * np.cos(alpha + phi)
+        xi, v = wall * (reach - (faces.arm + faces.gap)), wall * reach_rate * w
     else:
         xi, v = _place_at(a, Row.XI, order, tau)
     y, vy = (c, s * w) if mode.pivot != Pivot.OFF else _place_at(a, Row.Y, order, tau)

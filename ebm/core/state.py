@@ -37,7 +37,7 @@ MOTION = record(x="f8", y="f8", theta="f8", vx="f8", vy="f8", w="f8")
 MODE = record(
     # A Family.
     family="i8",
-    # The sign of theta; at phi = 0, the sign that it is about to take.
+    # The sign of theta; at phi = 0, the sign that it is about to take. Where flat: 1.
     sense="i8",
     # A Pivot, and the direction in which it slips (frame; world where flat).
     pivot="i8",

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core import contacts, impacts, modes
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import side_of, wall_corner
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
 from rockcheck.ebm.core.names import Contact, Event, Family, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
@@ -88,9 +88,7 @@ def touch(block, mode, motion, which):
         else:  # past upright it would stand on its other corner, without an impact
             motion.x -= sign * contacts.wall_gap(block, motion, mode.sense)
     elif which == Guard.TIP_GAP or which == Guard.FAR_GAP:
-        side = (
-            1 if (which == Guard.TIP_GAP) == (mode.family == Family.FLAT or mode.sense > 0) else -1
-        )
+        side = mode.sense if which == Guard.TIP_GAP else -mode.sense
         motion.x -= side * contacts.wall_gap(block, motion, side)
 
 
@@ -124,7 +122,7 @@ def _floor_impact(block, state, resting):
         # Flush with the wall toward which it would rock: the closed branch of "moreau" (the paper
         # is silent).
         state.rules[Rule.FLUSH_LANDING] += 1
-        e = block.e_right if S1 > 0 else block.e_left
+        e = side_of(block, -S1).e
         state.impulse = (1.0 + e) * s1 * abs(w1)
         motion.w = -e * w1 if e * abs(w1) > resting else 0.0
         motion.vx = (-e * v1 if S1 * v1 > 0.0 else v1) - c * motion.w
@@ -149,9 +147,8 @@ def _wall_impact(block, state, tip, resting):
         state.impulse = abs(motion.vx)
         contacts.stop(motion)
         return
-    flat = mode.family == Family.FLAT
-    e = block.e_left if tip == (flat or mode.sense > 0) else block.e_right
-    if flat:
+    e = side_of(block, mode.sense if tip else -mode.sense).e
+    if mode.family == Family.FLAT:
         state.impulse = (1.0 + e) * abs(motion.vx)
         motion.vx = -e * motion.vx if e * abs(motion.vx) > resting else 0.0
     else:
@@ -168,11 +165,8 @@ def _corner_impact(block, state, sw, e, resting):
     phi, sign = abs(motion.theta), float(mode.sense)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
     s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
-    cp = (
-        side.top_radius * math.cos(side.top_alpha + phi)
-        if sw > 0.0
-        else other.radius * math.cos(other.alpha + phi)
-    )
+    radius, alpha = wall_corner(side if sw > 0.0 else other, sw > 0.0)
+    cp = radius * math.cos(alpha + phi)
     w1, xdot1 = sign * motion.w, sign * motion.vx
     before = xdot1 * xdot1 + (s * w1) ** 2 + w1 * w1 / block.spin
     corner = impacts.Corner(1.0, sw, s, c, sw * cp, side.share, block.spin)
@@ -218,8 +212,7 @@ def _strike_all(block, base, run, resting):
     slower = v[1] + max(side_of(block, -sign).arm * v[2], -side_of(block, sign).arm * v[2])
     state.rules[Rule.FLAT_LANDING] += flat and floor and slower < -contacts.SLOW
     impact.sense, impact.phi, impact.resting = sign, abs(motion.theta), resting
-    impact.e_tip = block.e_left if sign > 0 else block.e_right
-    impact.e_far = block.e_right if sign > 0 else block.e_left
+    impact.e_tip, impact.e_far = side_of(block, sign).e, side_of(block, -sign).e
     if tip and far:
         state.rules[Rule.WEDGED] += 1
         impact.e_tip = impact.e_far = 0.0

@@ -141,7 +141,7 @@ class Core:
         """Guards of a tilted mode as polynomials of time, and the motion (phi, xi, y) that they
         follow."""
         run = run_of(mode, state)
-        order = motion.tilt_series(self.setting, self.base, run, 8, 0.0, 0.0)
+        order = motion.mode_series(self.setting, self.base, run, 8, 0.0, 0.0)
         a = run.a
         guards.fill_guards(self.setting, run.state, a)
         found = {
