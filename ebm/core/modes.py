@@ -251,9 +251,11 @@ def _clean(block, motion, floor):
         contacts.stand_if_slow(block, motion)
     if not floor or not block.walls or contacts.lean(motion) == 0.0:
         return
-    walls = touched_walls(block, motion, 1 if contacts.lean(motion) > 0.0 else -1, False)
+    side = 1 if contacts.lean(motion) > 0.0 else -1
+    near = contacts.closed_wall(block, motion, side, False)
+    away = contacts.closed_wall(block, motion, -side, True)
     slow = motion.theta != 0.0 and abs(motion.w) < contacts.SLOW
-    if walls == 3 or (slow and walls != 0):
+    if (near and away) or (slow and (near or away)):
         contacts.stop(motion)
         contacts.upright(block, motion)
 
