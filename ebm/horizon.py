@@ -70,12 +70,14 @@ def other_laws(model: EventBasedModel, *, walls: bool, flat: bool) -> tuple[Impa
 
     `walls`: beside walls; `flat`: where it lands flat.
     """
-    laws: list[ImpactLaw] = ["moreau"] if model.pivot == "unilateral" else []
-    if laws and walls:
-        laws.append("floor-first")
-    if laws and flat:
-        laws += ["leading-first", "trailing-first"]
-    return tuple(law for law in laws if law != model.impacts)
+    matter: dict[ImpactLaw, bool] = {
+        "moreau": True,
+        "floor-first": walls,
+        "leading-first": flat,
+        "trailing-first": flat,
+    }
+    others = (law for law, matters in matter.items() if matters and law != model.impacts)
+    return tuple(others) if model.pivot == "unilateral" else ()
 
 
 def _disturbed(

@@ -9,7 +9,17 @@ import numpy as np
 from pydantic import Field, Strict
 
 from rockcheck.ebm.core import names
-from rockcheck.scenes import Cost, Event, Frozen, History, Positive, Scene, errors, observation
+from rockcheck.scenes import (
+    Cost,
+    Event,
+    Frozen,
+    History,
+    Positive,
+    Scene,
+    errors,
+    observation,
+    progress,
+)
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -184,7 +194,6 @@ class EventBasedModel(Frozen):
     def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
         from rockcheck.ebm import natural
-        from rockcheck.scenes import progress
 
         runs = rows, states, *work
         # What is compiled or loaded is so before the clock starts. A run of few steps is played

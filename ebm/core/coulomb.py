@@ -109,6 +109,7 @@ def tell(run):
     if event == Event.UNTOLD:
         return
     note(run, event, state.before)
+    state.impulse = 0.0
     impact = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
     if impact and now == HistoryMode.REST and run.records.log.shape[0] > state.events:
         note(run, Event.SETTLED, state.before)

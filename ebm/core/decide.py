@@ -58,29 +58,25 @@ def _by_energy(block, state, ahead):
     excitation a block that only rocks conserves its energy up to its next impact, so that its peak
     is known at once, unless with as much it would turn farther on its other corner.
     """
-    mode, motion = state.mode, state.motion
+    mode, motion, peak = state.mode, state.motion, state.peak
     phi = abs(motion.theta)
     energy = energy_of(block, motion)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
     corner = min(side.radius, other.radius) - block.height
     most = 0.5 * (math.sqrt(2.0 * max(energy, 0.0)) + ahead) ** 2
-    free = ahead == 0.0 and rocks(mode) and not block.walls
-    if free and not block.no_slip:
-        free = _sticks(block, block.left, energy) and _sticks(block, block.right, energy)
-    if most < corner and phi < side.alpha:
-        return _safe(block, state, most, corner, free)
-    falls = phi > side.alpha or energy > side.radius - block.height
-    return 0.5 * math.pi if free and falls and mode.sense * motion.w >= 0.0 else -1.0
-
-
-@inner_kernel
-def _safe(block, state, most, corner, free):
-    """The peak of a block that never has the energy of standing on its lower `corner`, else -1."""
-    mode, motion, peak = state.mode, state.motion, state.peak
-    highest = _highest(block, side_of(block, mode.sense), most)
-    beyond = _highest(block, side_of(block, -mode.sense), most)
+    free = (
+        ahead == 0.0
+        and rocks(mode)
+        and not block.walls
+        and _sticks(block, block.left, energy)
+        and _sticks(block, block.right, energy)
+    )
+    if not (most < corner and phi < side.alpha):
+        falls = phi > side.alpha or energy > side.radius - block.height
+        return 0.5 * math.pi if free and falls and mode.sense * motion.w >= 0.0 else -1.0
+    highest, beyond = _highest(block, side, most), _highest(block, other, most)
     if free and beyond <= max(peak, highest):
-        return max(peak, highest if mode.sense * motion.w > 0.0 else abs(motion.theta))
+        return max(peak, highest if mode.sense * motion.w > 0.0 else phi)
     least = (_MARGIN if block.walls else 1.0) * corner
     return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < least else -1.0
 
@@ -167,4 +163,5 @@ def _sticks(block, side, energy):
     # s c rises with s only up to 45 degrees.
     pull = side.share * (s * c if side.alpha < 0.25 * math.pi else 0.5 * side.radius * side.radius)
     lands = side.share * s * c / (1.0 - side.share * s * s)
-    return push > 0.0 and block.mu_s * push >= max(pull, s * square) and block.mu_s >= lands
+    holds = push > 0.0 and block.mu_s * push >= max(pull, s * square) and block.mu_s >= lands
+    return block.no_slip or holds

@@ -170,9 +170,7 @@ def next_kink(g, t):
     if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         return (i + 1) * g.form.step if i + 1 < g.samples.size else NEVER
-    if g.form.kind == Shape.SINE:
-        return g.form.quiet if t < g.form.quiet else NEVER
-    return NEVER
+    return g.form.quiet if g.form.kind == Shape.SINE and t < g.form.quiet else NEVER
 
 
 @inner_kernel
@@ -242,15 +240,14 @@ def _next_extremum(g, t):
 
     NEVER where it is monotone (and dying out) for good.
     """
-    if g.form.kind == Shape.SAMPLED:
-        return next_kink(g, t)
-    if g.form.kind == Shape.SINE:
-        quarter = 0.5 * math.pi / g.form.rate
-        k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
-        return min((2.0 * k + 1.0) * quarter, g.form.quiet) if t < g.form.quiet else NEVER
-    if g.form.kind == Shape.STILL:
-        return NEVER
-    return _next_extremum_of_pulse(g.form, t)
+    if g.form.kind == Shape.GAUSSIAN:
+        return _next_extremum_of_pulse(g.form, t)
+    end = next_kink(g, t)
+    if g.form.kind != Shape.SINE or end == NEVER:
+        return end
+    quarter = 0.5 * math.pi / g.form.rate
+    k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
+    return min((2.0 * k + 1.0) * quarter, end)
 
 
 @inner_kernel

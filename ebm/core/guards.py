@@ -276,12 +276,8 @@ def starts_positive(which, ahead, a):
         if Guard.LANDING <= which <= Guard.FAR_GAP
         else series.NOISE[KIND[which]]
     )
-    begin, rate, half_bend = (
-        lanes.first(terms),
-        lanes.first(later),
-        lanes.first(lanes.shifted(later)),
-    )
-    return series.leads_up(begin + a[row, _CONSTANT], rate, half_bend, floor, ahead)
+    begin, half_bend = lanes.first(terms) + a[row, _CONSTANT], lanes.first(lanes.shifted(later))
+    return series.leads_up(begin, lanes.first(later), half_bend, floor, ahead)
 
 
 @inner_kernel

@@ -113,7 +113,6 @@ def resolve(block, base, run):
     state.event = Event.UNTOLD
     modes.leave(state, KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
-        state.impulse = 0.0
         strike(block, base, run, settle.settling_speed(state))
         if state.impulse > 0.0:
             modes.forget(state)  # a new motion: all modes may be tried again

@@ -58,24 +58,16 @@ _CANDIDATES = np.array([_candidates(-1), _candidates(1)], MODE)
 _FLAT_TRIES = 4
 
 
-def _tries() -> np.ndarray:
-    """The numbers of the candidates to try, by the walls that a tilted block touches.
-
-    Row 0 is none, 1 the tip wall, 2 the far wall, 3 both; the last row is a flat block's. Behind
-    the numbers stands -1.
-    """
-    modes = _CANDIDATES[1]
-    walls, tilts = modes["tip"] + 2 * modes["far"], modes["family"] == Family.TILT
-    rows = np.full((_FLAT_TRIES + 1, len(modes) + 1), -1, dtype=np.int8)
-    rows[_FLAT_TRIES, :-1] = range(len(modes))
-    for touched in range(_FLAT_TRIES):
-        # The first tilted one is a flat block's only.
-        found = np.flatnonzero(tilts & (modes["sense"] > 0) & (walls & ~touched == 0))[1:]
-        rows[touched, : len(found)] = found
-    return rows
-
-
-_TRIES = _tries()
+# The numbers of the candidates to try, by the walls that a tilted block touches: row 0 is none, 1
+# the tip wall, 2 the far wall, 3 both; the last row is a flat block's. Behind them stands -1.
+_WALLS = _CANDIDATES[1]["tip"] + 2 * _CANDIDATES[1]["far"]
+_TILTS = (_CANDIDATES[1]["family"] == Family.TILT) & (_CANDIDATES[1]["sense"] > 0)
+_TRIES = np.full((_FLAT_TRIES + 1, len(_WALLS) + 1), -1, dtype=np.int8)
+_TRIES[_FLAT_TRIES, :-1] = range(len(_WALLS))
+for _touched in range(_FLAT_TRIES):
+    # The first tilted one is a flat block's only.
+    _found = np.flatnonzero(_TILTS & (_WALLS & ~_touched == 0))[1:]
+    _TRIES[_touched, : len(_found)] = _found
 
 
 @inner_kernel
@@ -230,13 +222,13 @@ def _floor_allows(block, state, flat, mine):
 def touched_walls(block, motion, sense, flat):
     """The walls that the block touches, as bits 1 and 2.
 
-    Of a flat block the left and the right wall; else, as it tips to `sense`, the tip wall and the
-    far one.
+    As it tips to `sense`, the tip wall and the far one; of a flat block with sense 1 the left and
+    the right wall.
     """
     if not block.walls:
         return 0
-    return (1 if contacts.closed_wall(block, motion, 1 if flat else sense, False) else 0) + (
-        2 if contacts.closed_wall(block, motion, -1 if flat else -sense, not flat) else 0
+    return (1 if contacts.closed_wall(block, motion, sense, False) else 0) + (
+        2 if contacts.closed_wall(block, motion, -sense, not flat) else 0
     )
 
 

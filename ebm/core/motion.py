@@ -49,15 +49,6 @@ def sine_cosine(angle, a):
 
 
 @inner_kernel
-def base_series(base, t, sign, order, a):
-    """Fills in the series of the base motion in the frame of this sign, u and G."""
-    fill_series(base.horizontal, t, sign, order, a, Row.U)
-    if base.vertical.form.kind != Shape.STILL:  # otherwise G is 1 throughout, as the run has set it
-        fill_series(base.vertical, t, 1.0, order, a, Row.G)
-        a[Row.G, 0] += 1.0
-
-
-@inner_kernel
 def mode_series(block, base, run, order, enough, reach):
     """Fills the workspace with the series of the mode's motion; returns their order.
 
@@ -68,20 +59,24 @@ def mode_series(block, base, run, order, enough, reach):
     order, a rate one.
     """
     mode, motion, a, sign = run.state.mode, run.state.motion, run.a, float(run.state.mode.sense)
+    still = base.vertical.form.kind == Shape.STILL
+    fill_series(base.horizontal, run.state.t, sign, order, a, Row.U)
+    if not still:  # otherwise G is 1 throughout, as the run has set it
+        fill_series(base.vertical, run.state.t, 1.0, order, a, Row.G)
+        a[Row.G, 0] += 1.0
+    a[Row.XI, 0], a[Row.XI, 1] = sign * motion.x, sign * motion.vx
+    a[Row.Y, 0], a[Row.Y, 1] = motion.y, motion.vy
+    a[Row.Z, 0] = sign * run.state.zeta
     if mode.family == Family.FLAT:
-        return _flat_series(block, base, run, order)
-    base_series(base, run.state.t, sign, order, a)
+        return _flat_series(block, run.state, order, a)
     a[Row.PHI, 0], a[Row.OMEGA, 0] = sign * motion.theta, sign * motion.w
     side = side_of(block, mode.sense)
     sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
     a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
     run.state.place = sign * motion.x - a[Row.SIN, 0]
     if rocks(mode):
-        still = base.vertical.form.kind == Shape.STILL
         forces = block.unilateral or not block.no_slip
         return _rock_series(side.share, still, order, enough, reach, forces, a)
-    a[Row.XI, 0], a[Row.XI, 1] = sign * motion.x, sign * motion.vx
-    a[Row.Y, 0], a[Row.Y, 1] = motion.y, motion.vy
     if mode.pivot == Pivot.STICK and mode.tip != mode.far:
         return _lean_series(block, side, mode.tip != 0, order, a)
     w0, s0, c0 = a[Row.OMEGA, 0], a[Row.SIN, 0], a[Row.COS, 0]
@@ -332,7 +327,6 @@ def _contact_series(block, state, order, enough, reach, a):
     s0, c0 = a[Row.SIN, 0], a[Row.COS, 0]
     scale = 1.0
     small = 0
-    a[Row.Z, 0] = mode.sense * state.zeta
     for k in range(order - 1):
         i = k + 2
         # The rates of sine and cosine at order k + 1 lack only the term of phi's acceleration at
@@ -447,25 +441,22 @@ def inverse_of(a, matrix, inverse, n):
 
 
 @inner_kernel
-def _flat_series(block, base, run, order):
-    """Fills the workspace with the series of a block that only translates; returns their order.
+def _flat_series(block, state, order, a):
+    """FLAT: the block only translates.
 
-    World frame. Q is the floor's friction, P its normal force on both corners together, N_a the
-    force of a wall that presses.
+    Q is the floor's friction, P its normal force on both corners together, N_a the force of a wall
+    that presses.
     """
-    mode, motion, a = run.state.mode, run.state.motion, run.a
-    base_series(base, run.state.t, 1.0, order, a)
-    a[Row.XI, 0], a[Row.XI, 1], a[Row.Y, 0], a[Row.Y, 1] = motion.x, motion.vx, motion.y, motion.vy
-    press, kappa = mode.tip - mode.far, friction(block, run.state)
-    a[Row.Z, 0] = run.state.zeta
+    mode = state.mode
+    press, kappa = mode.tip - mode.far, friction(block, state)
     for k in range(order - 1):
         a[Row.P, k] = a[Row.G, k] if mode.pivot != Pivot.OFF else 0.0
         a[Row.Q, k] = a[Row.NA, k] = 0.0
         if mode.pivot == Pivot.SLIPPING:
             a[Row.Q, k] = -kappa * a[Row.P, k]
-            if run.state.winds:
+            if state.winds:
                 _late_friction(block, mode, k, a)
-            _wind(block, run.state, k, a)
+            _wind(block, state, k, a)
         if mode.pivot == Pivot.STICK:
             a[Row.Q, k] = a[Row.U, k]
         elif press != 0:

@@ -91,9 +91,7 @@ def least_change(low, high, h):
     least = lanes.total(lanes.above(lanes.falls(low), 2) + lanes.falls(high))
     once = lanes.shifted(low)
     for term in (lanes.first(lanes.shifted(once)), lanes.first(once)):
-        least += term
-        if least > 0.0:
-            least = 0.0
+        least = min(least + term, 0.0)
     return least
 
 

@@ -117,7 +117,7 @@ STATE = record(
     counted="i8",
     full="i8",
     at_once="i8",
-    # Normal impulse of the last impact, of all contacts together.
+    # Normal impulse of an impact, of all contacts together, until its event is noted.
     impulse="f8",
     # Bouc-Wen friction: its variable z, and whether that winds, the pivot not having yielded.
     zeta="f8",
@@ -269,12 +269,11 @@ def mode_code(state):
 
 @inner_kernel
 def note(run, event, before):
-    """One row of the log; a change at rest has no impulse."""
+    """One row of the log."""
     state, log = run.state, run.records.log
     count = state.events
     state.events = count + 1
     if count < log.shape[0]:
-        strikes = event == Event.FLOOR_IMPACT or event == Event.WALL_IMPACT or event == Event.LANDS
         log[count, 0], log[count, 1], log[count, 2] = state.t, event, before
         log[count, 3] = 0 if event == Event.SETTLED else mode_code(state)
-        log[count, 4] = state.impulse if strikes else 0.0
+        log[count, 4] = state.impulse

@@ -17,6 +17,10 @@ from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, rock_on
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
+# The event of the impact at each gap that may close, a Guard.
+_EVENTS = np.full(Guard.FAR_GAP + 1, Event.WALL_IMPACT, dtype=np.int64)
+_EVENTS[Guard.PHI], _EVENTS[Guard.LANDING] = Event.FLOOR_IMPACT, Event.LANDS
+
 
 @inner_kernel
 def strike(block, base, run, resting):
@@ -33,13 +37,10 @@ def strike(block, base, run, resting):
     if which == Guard.PHI:
         floor = mode.pivot != Pivot.OFF or contacts.closed_floor(block, motion)
         contacts.land_upright(block, motion, float(mode.sense), floor)
-    wall = which == Guard.TIP_GAP or which == Guard.FAR_GAP
-    state.event = Event.LANDS if which == Guard.LANDING else Event.FLOOR_IMPACT
-    if wall:
-        state.event = Event.WALL_IMPACT
+    state.event = _EVENTS[which]
     if block.unilateral:
         _strike_all(block, base, run, resting)
-    elif wall:
+    elif state.event == Event.WALL_IMPACT:
         _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
         _floor_impact(block, state, resting)
