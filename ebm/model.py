@@ -136,8 +136,7 @@ class EventBasedModel(Frozen):
         states, work = natural.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
         ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
-        last: Any = kept[0].tolist()
-        motion, t, _, _, steps, written, at_rest = last
+        motion, t, _, _, steps, written, at_rest = kept[0].tolist()
         if ending in names.FAILURES:
             raise errors.ModelFailure(
                 f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s"

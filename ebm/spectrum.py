@@ -295,12 +295,9 @@ def _refine(outcomes: NDArray[np.int8], run: Callable[[NDArray[np.bool_]], None]
         corners = outcomes[np.ix_(lattice.any(axis=1), lattice.any(axis=0))]
         differs = vary(corners, 2)[1:, 1:]  # in the cells that end at these corners
         near = ndimage.binary_dilation(differs, np.ones((3, 3)))  # and a ring of cells around each
-        wanted = np.zeros(outcomes.shape, dtype=bool)
-        for i, j in zip(*np.nonzero(near), strict=True):
-            wanted[
-                i * step : min((i + 1) * step, rows - 1) + 1 : 1,
-                j * step : min((j + 1) * step, columns - 1) + 1,
-            ] = True
+        inside = np.pad(near.repeat(step, axis=0).repeat(step, axis=1), (0, 1))
+        # A node at the end of a cell is in it, too.
+        wanted = ndimage.maximum_filter(inside, 2, mode="constant")[:rows, :columns]
         lattice = _lattice(rows, columns, half)
         run(wanted & lattice)
         # Cells without a boundary are uniform: their inner nodes take the value of a corner.
@@ -326,8 +323,7 @@ def vary(outcomes: NDArray[np.int8], width: int) -> NDArray[np.bool_]:
         extreme(outcomes, width, mode="nearest")
         for extreme in (ndimage.minimum_filter, ndimage.maximum_filter)
     )
-    vary: NDArray[np.bool_] = least != most
-    return vary
+    return np.asarray(least != most)
 
 
 def _lattice(rows: int, columns: int, step: int) -> NDArray[np.bool_]:

@@ -280,25 +280,21 @@ def _keep(impact, number):
 
 
 @inner_kernel
-def _moreau(law, impact, rounding):
-    """Whatever touches takes part; at an elastic wall only the corners that approach."""
+def _together(law, impact, rounding):
+    """Whatever touches takes part; at an elastic wall only the corners that approach.
+
+    Of two bottom corners that approach the floor only the law's first one does. F stands on the
+    side of negative slip. Without slip neither leads, and both take part.
+    """
     for j in range(CONTACTS):
         elastic = law != Law.CLOSED_BRANCH and not impact.restitution[j] < 1.0
         rests = j <= Contact.OTHER or (law != Law.OPEN_BRANCH and not elastic)
         takes = rests or impact.approach[j] < -rounding
         impact.taking[j] = impact.touching[j] and takes
-
-
-@inner_kernel
-def _one_corner(law, impact):
-    """Of two bottom corners that approach the floor only the law's first one takes part.
-
-    F stands on the side of negative slip. Without slip neither leads, and both take part.
-    """
-    if law != Law.LEADING_FIRST and law != Law.TRAILING_FIRST:
-        return
-    approach, slip = impact.approach, _dot(impact.rows[Contact.TANGENT], impact.v)
-    if max(approach[Contact.FOOT], approach[Contact.OTHER]) < -SLOW and abs(slip) >= SLOW:
+    one_first = law == Law.LEADING_FIRST or law == Law.TRAILING_FIRST
+    slip = _dot(impact.rows[Contact.TANGENT], impact.v)
+    lands_flat = max(impact.approach[Contact.FOOT], impact.approach[Contact.OTHER]) < -SLOW
+    if one_first and lands_flat and abs(slip) >= SLOW:
         trails = (slip < 0.0) == (law == Law.LEADING_FIRST)
         impact.taking[Contact.OTHER if trails else Contact.FOOT] = False
 
@@ -350,8 +346,7 @@ def _choose(law, impact, number, rounding):
     if law == Law.FLOOR_FIRST:
         _floor_first(impact, number, rounding)
     else:
-        _moreau(law, impact, rounding)
-        _one_corner(law, impact)
+        _together(law, impact, rounding)
     for j in range(CONTACTS):
         rebounds = impact.taking[j] and impact.approach[j] < -impact.resting
         impact.target[j] = -impact.restitution[j] * impact.approach[j] if rebounds else 0.0

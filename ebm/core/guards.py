@@ -346,9 +346,7 @@ def first_event(run):
             continue
         past = _past_a_touch(k, degree, (root, h), noise, a)
         if past < tau:
-            tau, which = past, Guard.NONE
-        if past == root:
-            tau, which = root, k
+            tau, which = past, k if past == root else Guard.NONE
     if which >= 0 and KIND[which] == Kind.FORCE and tau > _NEARBY * h:
         tau, which = 0.9 * tau, Guard.NONE
     state.tau, state.guard = tau, which

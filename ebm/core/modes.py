@@ -53,8 +53,8 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
     return rows
 
 
-#: Row 1 has the left side first, row 0 the right one.
-_CANDIDATES = np.array([_candidates(-1), _candidates(1)], MODE)
+#: Row 1 has the left side first, row -1 (the last one) the right one.
+_CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
 _FLAT_TRIES = 4
 
 
@@ -176,12 +176,6 @@ def hangs_flat(mode):
 
 
 @inner_kernel
-def _candidate(at, number):
-    """A candidate, as the side that is tried first has it."""
-    return _CANDIDATES[int(at.first > 0), number]
-
-
-@inner_kernel
 def _possible(block, state, at):
     """Whether the contacts of the mode are closed and its slip agrees with the motion."""
     mode, motion = state.mode, state.motion
@@ -298,7 +292,7 @@ def select(block, base, run):
             least, chosen = wrong, number
     if chosen < 0:
         return False
-    state.mode = _candidate(at, chosen)
+    state.mode = _CANDIDATES[at.first, chosen]
     again = least <= state.least_slack
     state.rules[Rule.MODE_AGAIN if again else Rule.LEAST_CONTRADICTION] += 1
     slacken(state)
@@ -332,7 +326,7 @@ def _comes_up(block, state, at, number, again):
 
     Returns whether it is possible, and has been tried at this instant (`again`) or not.
     """
-    mode = _candidate(at, number)
+    mode = _CANDIDATES[at.first, number]
     tilts = mode.family == Family.TILT
     touched = (at.near if mode.sense == at.first else at.away) if tilts else at.upright_walls
     if (mode.tip + 2 * mode.far) & ~touched or (tilts and at.favoured == 0):
