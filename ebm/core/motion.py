@@ -66,7 +66,7 @@ def mode_series(block, base, run, order, enough, reach):
         a[Row.G, 0] += 1.0
     a[Row.XI, 0], a[Row.XI, 1] = sign * motion.x, sign * motion.vx
     a[Row.Y, 0], a[Row.Y, 1] = motion.y, motion.vy
-    a[Row.Z, 0] = sign * run.state.zeta
+    a[Row.Z, 0], a[Row.LATE, 0] = sign * run.state.zeta, 0.0
     if mode.family == Family.FLAT:
         return _flat_series(block, run.state, order, a)
     a[Row.PHI, 0], a[Row.OMEGA, 0] = sign * motion.theta, sign * motion.w
@@ -100,16 +100,11 @@ def friction(block, state):
 
 
 @inner_kernel
-def _late_friction(block, mode, k, a):
-    """Coefficient k of what the later terms of z add to the friction -kappa P."""
-    a[Row.LATE, k] = -block.mu_k * mode.pull * _products(a, Row.Z, Row.P, 1, k, k)
-
-
-@inner_kernel
 def _wind(block, state, k, a):
     """Coefficient k + 1 of z by (9) with beta = gamma = 1/2 and n = 2, and k of its friction.
 
-    What comes before them is given. The pivot loads where V z > 0.
+    What comes before them is given. The pivot loads where V z > 0. LATE is what the later terms of
+    z add to the friction -kappa P.
     """
     if not state.winds:
         return
@@ -121,6 +116,8 @@ def _wind(block, state, k, a):
         a[Row.Z2, k] = product(a, Row.Z, Row.Z, k)
         rate -= product(a, Row.V, Row.Z2, k)
     a[Row.Z, k + 1] = rate / (block.yields * (k + 1))
+    late = _products(a, Row.Z, Row.P, 1, k + 1, k + 1)
+    a[Row.LATE, k + 1] = -block.mu_k * mode.pull * late
 
 
 @inner_kernel
@@ -335,7 +332,6 @@ def _contact_series(block, state, order, enough, reach, a):
         dc = _products(a, Row.OMEGA, Row.SIN, 0, k, k + 1)
         along, moment = -a[Row.U, k], _moment_of_lower_orders(acting, k, a)
         if state.winds:
-            _late_friction(block, mode, k, a)
             along += a[Row.LATE, k]
             moment += product(a, Row.COS, Row.LATE, k)
         free = ds * (i - 1.0), dc * (i - 1.0), along, moment
@@ -454,8 +450,6 @@ def _flat_series(block, state, order, a):
         a[Row.Q, k] = a[Row.NA, k] = 0.0
         if mode.pivot == Pivot.SLIPPING:
             a[Row.Q, k] = -kappa * a[Row.P, k]
-            if state.winds:
-                _late_friction(block, mode, k, a)
             _wind(block, state, k, a)
         if mode.pivot == Pivot.STICK:
             a[Row.Q, k] = a[Row.U, k]
