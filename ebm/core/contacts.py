@@ -119,12 +119,9 @@ def closed_gap(gap, rate):
 
     Then its acceleration decides.
     """
-    if abs(gap) < CLOSED:
-        if -SLOW < rate < 0.0:
-            return 0.0, 0.0
-        if gap < 0.0:
-            return 0.0, rate
-    return gap, rate
+    touches = abs(gap) < CLOSED
+    rests = touches and -SLOW < rate < 0.0
+    return 0.0 if rests or (touches and gap < 0.0) else gap, 0.0 if rests else rate
 
 
 @inner_kernel

@@ -142,9 +142,8 @@ def _falls(block, base, state):
         return -1.0
     steepness = math.tan(abs(motion.theta) - side.alpha)
     strongest = max(abs(acceleration(base.horizontal, t)), largest_ahead(base.horizontal, t))
-    if (not block.no_slip and steepness <= block.mu_s) or steepness <= strongest:
-        return -1.0
-    return 0.5 * math.pi
+    falls = steepness > strongest and (block.no_slip or steepness > block.mu_s)
+    return 0.5 * math.pi if falls else -1.0
 
 
 @inner_kernel

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.core.typing.templates import infer_global, make_concrete_template, signature
 from numba.extending import lower_builtin, models, register_model
 from numba.np.arrayobj import make_array
 
@@ -79,17 +79,14 @@ def _compiled_as(
     """
 
     def tell(plain: Callable[..., Any]) -> Callable[..., Any]:
-        class _Template(ConcreteTemplate):
-            key = plain
-            cases = [signature(result, *given)]  # noqa: RUF012
-
         def lower(context: Any, b: Any, kinds: Any, values: Any) -> Any:
             if given[:3] == _IN_MATRIX:
                 values = [_place(context, b, *values[:3]), *values[3:]]
             found = code(b, *values)
             return context.get_dummy_value() if result == types.none else found
 
-        infer_global(plain, types.Function(_Template))
+        kind = make_concrete_template(plain.__name__, plain, [signature(result, *given)])
+        infer_global(plain, types.Function(kind))
         lower_builtin(plain, *given)(lower)
         return plain
 
@@ -104,7 +101,7 @@ _PAIRS = (_LANES, _LANES), (_LANES, types.float64), (types.float64, _LANES)
 def _calculates(operation: Any, instruction: str) -> None:
     """Tells numba how an operator works on lanes."""
     cases = [signature(_LANES, *kinds) for kinds in _PAIRS]
-    infer_global(operation)(type(instruction, (ConcreteTemplate,), {"cases": cases}))
+    infer_global(operation)(make_concrete_template(instruction, operation, cases))
     for kinds in _PAIRS:
 
         def code(_: Any, b: Any, found: Any, values: Any, kinds: Any = kinds) -> Any:

@@ -28,23 +28,20 @@ def may_go_on(block, base, run):
     Its time is up, its outcome is certain, or it has taken too many steps.
     """
     state, motion, decides = run.state, run.state.motion, run.state.control.until_decided
+    verdict = decided(block, base, state) if decides else -1.0
     if state.t >= state.t_end or (decides and state.repeats):
         state.ending = Ending.DONE
-        return False
-    if decides:
-        verdict = decided(block, base, state)
-        if verdict > 0.0:
-            state.peak = verdict
-            state.ending = Ending.DONE
-            if verdict >= 0.5 * math.pi:
-                motion.theta = math.copysign(verdict, motion.theta)
-                state.ending = Ending.OVERTURNED
-            return False
-    if state.steps >= run.state.control.most_steps:
+    elif verdict > 0.0:
+        state.peak = verdict
+        state.ending = Ending.DONE
+        if verdict >= 0.5 * math.pi:
+            motion.theta = math.copysign(verdict, motion.theta)
+            state.ending = Ending.OVERTURNED
+    elif state.steps >= run.state.control.most_steps:
         state.ending = Ending.TOO_MANY_STEPS
-        return False
-    state.steps += 1
-    return True
+    else:
+        state.steps += 1
+    return state.ending == Ending.GOING
 
 
 @inner_kernel
@@ -89,15 +86,13 @@ def passes_on(block, base, run):
     state.swing = 0.0
     if state.events + 1 >= run.state.control.most_events:
         state.ending = Ending.TOO_MANY_EVENTS
-        return True
-    if state.guard != Guard.TOPPLE and not lies_along_wall(state):
-        return False
-    motion.theta = math.copysign(0.5 * math.pi, motion.theta)
-    state.peak = 0.5 * math.pi
-    side = Event.FELL_LEFT if state.mode.sense > 0 else Event.FELL_RIGHT
-    note(run, side, mode_code(state))
-    state.ending = Ending.OVERTURNED
-    return True
+    elif state.guard == Guard.TOPPLE or lies_along_wall(state):
+        motion.theta = math.copysign(0.5 * math.pi, motion.theta)
+        state.peak = 0.5 * math.pi
+        side = Event.FELL_LEFT if state.mode.sense > 0 else Event.FELL_RIGHT
+        note(run, side, mode_code(state))
+        state.ending = Ending.OVERTURNED
+    return state.ending != Ending.GOING
 
 
 @inner_kernel
