@@ -141,13 +141,10 @@ def fill_series(g, t, sign, n, a, row):
         _fill_gaussian(g, t, sign, n, a, row)
         return
     value, rate = _with_rate(g, t)
-    for k in range(n + 1):
+    a[row, 0], a[row, 1] = sign * value, sign * rate
+    for k in range(2, n + 1):
         a[row, k] = 0.0
-    a[row, 0] = sign * value
-    if n > 0:
-        a[row, 1] = sign * rate
-    if g.form.kind == Shape.SINE:
-        for k in range(2, n + 1):
+        if g.form.kind == Shape.SINE:
             a[row, k] = -g.form.rate * g.form.rate * a[row, k - 2] / (k * (k - 1))
 
 
