@@ -331,8 +331,7 @@ def _approaches(block, impact, plastic, rounding):
     for j in range(CONTACTS):
         impact.approach[j] = _dot(impact.rows[j], impact.v) if impact.touching[j] else 0.0
         closes = closes or impact.approach[j] < -rounding
-        e_wall = impact.e_tip if j <= Contact.TIP_BOTTOM else impact.e_far
-        e = block.e_floor if j <= Contact.OTHER else e_wall
+        e = (block.e_floor, impact.e_tip, impact.e_far)[j // 2]
         impact.restitution[j] = 0.0 if plastic else e
     return closes
 

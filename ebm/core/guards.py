@@ -214,13 +214,10 @@ def _coefficients(which, half, a):
 
 @inner_kernel
 def guard(which, order, a):
-    """Writes a guard of the table into the workspace; returns its degree, -1 if there is none."""
-    row = Row.TABLE + which
-    if a[row, _THERE] == 0.0:
-        return -1
+    """Writes a guard that the mode has into the workspace; returns its degree."""
     for half in (0, lanes.LANES):
         lanes.store(a, Row.GUARD, half, _coefficients(which, half, a))
-    a[Row.GUARD, 0] += a[row, _CONSTANT]
+    a[Row.GUARD, 0] += a[Row.TABLE + which, _CONSTANT]
     if Guard.LANDING <= which <= Guard.FAR_GAP:
         a[Row.GUARD, 0], a[Row.GUARD, 1] = contacts.closed_gap(a[Row.GUARD, 0], a[Row.GUARD, 1])
     return order - _SHORTER[which]

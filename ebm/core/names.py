@@ -127,7 +127,8 @@ Law = IntEnum(
 LAWS = ("moreau", "closed", "open", "floor-first", "leading-first", "trailing-first")
 
 #: The six contacts: the pivot and the other bottom corner on the floor, the top and bottom corner
-#: on the tip wall, the bottom and top corner on the far wall; and the floor's tangent.
+#: on the tip wall, the bottom and top corner on the far wall, in pairs of which the second one
+#: touches only where the block is upright; and the floor's tangent.
 Contact = IntEnum("Contact", "FOOT OTHER TIP_TOP TIP_BOTTOM FAR_BOTTOM FAR_TOP TANGENT", start=0)
 
 CONTACTS = 6

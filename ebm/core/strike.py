@@ -12,7 +12,7 @@ import numpy as np
 from rockcheck.ebm.core import contacts, impacts, modes
 from rockcheck.ebm.core.block import side_of, wall_corner
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
-from rockcheck.ebm.core.names import Contact, Event, Family, Guard, Pivot, Rule
+from rockcheck.ebm.core.names import CONTACTS, Event, Family, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, rock_on
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -206,9 +206,8 @@ def _strike_all(block, base, run, resting):
     tip = abs(contacts.wall_gap(block, motion, sign)) < contacts.CLOSED
     far = abs(contacts.wall_gap(block, motion, -sign)) < contacts.CLOSED
     touching, v = impact.touching, impact.v
-    touching[Contact.FOOT], touching[Contact.OTHER] = floor, flat and floor
-    touching[Contact.TIP_TOP], touching[Contact.TIP_BOTTOM] = tip, flat and tip
-    touching[Contact.FAR_BOTTOM], touching[Contact.FAR_TOP] = far, flat and far
+    for j in range(CONTACTS):
+        touching[j] = (floor, tip, far)[j // 2] and (flat or j % 2 == 0)
     v[0], v[1], v[2] = sign * motion.vx, motion.vy, sign * motion.w
     slower = v[1] + max(side_of(block, -sign).arm * v[2], -side_of(block, sign).arm * v[2])
     state.rules[Rule.FLAT_LANDING] += flat and floor and slower < -contacts.SLOW

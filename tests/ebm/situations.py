@@ -145,9 +145,9 @@ class Core:
         a = run.a
         guards.fill_guards(self.setting, run.state, a)
         found = {
-            name: Polynomial(a[Row.GUARD, : degree + 1].copy())
+            name: Polynomial(a[Row.GUARD, : guards.guard(which, order, a) + 1].copy())
             for name, which in GUARDS.items()
-            if (degree := guards.guard(which, order, a)) >= 0
+            if a[Row.TABLE + which, guards._THERE]
         }
         rock = mode.floor == "stick" and not mode.tip and not mode.far
         places = {"xi": Row.SIN, "y": Row.COS} if rock else {"xi": Row.XI, "y": Row.Y}
