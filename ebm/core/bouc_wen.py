@@ -79,8 +79,7 @@ def after_event(block, base, run):
         return
     contacts.upright(block, motion)
     contacts.stand_if_slow(block, motion)
-    flat = motion.theta == 0.0 and motion.w == 0.0
-    stands = flat and (motion.vx == 0.0 or which == Guard.SLIP)
+    stands = contacts.lean(motion) == 0.0 and (motion.vx == 0.0 or which == Guard.SLIP)
     begins = stands or math.isnan(state.zeta)
     state.winds = not begins
     if stands:

@@ -11,7 +11,7 @@ from types import ModuleType
 import numpy as np
 
 from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, series, settle, steps
-from rockcheck.ebm.core.contacts import closed_floor
+from rockcheck.ebm.core.contacts import closed_floor, lean
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.guards import KIND
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
@@ -100,7 +100,7 @@ def begin(block, base, run):
     state.quiet_from = quiet_from(base, state.tolerance_rad)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
-    stands = motion.theta == 0.0 and motion.w == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
+    stands = lean(motion) == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     if stands and closed_floor(block, motion):
         state.event = Event.RELEASE
 
