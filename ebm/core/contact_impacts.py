@@ -41,11 +41,17 @@ _SLIPS = {Friction.PLUS: 1.0, Friction.MINUS: -1.0}
 # Every set of contacts with every friction, of at most three unknowns.
 _TRIALS = np.array(
     [
-        (sum(1 << j for j in some), len(some), n, rows, friction, _SLIPS.get(friction, 0.0))
+        (
+            sum(1 << j for j in some),
+            len(some),
+            len(some) + (friction == Friction.HELD),
+            [*some, *[Contact.TANGENT] * 3][:3],
+            friction,
+            _SLIPS.get(friction, 0.0),
+        )
         for some in CONTACT_SETS
         for friction in Friction
-        if (n := len(some) + (friction == Friction.HELD)) <= 3
-        for rows in [[*some, *[Contact.TANGENT] * 3][:3]]
+        if len(some) + (friction == Friction.HELD) <= 3
     ],
     _TRIAL,
 )

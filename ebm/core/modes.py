@@ -205,7 +205,7 @@ def _floor_allows(block, state, flat, mine):
     unless both walls hold the block, `mine`.
     """
     pivot, pulls = state.mode.pivot, state.mode.pull < 0
-    if pulls if block.unilateral else pivot == Pivot.OFF:
+    if (pulls and block.unilateral) or (pivot == Pivot.OFF and not block.unilateral):
         return False
     if block.no_slip:
         return pivot != Pivot.SLIPPING and (flat or not pulls)
