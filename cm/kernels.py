@@ -257,7 +257,7 @@ def begun(
             sunk *= 2.0 * (left * left + right * right) / (left + right) ** 2
         placed[1] -= sunk
     energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
-    gross = energy + 0.01 * scene.gravity * scene.block.half_width
+    gross = abs(energy) + 0.01 * scene.gravity * scene.block.half_width
     state = np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross))
     surfaces = np.flatnonzero(np.isfinite(parameters.distance))
     return state, Contacts(memory, np.zeros(4), parameters, surfaces)

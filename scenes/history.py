@@ -440,14 +440,14 @@ def _channels(frame: pd.DataFrame, shown: str) -> tuple[dict[str, NDArray[Any]],
         again, _ = MEANINGS.get(first, (name, factor))
         refuse(
             (
-                unit_of and plain not in MEANINGS,
-                f"{shown}: column {printable(given)!r}: give a unit of {unit_of}:"
-                f" {', '.join(UNITS.get(unit_of, ()))}",
+                again in columns,
+                f"{shown}: column {printable(bare)!r} gives {printable(again)} a second time",
                 "",
             ),
             (
-                again in columns,
-                f"{shown}: column {printable(bare)!r} gives {printable(again)} a second time",
+                unit_of and plain not in MEANINGS,
+                f"{shown}: column {printable(given)!r}: give a unit of {unit_of}:"
+                f" {', '.join(UNITS.get(unit_of, ()))}",
                 "",
             ),
         )

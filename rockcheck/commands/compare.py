@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import FiniteFloat, TypeAdapter
 
 from rockcheck.commands import PlotOption, check_file, scene_names, told
 from rockcheck.reports.style import save_as
@@ -69,7 +70,7 @@ def run(
         check_file(plot, "--plot")
     what = load_scene(scene) if scene else None
     try:
-        offset = 0.0 if align == BEST else float(align or 0.0)
+        offset = TypeAdapter(FiniteFloat).validate_python(0.0 if align in (None, BEST) else align)
     except ValueError:
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
     given, other = History.load(reference), History.load(candidate)

@@ -70,18 +70,16 @@ def new(
     """
     if path.suffix.lower() != ".toml":
         raise errors.InputError(f"{printable(path)}: give the name of a .toml file")
-    content = (resources.files("rockcheck.validation") / "data" / "new_scene.toml").read_text(
-        encoding="utf-8"
-    )
+    template = Path(str(resources.files("rockcheck.validation"))) / "data" / "new_scene.toml"
+    scene = files.load_scene(template).replace(name=path.stem)  # a name that a scene may have
     try:
-        writing.write_new(path, content)
+        writing.write_new(path, template.read_text(encoding="utf-8"))
     except FileExistsError:
         raise errors.InputError(
             f"{printable(path)}: is there already; it is left as it is"
         ) from None
     except OSError as error:
         raise errors.InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
-    scene = files.load_scene(path)
     size = f"{2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m"
     lines = [
         f"{path}: a block of {size}",

@@ -69,6 +69,7 @@ FILES = {
         ),
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
+        (["compare", "a.csv", "b.csv", "--align=nan"], "--align: 'nan': give seconds"),
         (["compare", "a.csv", "b.csv", "--offset=1"], "--offset: is gone: --align SECONDS"),
         (["conformance", "--settings", "best"], "--settings: is gone: --set settings=best"),
         (["compare", "a", "b", "--all"], "--all: is gone: --json"),
@@ -128,6 +129,7 @@ FILES = {
         (["validate", "wrong.toml"], "records.scenes: unknown scene 'seen'; did you mean 'scene'"),
         (["new", "scene.toml"], "scene.toml: is there already"),
         (["new", "mine.txt"], "mine.txt"),
+        (["new", "Möbel.toml"], "name: Möbel is not allowed"),
         (["new", "no/such/mine.toml"], "no/such"),
         *((["simulate", f"pga-{n}.toml"], "excitation.pga") for n in range(4)),
         *(

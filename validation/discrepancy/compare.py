@@ -301,7 +301,7 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
     """Speeds (m/s) with which the block struck walls, one per event "wall impact".
 
     The speed of the outermost corner in the last row before the event, extrapolated to the event
-    from the last two rows if no other event lies between.
+    from the last two rows if no other event lies between; of an event at the start in that row.
     """
     names = ("t", "x", "theta", "x_dot", "theta_dot")
     if not scene.walls or any(name not in history.channels for name in names):
@@ -312,8 +312,8 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
     times = np.array([event.t for event in history.event_list])
     found = []
     for event in history.event_list:
-        row = int(np.searchsorted(t, event.t - 1e-9)) - 1
-        if event.kind != "wall impact" or row < 0:
+        row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
+        if event.kind != "wall impact":
             continue
         rows = slice(max(row - 1, 0), row + 1)
         wall = min(

@@ -88,10 +88,13 @@ DATA = Path(__file__).parents[1] / "data"
 
 
 class Limits(Frozen):
-    """Limits of one cell, of wall time (s) and of memory (MB)."""
+    """Limits of one cell, of wall time (s) and of memory (MB).
+
+    Compiled code needs 500 MB.
+    """
 
     seconds: Positive = 120.0
-    memory_mb: Positive = 4096.0
+    memory_mb: Annotated[Positive, Field(ge=500.0)] = 4096.0
 
 
 class Require(Frozen):
@@ -410,7 +413,10 @@ def is_scene(source: str) -> bool:
 
 
 def _check_names(
-    given: SuiteFile, models: Collection[str], scenes: Collection[str], ensembles: Collection[str]
+    given: SuiteFile,
+    models: Mapping[str, Work],
+    scenes: Collection[str],
+    ensembles: Collection[str],
 ) -> None:
     known = ", ".join(models) or "none"
     count = Counter((*scenes, *(one.name for one in given.ensemble)))
@@ -422,6 +428,16 @@ def _check_names(
         (not models, "no model; at least the reference is needed", "models"),
         (not scenes and not ensembles, "no scene; at least one is needed", "scenes"),
         *((n > 1, f"{one!r} is named twice", "ensemble.name") for one, n in count.items()),
+        *(
+            (
+                scene not in scenes,
+                str(errors.unknown_name("scene", scene, scenes)),
+                f"models.{label}.files",
+            )
+            for label, model in models.items()
+            if model.family == "measured"
+            for scene in model.settings["files"]
+        ),
     )
     for key, texts in given.require:
         book = {"figures": measures.FIGURES, "ensemble": measures.STATISTICS}.get(

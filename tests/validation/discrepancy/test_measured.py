@@ -63,6 +63,7 @@ ROWS = "\n0,0,0\n1,1,1\n2,2,2\n"
         ("a.csv", f"t_s,theta_gon,x{ROWS}", "'theta_gon': give a unit of theta: rad, mrad, deg"),
         ("a.csv", f"t_s,theta_deg,theta_rad{ROWS}", "gives theta a second time"),
         ("a.csv", f"time,t_s,theta{ROWS}", "gives t a second time"),
+        ("a.csv", f"t_s,theta_deg,theta_deg{ROWS}", "'theta_deg' gives theta a second time"),
         ("a.csv", f"t_s,x_mm,y_mm{ROWS}", "no column 'theta'"),
         ("a.csv", "t_s,theta_deg\n0,0\n1,nan\n2,0\n", "is not finite"),
         ("gone/a.csv", None, "cannot be read"),

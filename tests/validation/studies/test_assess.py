@@ -159,7 +159,8 @@ def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loo
 
 
 @pytest.mark.parametrize(
-    ("before", "at", "speed"), [(None, 0.3, 0.4), (0.15, 0.3, 0.3), (None, 0.05, 0.1)]
+    ("before", "at", "speed"),
+    [(None, 0.3, 0.4), (0.15, 0.3, 0.3), (None, 0.05, 0.1), (None, 1e-12, 0.1)],
 )
 def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, at, speed):
     """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between

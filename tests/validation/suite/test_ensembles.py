@@ -144,8 +144,8 @@ def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
 
 
 def test_a_measured_history_takes_no_part_in_an_ensemble(loaded):
-    table = '[models.table]\nmodel = "measured"\nfiles = { shelf = "run1.csv" }\n[require]'
-    cells = loaded(SUITE.replace("[require]", table)).cells()
+    table = '[models.table]\nmodel = "measured"\nfiles = { fig5a = "run1.csv" }\n[require]'
+    cells = loaded('scenes = ["fig5a"]' + SUITE.replace("[require]", table)).cells()
     assert [work.label for _, work, ensemble in cells if ensemble] == ["still", "near", "broken"]
 
 

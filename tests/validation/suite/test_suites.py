@@ -86,6 +86,11 @@ walls = [{ restitution = 0.5 }]
             "unknown reference",
         ),
         ("reference = [\n", "not valid TOML"),
+        (MODELS + "[limits]\nmemory_mb = 100\n" + SHELF, "limits.memory_mb: 100 is not allowed"),
+        (
+            MODELS + "[models.measured]\nfiles = { shelv = 'run.csv' }\n" + SHELF,
+            "models.measured.files: unknown scene 'shelv'; did you mean 'shelf'",
+        ),
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
         ('include = ["papre"]\n', "did you mean 'paper'"),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),
