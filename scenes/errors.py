@@ -96,6 +96,10 @@ def printable(value: object, limit: int = 80) -> str:
     return text if len(text) <= limit or isinstance(value, PurePath) else text[: limit - 3] + "..."
 
 
+#: What pydantic adds to the place of a fault where a value may be of several kinds.
+_KINDS = ("constrained-int", "constrained-str", "str", "tuple[str, ...]")
+
+
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed.
 
@@ -108,7 +112,7 @@ def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputEr
         if faults[0]["type"] == "missing"
         else faults[0]
     )
-    path = [printable(part) for part in fault["loc"]]
+    path = [printable(part) for part in fault["loc"] if part not in _KINDS]
     if path[:1] in (["excitation"], ["vertical"]):
         del path[1:2]  # the excitation's kind, which pydantic adds
     inner = fault.get("ctx", {}).get("error")

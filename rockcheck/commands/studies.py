@@ -141,8 +141,7 @@ def assess(
     clear: tuple[float, ...] = ()
     sides = tuple(wall.side for wall in given.scene.walls)
     if tried.gaps is not None:
-        clear, sides, changed = runs.gaps_of(tried.gaps, given.scene)
-        given = files.UncertainScene(changed, given.spreads, given.correlation)
+        clear, sides = runs.gaps_of(tried.gaps, given.scene)
     cases, left_out = motions.under_records(
         {given.scene.name: given}, record_sets(records or (), read or ()), Path()
     )

@@ -77,6 +77,7 @@ FILES = {
         (["spectrum", "fig8", "--force"], "--force: is gone: "),
         (["report", "out", "--against=ebm"], "--against: is gone: "),
         (["benchmark", "--minutes", "5"], "--minutes: is gone: "),
+        (["record", "one.AT2", "--read", "column=0"], "rockcheck: column: 0 is not allowed"),
         (["report", "gone"], "no finished run here"),
         (["report", "."], "format 99; this version reads"),
         *(

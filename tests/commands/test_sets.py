@@ -43,8 +43,11 @@ def at2(name: str, gain: float, component: str) -> None:
 def files(in_an_empty_folder):
     Path("rack.toml").write_text(SCENE, "utf-8")
     Path("records").mkdir()
-    for name, gain, component in (("H1", 0.1, "180"), ("H2", 0.2, "270"), ("V", 0.3, "UP")):
-        at2(f"records/RSN1_{name}.AT2", gain, component)
+    for name, gain, component in (
+        *(("records/RSN1_H1", 0.1, "180"), ("records/RSN1_H2", 0.2, "270")),
+        *(("records/RSN1_V", 0.3, "UP"), ("Ä", 0.1, "180"), ("Ö", 0.2, "180")),
+    ):
+        at2(f"{name}.AT2", gain, component)
     Path("records/README.txt").write_text("where they are from\n", "utf-8")
 
 
@@ -64,6 +67,7 @@ def names(left_out: list[str]) -> list[str]:
         (["records/RSN1_H1.AT2", "records/RSN1_H2.AT2"], HORIZONTAL, []),  # as a shell gives it
         (["records"], HORIZONTAL, [VERTICAL, ODD]),
         (["records/RSN1_*.AT2"], HORIZONTAL, [VERTICAL]),
+        (["?.AT2"], ["- 1", "- 2"], []),  # which no name of a scene can tell apart
         (["elcentro_1940_ns.csv"], ["elcentro_1940_ns"], []),  # one that comes with the package
     ],
 )

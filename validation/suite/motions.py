@@ -120,12 +120,8 @@ def _motions(
     upward = sets.verticals_of(files, given) if given.vertical else {}
     if given.vertical:
         left_out = [one for one in left_out if isinstance(one, sets.Odd)]
-    # labels as allowed in names of scenes; endings only where names would be equal
-    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name, _ in motions]
     found = []
-    for (name, across), brief in zip(motions, short, strict=True):
-        word = brief if short.count(brief) == 1 else name
-        label = re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", word)[-_LONGEST_RECORD:].strip() or "record"
+    for label, (name, across) in zip(_labels([name for name, _ in motions]), motions, strict=True):
         parts = {"excitation": (label, across)}
         if name in upward:
             parts["vertical"] = f"{label}, vertical", upward[name]
@@ -137,6 +133,26 @@ def _motions(
         }
         found.append((label, records))
     return found, left_out
+
+
+def _labels(names: Sequence[str]) -> list[str]:
+    """The names as parts of names of scenes: with endings, or else numbers, where two are equal."""
+    short = [re.sub(r"\.[A-Za-z0-9]{1,5}(?= |$)", "", name, count=1) for name in names]
+    forms = [
+        [
+            re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", word)[-_LONGEST_RECORD:].strip() or "record"
+            for word in (brief, name, f"{brief} {names.index(name) + 1}")
+        ]
+        for brief, name in zip(short, names, strict=True)
+    ]
+    alike = [*zip(*forms, strict=True)]
+    return [
+        next(
+            (form for form, others in zip(forms_of, alike, strict=True) if others.count(form) == 1),
+            forms_of[-1],
+        )
+        for forms_of in forms
+    ]
 
 
 def _shaken(

@@ -642,14 +642,18 @@ class Asked(Study):
         model: str,
         variants: Sequence[Numbers] = ((),),
         settings: Mapping[str, Any] | None = None,
+        besides: Sequence[Wall] = (),
     ) -> dict[str, list[Task]]:
-        """By case, runs as tasks of at most `MOST_RUNS`; those of the case as it is are `shown`."""
+        """By case, runs as tasks of at most `MOST_RUNS`; those of the case as it is are `shown`.
+
+        `besides` are walls that the scene does not have.
+        """
         given = self.settings.get(model, {}) if settings is None else settings
         return {
             case: [
                 Run(
                     (what, case, "" if model == self.model else model),
-                    one.scene,
+                    one.scene.replace(walls=(*one.scene.walls, *besides)),
                     model,
                     tuple(given.items()),
                     part,
@@ -678,12 +682,16 @@ class Asked(Study):
     @cached_property
     def at_gaps(self) -> dict[float, dict[str, list[Task]]]:
         """The runs at each gap, without the walls at an infinite one."""
-        found = {}
+        found, scene = {}, self.own.scene
+        new = [Wall(side=one, gap=self.gaps[-1]) for one in self.sides if not scene.wall(one)]
         for gap in (*self.gaps, np.inf) if self.sides else ():
             walls = {f"walls.{side}.gap": gap for side in self.sides}
             variants = [tuple({**dict(one), **walls}.items()) for one in self.draws or ((),)]
             found[gap] = self._runs(
-                "without the wall" if gap == np.inf else f"gap {gap:g} m", self.swift, variants
+                "without the wall" if gap == np.inf else f"gap {gap:g} m",
+                self.swift,
+                variants,
+                besides=new,
             )
         return found
 
@@ -732,15 +740,14 @@ class Asked(Study):
         ]
 
 
-def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...], Scene]:
-    """Gaps (m), their sides, and the scene with the walls that `--gaps` asks for.
+def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...]]:
+    """Gaps (m) and their sides that `--gaps` asks for.
 
     `0.05,0.1` are gaps of the scene's walls, `left:0.05,0.1` of that side, where a wall without
-    rebound is put if there is none. Raises `InputError`.
+    rebound is tried if there is none. Raises `InputError`.
     """
     side, colon, numbers = text.rpartition(":")
-    known = [wall.side for wall in scene.walls]
-    sides: tuple[Any, ...] = (side,) if colon else tuple(known)
+    sides: tuple[Any, ...] = (side,) if colon else tuple(wall.side for wall in scene.walls)
     try:
         gaps = sorted({float(word) for word in numbers.split(",")})
     except ValueError:
@@ -754,5 +761,4 @@ def gaps_of(text: str, scene: Scene) -> tuple[tuple[float, ...], tuple[Side, ...
         ),
         (not sides, f"the scene has no wall: say on which side, as in left:{numbers}", "--gaps"),
     )
-    new = [Wall(side=one, gap=gaps[-1]) for one in sides if one not in known]
-    return tuple(gaps), sides, scene.replace(walls=[*scene.walls, *new])
+    return tuple(gaps), sides
