@@ -31,7 +31,7 @@ from rockcheck.reports.style import ENDINGS, kind_of
 from rockcheck.scenes import InputError, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings import sets
-from rockcheck.validation.execute.models import FAMILIES, compiles, family, not_installed
+from rockcheck.validation.execute.models import FAMILIES, build, compiles, is_own, not_installed
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.study import Study, run
 
@@ -244,16 +244,14 @@ def told(
 def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """The models by name, each with its settings; of all, those that are installed.
 
-    Raises `InputError` for an unknown one.
+    Raises `InputError` for an unknown one, and for a setting that is not allowed.
     """
-    given = (
+    named = (
         (name for name in FAMILIES if name != "measured" and not not_installed(name))
         if names == ALL
         else filter(None, map(str.strip, names.split(",")))
     )
-    found: dict[str, dict[str, Any]] = {name: {} for name in given}
-    for name in found:
-        family(name)
+    found: dict[str, dict[str, Any]] = {name: {} for name in named}
     if not found or "measured" in found:
         raise InputError(
             f"{printable(names)!r} is not allowed: models that play, with commas between, or all",
@@ -267,6 +265,9 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
                 "--set",
             )
         found[model].update([setting_of(rest)])
+    for name, given in found.items():
+        if not is_own(name):
+            build(name, given)
     return found
 
 

@@ -151,6 +151,7 @@ FILES = {
             )
             for words in (["one.AT2"], ["--levels", "1:2:3"], [])
         ),
+        (["assess", "fig5a", "--set", "tolerance=1"], "ebm-unilateral.tolerance: 1 is not allowed"),
         (["benchmark", "modles"], "did you mean 'models'"),
         *(
             (["spectrum", *words], said)
