@@ -20,6 +20,7 @@ from rockcheck.scenes import (
     observation,
     progress,
 )
+from rockcheck.scenes.history import STILL
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -169,13 +170,16 @@ class EventBasedModel(Frozen):
                 if count
             },
         )
-        outcome = "at rest" if at_rest else "moving"
+        seen = natural.to_si(scene, out[:rows])
+        # what slides without friction, or rocks, as slowly as in any history at rest (`outcome_of`)
+        slow = np.abs(seen[-1, [2, 3, 5]]) < STILL
+        outcome = "at rest" if at_rest or slow.all() else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"
         history = observation.observe(
             scene,
             self.name,
-            natural.to_si(scene, out[:rows]),
+            seen,
             mode=np.array(names.MODE_NAMES)[modes[:rows]],
             events=events,
             outcome=outcome,

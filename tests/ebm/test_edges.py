@@ -213,12 +213,22 @@ def test_zeno_sequence_of_a_rocking_block(pivot):
     )
 
 
-@pytest.mark.parametrize("strength", [0.1, 20.0, -20.0])
+@pytest.mark.parametrize(
+    ("excitation", "friction"),
+    [
+        *(
+            (Record.from_samples([strength], time_step=0.01), 0.6)
+            for strength in (0.1, 20.0, -20.0)
+        ),
+        (Ricker(amplitude=4.0, period=0.6), 0.0),
+    ],
+)
 @pivots
-def test_record_of_one_sample(pivot, strength):
+def test_record_of_one_sample_and_a_pulse_on_ice(pivot, excitation, friction):
     """One sample lasts no time: nothing happens. Found by `rockcheck stress`: no mode was
-    consistent at t = 0."""
-    shaken = play(scene_of(excitation=Record.from_samples([strength], time_step=0.01)), pivot)
+    consistent at t = 0. A pulse whose integral is 0 leaves a block on ice where it was, with no
+    more speed than rounding gives."""
+    shaken = play(scene_of(excitation=excitation, floor=Floor(friction=friction)), pivot)
     assert (shaken.outcome, shaken.channels["theta"].any()) == ("at rest", False)
 
 
