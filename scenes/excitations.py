@@ -200,7 +200,7 @@ class Record(Motion):
     def from_samples(cls, samples: ArrayLike, time_step: float, scale: float = 1.0) -> Self:
         """A record of `samples` (m/s^2, 1-D) taken every `time_step` s, the first at t = 0."""
         return cls(
-            unscaled=tuple(np.asarray(samples, dtype=float).ravel().tolist()),
+            unscaled=tuple(np.atleast_1d(np.squeeze(np.asarray(samples, dtype=float))).tolist()),
             time_step=time_step,
             scale=scale,
         )

@@ -58,12 +58,15 @@ def test_quiet_before_and_after(excitation):
     np.testing.assert_array_equal(excitation.acceleration(np.array([-1e-9, -5.0])), 0.0)
 
 
-def test_record_is_linear_between_samples():
+def test_record_is_linear_between_samples_of_one_column(fault_of):
     record = Record.from_samples([0.0, 1.0, -2.0], time_step=0.1, scale=-2.0)
     np.testing.assert_allclose(
         record.acceleration([0.05, 0.1, 0.15, 0.2]), [-1.0, -2.0, 1.0, 4.0], atol=1e-14
     )
-    assert record.peak == pytest.approx(4.0 / 9.80665)
+    assert (
+        record.peak,
+        fault_of(Record.from_samples, [[0.0, 1.0], [0.1, -2.0]], time_step=0.1).key,
+    ) == (pytest.approx(4.0 / 9.80665), "unscaled.0")
 
 
 # --- how strong a recorded motion is, against closed forms

@@ -300,7 +300,7 @@ SHIFTS = (
 
 def run_suite(
     suite: suites.Suite,
-    folder: Path,
+    folder: str | Path,
     *,
     jobs: int | None = None,
     force: bool = False,
@@ -314,8 +314,8 @@ def run_suite(
     `folder` cannot be used, and, when interrupted, `KeyboardInterrupt` after all results are kept.
     """
     found = run(
-        SuiteStudy(suite, folder),
-        folder,
+        SuiteStudy(suite, Path(folder)),
+        Path(folder),
         jobs=jobs,
         force=force,
         scheduler=scheduler,

@@ -136,7 +136,7 @@ def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
     ]
     assert run.exit_code == 3
     assert run.ensembles[0].peaks["near"] == pytest.approx([1e-3 / math.atan2(0.4, 1.5)] * 10)
-    assert run_suite(loaded(), tmp_path / "out", jobs=0).cells == tuple(
+    assert run_suite(loaded(), str(tmp_path / "out"), jobs=0).cells == tuple(
         cell.model_copy(update={"read_back": True}) for cell in run.cells
     )
     run.save(tmp_path / "out")
