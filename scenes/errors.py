@@ -123,8 +123,8 @@ def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputEr
     match fault["type"]:
         case "extra_forbidden":
             message = f"unknown key{suggestion(path[-1], keys)}"
-        case "missing":
-            message = "is missing"
+        case "missing" | "union_tag_not_found":
+            message = "is missing" if fault["type"] == "missing" else "kind is missing"
         case "union_tag_invalid":
             known = re.findall(r"'([^']*)'", str(fault["ctx"]["expected_tags"]))
             message = str(unknown_name("kind", str(fault["ctx"]["tag"]), known))

@@ -58,6 +58,7 @@ def test_a_scene_file(written):
         ),
         ('side = "left"', 'side = "top"', "walls.0.side: top is not allowed"),
         ('kind = "ricker"', 'kind = "morlet"', "excitation"),
+        ('kind = "ricker"', "", "excitation: kind is missing"),
         ("period = 0.98", "period = 0.98\nfile = 'a.AT2'", "excitation.file: unknown key"),
         ('kind = "ricker"', 'kind = "record"\nfile = "none.AT2"', "none.AT2: cannot be read"),
         ("[floor]", "[floor", "not valid TOML"),
