@@ -3,15 +3,12 @@
 Call `rockcheck_check("my-scene", model="mujoco")` in a test. The suite is the ini option
 `rockcheck_suite` (a named suite or a .toml file, relative to pytest's root), by default
 `rockcheck.toml` in the root where there is one, else `paper`. Histories are kept in pytest's cache
-and read back while nothing that they depend on has changed. `check` is the fixture's old name, kept
-for one release where no other plugin (such as pytest-check) has a fixture of that name.
+and read back while nothing that they depend on has changed.
 """
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -92,16 +89,3 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
         return cell
 
     return check
-
-
-if find_spec("pytest_check") is None:
-
-    @pytest.fixture
-    def check(rockcheck_check: Callable[..., results.Cell]) -> Callable[..., results.Cell]:
-        """The old name of `rockcheck_check`; it goes with the next release."""
-        warnings.warn(
-            "rockcheck's fixture `check` is called `rockcheck_check` now",
-            DeprecationWarning,
-            stacklevel=2,
-        )
-        return rockcheck_check

@@ -81,21 +81,3 @@ def test_check_holds_a_cell_against_its_suite(pytester):
             "*odd, near: last_rotation: 0.003* is more than 0.01 from 0.5*",
         ]
     )
-
-
-def test_the_old_name_warns_and_leaves_other_plugins_theirs(pytester, monkeypatch):
-    """`check` was its name; pytest-check has a fixture of that name, which is the one to have where
-    it is installed."""
-    pytester.makepyfile(
-        'def test_old(check):\n    assert check("my-scene", model="near").figures\n'
-    )
-    pytester.makeini("[pytest]\nrockcheck_allow_code = faulty:Still faulty:Fails\n")
-    result = pytester.runpytest_subprocess("-W", "default::DeprecationWarning")
-    result.assert_outcomes(passed=1, warnings=1)
-    result.stdout.fnmatch_lines(["*fixture `check` is called `rockcheck_check` now*"])
-    (pytester.mkdir("elsewhere") / "pytest_check.py").write_text(
-        'import pytest\n@pytest.fixture\ndef check():\n    return "of another plugin"\n', "utf-8"
-    )
-    monkeypatch.setenv("PYTHONPATH", str(pytester.path / "elsewhere"))
-    pytester.makepyfile('def test_theirs(check):\n    assert check == "of another plugin"\n')
-    pytester.runpytest_subprocess("-p", "pytest_check").assert_outcomes(passed=1)
