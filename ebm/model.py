@@ -17,10 +17,10 @@ from rockcheck.scenes import (
     Positive,
     Scene,
     errors,
+    history,
     observation,
     progress,
 )
-from rockcheck.scenes.history import STILL
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -172,11 +172,11 @@ class EventBasedModel(Frozen):
         )
         seen = natural.to_si(scene, out[:rows])
         # what slides without friction, or rocks, as slowly as in any history at rest (`outcome_of`)
-        slow = np.abs(seen[-1, [2, 3, 5]]) < STILL
+        slow = np.abs(seen[-1, [2, 3, 5]]) < history.STILL
         outcome = "at rest" if at_rest or slow.all() else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"
-        history = observation.observe(
+        played = observation.observe(
             scene,
             self.name,
             seen,
@@ -187,12 +187,12 @@ class EventBasedModel(Frozen):
             settings=self.model_dump(),
         )
         if not self.estimate_error:
-            return history
+            return played
         finer = self.finer().model_copy(update={"estimate_error": False}).simulate(scene)
-        thetas = finer.channels["theta"], history.channels["theta"]
+        thetas = finer.channels["theta"], played.channels["theta"]
         fine, coarse = (theta[: min(map(len, thetas))] for theta in thetas)
         change = np.max(np.abs(fine - coarse)) / scene.block.alpha
-        return replace(history, cost=replace(cost, error_estimate=float(change)))
+        return replace(played, cost=replace(cost, error_estimate=float(change)))
 
     def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""

@@ -251,35 +251,41 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
         if names == ALL
         else filter(None, map(str.strip, names.split(",")))
     )
-    found: dict[str, dict[str, Any]] = {name: {} for name in named}
-    if not found or "measured" in found:
+    words: dict[str, list[str]] = {name: [] for name in named}
+    if not words or "measured" in words:
         raise InputError(
             f"{printable(names)!r} is not allowed: models that play, with commas between, or all",
             "--models",
         )
     for text in settings:
         model, dot, rest = text.partition(".")
-        if not dot or model not in found:
-            raise InputError(
-                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of {', '.join(found)}",
-                "--set",
-            )
-        found[model].update([setting_of(rest)])
+        said = f"write MODEL.key=value, with MODEL one of {', '.join(words)}"
+        errors.refuse((not dot or model not in words, f"{printable(text)!r}: {said}", "--set"))
+        words[model].append(rest)
+    found = {name: settings_of(some) for name, some in words.items()}
     for name, given in found.items():
         if not is_own(name):
             build(name, given)
     return found
 
 
-def setting_of(text: str, option: str = "--set") -> tuple[str, Any]:
-    """Key and value of `key=value`, the value as in TOML; a bare word is a string."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.isidentifier():
-        raise InputError(f"{printable(text)!r}: write key=value", option)
-    try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key, value
+def settings_of(words: Iterable[str], option: str = "--set") -> dict[str, Any]:
+    """The values of words `key=value` by their keys, as in TOML; a bare value is a string.
+
+    Raises `InputError` for a word of another form, and for a key that is given twice.
+    """
+    found: dict[str, Any] = {}
+    for word in words:
+        key, equals, value = word.partition("=")
+        errors.refuse(
+            (not equals or not key.isidentifier(), f"{printable(word)!r}: write key=value", option),
+            (key in found, f"{key} is given twice: give one value", option),
+        )
+        try:
+            found[key] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key] = value
+    return found
 
 
 def check_file(path: Path, option: str, check: Callable[[Path], Any] = kind_of) -> None:

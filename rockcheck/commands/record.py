@@ -12,7 +12,7 @@ from rockcheck.commands import (
     answer,
     check_file,
     console,
-    setting_of,
+    settings_of,
     tell_left_out,
 )
 from rockcheck.reports.style import save_as
@@ -55,7 +55,7 @@ def run(
 
     if plot is not None:
         check_file(plot, "--plot")
-    reading = recordings.Reading(**dict(setting_of(word, "--read") for word in read or ()))
+    reading = recordings.Reading(**settings_of(read or (), "--read"))
     asked = sets.files_of(files)
     known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
     found = [(path, one) for path, components in known.items() for _, one in components]
@@ -121,7 +121,7 @@ def _finding(path: Path, record: recordings.Recording) -> Finding:
 
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:
     """The records, and how they are read. Raises `InputError`."""
-    given = dict(setting_of(word, "--read") for word in read)
+    given = settings_of(read, "--read")
     if given and not records:
         raise InputError("needs records", "--read")
     scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)

@@ -24,7 +24,7 @@ from rockcheck.commands import (
     progress,
     report_file,
     scene_names,
-    setting_of,
+    settings_of,
     told,
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
@@ -119,7 +119,7 @@ def run(
     A figure shows rotation, slip and impacts.
     """
     models.check_allowed(model, allow_code or ())
-    given = dict(setting_of(text) for text in settings or [])
+    given = settings_of(settings or ())
     simulate = (
         partial(_played_apart, model, given)
         if models.is_own(model)

@@ -24,7 +24,7 @@ from rockcheck.commands import (
     completing,
     model_names,
     scene_names,
-    setting_of,
+    settings_of,
     studied,
     tell_left_out,
     tell_missing,
@@ -321,7 +321,7 @@ def spectrum(
         panels = (Panel(store.name_of(scene.name.replace(" ", "-")), scene.name, scene),)
     # Beside a wall a block hops, which the pivot of the paper's figures forbids.
     hops = what not in PAPER and panels[0].wall is not None
-    given = dict(setting_of(one) for one in settings or [])
+    given = settings_of(settings or ())
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
     request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
@@ -463,7 +463,7 @@ def conformance(
 
     if export is not None:
         _export(usable_folder(export))
-    given, folders = dict(map(setting_of, sets or [])), histories or []
+    given, folders = settings_of(sets or ()), histories or []
     known = () if folders else models.ENGINE_NAMES
     names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
     _check_engines(names, allow_code or (), own=tune is None)

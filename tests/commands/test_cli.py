@@ -94,6 +94,7 @@ FILES = {
         (["simulate", "table.toml"], "table.toml: blok: unknown key; did you mean 'block'"),
         (["simulate", "unit.toml"], "unit.toml: excitation.unit"),
         (["simulate", "fig5a", "--model", "ebm", "--model", "cm"], "--model: is given twice"),
+        (["simulate", "fig5a", *["--set", "tolerance=1e-8"] * 2], "--set: tolerance is given twice"),
         (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),
         (
             ["simulate", "fig5a", "-o", "x.xlsx"],
