@@ -461,6 +461,14 @@ def conformance(
         written,
     )
 
+    errors.refuse(
+        (
+            export is not None and (engine or histories or tune is not None or sets),
+            "does not go with --engine, --histories, --tune or --set",
+            "--export",
+        ),
+        (tune is not None and histories, "does not go with --histories", "--tune"),
+    )
     if export is not None:
         _export(usable_folder(export))
     given, folders = settings_of(sets or ()), histories or []
@@ -468,8 +476,6 @@ def conformance(
     names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
     _check_engines(names, allow_code or (), own=tune is None)
     if tune is not None:
-        if folders:
-            raise errors.InputError("does not go with --histories", "--tune")
         wanted = WANTED.keys() - {"restitution"}
         if unknown := given.keys() - wanted:
             raise errors.unknown_name("setting", min(unknown), wanted)

@@ -76,7 +76,7 @@ def measure_of(what: str) -> figures.Measure:
     """
     name, at, window = what.partition("@")
     errors.one_of("measure", name, MEASURES)
-    if at and window != HORIZON and not re.fullmatch(r"\d+(\.\d+)?s", window):
+    if at and window != HORIZON and not re.fullmatch(r"(?=.*[1-9])\d+(\.\d+)?s", window):
         raise InputError(
             f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
         )

@@ -44,6 +44,7 @@ def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails_and_says_why(one, 
     [
         ("[a.b.c]\ntheta_rsm = {limit = 1.0}", "did you mean 'theta_rms'"),
         ('[a.b.c]\n"theta_rms@8" = {limit = 1.0}', "window '8'"),
+        ('[a.b.c]\n"theta_rms@0s" = {limit = 1.0}', "window '0s'"),
         ("[a.b.c]\ntheta_rms = {limit = nan}", "limit"),
         ("[a.b.c]\ntheta_rms = {limit = -1.0}", "limit"),
         ("[a.b.c]\ntheta_rms = {expected = 1.0}", "limit: is missing"),
