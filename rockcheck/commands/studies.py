@@ -463,7 +463,7 @@ def conformance(
 
     errors.refuse(
         (
-            export is not None and (engine or histories or tune is not None or sets),
+            export and any((engine, histories, sets, tune is not None)),
             "does not go with --engine, --histories, --tune or --set",
             "--export",
         ),
