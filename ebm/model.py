@@ -9,18 +9,7 @@ import numpy as np
 from pydantic import Field, Strict
 
 from rockcheck.ebm.core import names
-from rockcheck.scenes import (
-    Cost,
-    Event,
-    Frozen,
-    History,
-    Positive,
-    Scene,
-    errors,
-    history,
-    observation,
-    progress,
-)
+from rockcheck.scenes import Frozen, Positive, Scene, errors, history, observation, progress
 
 #: The finest tolerance.
 FINEST = 1e-15
@@ -118,7 +107,7 @@ class EventBasedModel(Frozen):
             ),
         )
 
-    def simulate(self, scene: Scene) -> History:
+    def simulate(self, scene: Scene) -> history.History:
         """The motion of the scene on its output grid.
 
         Raises `InputError` (see `check`) or `ModelFailure`.
@@ -147,7 +136,7 @@ class EventBasedModel(Frozen):
         speed = scene.block.radius / unit
         out[0] = natural.state_of(scene) if written == 0 else out[0]
         events = [
-            Event(
+            history.Event(
                 t=at * unit,
                 kind=names.EVENT_NAMES[int(kind)],
                 mode_before=names.MODE_NAMES[int(before)],
@@ -156,7 +145,7 @@ class EventBasedModel(Frozen):
             )
             for at, kind, before, after, impulse in log[: min(found.events, len(log))].tolist()
         ]
-        cost = Cost(
+        cost = history.Cost(
             wall_seconds=seconds,
             cpu_seconds=cpu,
             set_up=ready - began,

@@ -9,20 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core import names
 from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.contact_impacts import IMPACT
 from rockcheck.ebm.core.ground import Ground
-from rockcheck.ebm.core.names import (
-    ROWS,
-    RULES,
-    Ending,
-    Event,
-    Family,
-    Guard,
-    HistoryMode,
-    Pivot,
-    Row,
-)
+from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import Floats
@@ -129,7 +120,7 @@ STATE = record(
     rows="i8",
     gains="i8",
     largest_gain="f8",
-    rules=("i8", (RULES,)),
+    rules=("i8", (names.RULES,)),
     # Scratch: a motion between the ends of a step, and the impact that is resolved.
     sampled=MOTION,
     impact=IMPACT,
@@ -216,7 +207,7 @@ def workspace():
 
     The series of G is 1: no vertical motion.
     """
-    series = np.zeros((ROWS, WIDTH))
+    series = np.zeros((names.ROWS, WIDTH))
     series[Row.G, 0] = series[Row.ANGLE, 2] = 1.0
     return series, np.zeros((48, WIDTH))
 
