@@ -449,7 +449,10 @@ class EnsembleView(View):
 
     @cached_property
     def references(self) -> tuple[str, ...]:
-        """Models that others are held against here; the run's own reference first."""
+        """Models that others are held against here; the run's own reference first.
+
+        Where none of them finished, the first that did.
+        """
         named = dict.fromkeys(
             [
                 self.run.reference,
@@ -457,22 +460,28 @@ class EnsembleView(View):
                 *(figure.against for cell in self.cells for figure in cell.figures),
             ]
         )
-        return tuple(model for model in named if model in self.record.samples)
+        finished = tuple(self.record.finished)
+        return tuple(model for model in named if model in finished) or finished[:1]
 
     @cached_property
     def curves(self) -> dict[str, tuple[list[float], list[float]]]:
         """Sorted peaks of the blocks that stay, and the share of scenes up to each, by model."""
         known = {
             model: np.sort(sample.peaks[~sample.fallen & np.isfinite(sample.peaks)])
-            for model, sample in self.record.samples.items()
+            for model, sample in self.record.finished.items()
         }
         return {
             model: (
                 peaks.tolist(),
-                (np.arange(1, len(peaks) + 1) / len(self.record.samples[model].peaks)).tolist(),
+                (np.arange(1, len(peaks) + 1) / len(self.record.peaks[model])).tolist(),
             )
             for model, peaks in known.items()
         }
+
+    @property
+    def missing(self) -> dict[str, str]:
+        """By model: why it is not drawn."""
+        return {cell.model: cell.reason for cell in self.cells if cell.model not in self.curves}
 
     def page(self) -> Finding:
         """All that its page shows."""
@@ -492,8 +501,8 @@ class EnsembleView(View):
                     for cell in self.cells
                 ],
             ),
-            self.distributions(),
-            *([self.by_scene()] if len(self.record.samples) > 1 else []),
+            *([self.distributions()] if self.curves else []),
+            *([self.by_scene()] if len(self.curves) > 1 else []),
             *(table for against in self.references if (table := self.agreement(against)).rows),
             Text(
                 "Intervals are for 95 % confidence: Wilson's for shares, Student's for the bias"
@@ -590,7 +599,7 @@ class EnsembleView(View):
     def by_scene(self) -> Plot:
         """Peak rotation of each scene by each model against the reference's."""
         reference, known, panels = self.references[0], self.looks, []
-        for model in [one for one in self.record.samples if one != reference]:
+        for model in [one for one in self.curves if one != reference]:
             pair = measures.Samples(self.record.samples[reference], self.record.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LOWEST, MOST * 1.6))

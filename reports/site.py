@@ -126,12 +126,12 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     reference. Raises `InputError` for what the run does not have.
     """
     view = _Pages(folder, (name,)).views[name]
-    if isinstance(view, EnsembleView):
-        return save_as(figure_of(view.distributions()), path)
-    if not view.histories:
+    if not (view.curves if isinstance(view, EnsembleView) else view.histories):
         raise errors.InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
+    if isinstance(view, EnsembleView):
+        return save_as(figure_of(view.distributions()), path)
     return save_as(histories_figure(view), path)
 
 

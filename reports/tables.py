@@ -255,10 +255,9 @@ def runs_table(
 ) -> Table:
     """Settings, run times and outcomes of a place's cells.
 
-    Of an ensemble (no `histories`) the CPU time of all its scenes. Links lead from a scene's page.
+    Of an ensemble (no `histories`) the time of all its scenes. Links lead from a scene's page.
     """
-    of = "cpu_seconds" if histories is None else "wall_seconds"
-    base = next((cell for cell in cells if cell.model == run.reference), None)
+    whole = next((cell.cost.wall_seconds for cell in cells if cell.model == run.reference), 0.0)
     gains = {
         cell.model: [
             f"{cell.cost.energy_gains} impacts added energy,"
@@ -268,11 +267,10 @@ def runs_table(
         else []
         for cell in cells
     }
-    whole = getattr(base.cost, of) if base else 0.0
     costs = {
         cell.model: [
-            duration(getattr(cell.cost, of)),
-            ratio(getattr(cell.cost, of) / whole if whole > 0.0 else None),
+            duration(cell.cost.wall_seconds),
+            ratio(cell.cost.wall_seconds / whole if whole > 0.0 else None),
             duration(cell.cost.set_up),
             f"{cell.cost.steps:,}".replace(",", "\u202f"),
             f"{cell.cost.evaluations:,}".replace(",", "\u202f"),

@@ -205,6 +205,7 @@ def crowd(scatter: float) -> tuple[results.EnsembleRecord, list[results.Cell]]:
             model="cm",
             status="done",
             outcome="6 of 40 overturned",
+            cost=results.CostRecord(wall_seconds=7.25, cpu_seconds=0.5),
             figures=figures,
             checks=(
                 results.Check(

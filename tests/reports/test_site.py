@@ -13,7 +13,7 @@ import pytest
 from rockcheck.commands import OUT, studies
 from rockcheck.reports.drawers import GREY, colours
 from rockcheck.reports.figures import EnsembleView
-from rockcheck.reports.show.words import number
+from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import PAGES, STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
@@ -284,7 +284,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
     }
     assert {name: row[name] for name in expected} == expected
     page = text_of((site / PAGES / "crowd.html").read_text("utf-8"))
-    drawn = ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "p = ")
+    drawn = ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "p = ", duration(7.25))
     assert [said for said in (*drawn, number(row["peak_scatter"])) if said not in page] == []
     rows = pd.read_csv(site / PAGES / "data" / "crowd.csv")
     columns = ("peak_rotation_alpha", "outcome")

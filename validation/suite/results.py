@@ -215,6 +215,11 @@ class EnsembleRecord(Stored):
             for model, peaks in self.peaks.items()
         }
 
+    @property
+    def finished(self) -> dict[str, measures.Sample]:
+        """The `samples` of the models that have a result in every scene."""
+        return {model: sample for model, sample in self.samples.items() if not sample.failures}
+
 
 class Run(Stored):
     """All of one run of a suite.
@@ -251,15 +256,20 @@ class Run(Stored):
     printed: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
-        """The worst cell's verdict.
-
-        At least "fail" where there are faults, or where checks were asked for and none was made.
-        """
-        weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
+    def wrong(self) -> tuple[str, ...]:
+        """Why it does not pass, besides its cells: its faults, and where nothing was judged."""
         judged = any(check.verdict != "not defined" for _, check in self.checks())
-        wrong = bool(self.faults) or (self.judged and not judged)
-        return max([*weighed, "fail" if wrong else "pass"], key=SEVERITY.index)
+        nothing = (
+            "nothing was judged: no cell that finished has a figure that is defined here and is"
+            " required or has a tolerance"
+        )
+        return self.faults if judged or not self.judged else (*self.faults, nothing)
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst cell's verdict; at least "fail" where something is `wrong`."""
+        weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
+        return max([*weighed, "fail" if self.wrong else "pass"], key=SEVERITY.index)
 
     @property
     def words(self) -> str:
@@ -302,9 +312,7 @@ class Run(Stored):
     @property
     def without_tolerance(self) -> int:
         """Number of figures that need a tolerance and have none yet; none of them passes."""
-        return sum(
-            check.limit is None and check.verdict != "not defined" for _, check in self.checks()
-        )
+        return sum(check.words == "no tolerance yet" for _, check in self.checks())
 
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""

@@ -689,7 +689,7 @@ class SuiteStudy(Study):
             },
         )
         return whole, [
-            self._ensemble_cell(planned[label], [one.cost for one in some], whole.samples)
+            self._ensemble_cell(planned[label], [one.cost for one in some], whole)
             for label, some in played.items()
         ]
 
@@ -706,10 +706,10 @@ class SuiteStudy(Study):
         self,
         batches: Sequence[Planned],
         costs: Sequence[results.CostRecord],
-        samples: Mapping[str, measures.Sample],
+        whole: results.EnsembleRecord,
     ) -> results.Cell:
         name, label = batches[0].place, batches[0].model
-        mine, reason = samples[label], ""
+        mine, others, reason = whole.samples[label], whole.finished, ""
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]
             reason = f"{mine.failures} of {len(mine.peaks)} scenes failed; the first: {first}"
@@ -727,10 +727,10 @@ class SuiteStudy(Study):
         required = own.required(name, label)
         figures = [
             Compared(
-                evaluate(measure, measures.Samples(samples[other], mine), "alpha", against=other)
+                evaluate(measure, measures.Samples(others[other], mine), "alpha", against=other)
             )
             for other in own.yardsticks(required)
-            if other in samples and other != label
+            if other in others and other != label
             for measure in measures.STATISTICS.values()
         ]
         return results.Cell(
@@ -761,11 +761,11 @@ def _checks(
         nothing = Figure(  # without a value, so that the check cannot pass
             measure=measure.name,
             label=measure.label,
-            unit=measure.unit,
+            unit=measure.unit.replace("angle", "alpha"),
             value=None,
             against="" if itself else place.against,
             window=place.what.partition("@")[2],
-            note="not computed" if itself else f"{place.against} failed in this scene",
+            note="not computed" if itself else f"{place.against} has no result here",
         )
         found = known.get((place.against, place.what), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap

@@ -183,17 +183,12 @@ def summary(run: results.Run) -> dict[str, Any]:
 
 def verdict_lines(run: results.Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
-    yield from run.faults
+    yield from run.wrong
     absent = {cell.model: cell.reason for cell in run.cells if cell.status in results.MISSING}
     yield from (f"{model}: {reason}" for model, reason in absent.items())
     for cell in run.cells:
         if cell.status not in results.MISSING:
             yield from cell_lines(cell)
-    if run.judged and not any(
-        cell.status != "done" or any(c.verdict != "not defined" for c in cell.checks)
-        for cell in run.cells
-    ):
-        yield "nothing was judged: no measure that is defined here is required or has a tolerance"
 
 
 def improvements(run: results.Run) -> Iterator[str]:
@@ -293,7 +288,7 @@ def junit(run: results.Run) -> str:
         for scene, cells in run.by_scene.items()
     ]
     faults: list[writing.Case] = [
-        ("tolerances", fault, "failed", fault, "", None) for fault in run.faults
+        ("tolerances", fault, "failed", fault, "", None) for fault in run.wrong
     ]
     return writing.junit_text(
         f"rockcheck {run.suite}", [*suites, *([("tolerances", faults)] if faults else [])]
@@ -367,8 +362,8 @@ def _entry(cell: results.Cell | None, judged: bool) -> str:
     if cell is None:
         return ""
     sure = " (not converged)" if cell.converged is False else ""
-    if not judged and cell.status == "done":
-        return _plain(cell.fate)
+    if cell.status == "done" and not (judged and cell.checks):
+        return f"{_plain(cell.fate)}{sure}"
     numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
     worst = max(
         numerical,

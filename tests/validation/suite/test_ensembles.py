@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
+from rockcheck.reports.figures import EnsembleView
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.suite import suites
@@ -141,6 +142,16 @@ def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
     )
     run.save(tmp_path / "out")
     assert type(run).load(tmp_path / "out") == run
+
+
+def test_a_model_without_results_is_no_yardstick_and_is_not_drawn(loaded, tmp_path):
+    text = SUITE.partition("[tolerances")[0].replace('"still"', '"broken"', 1)
+    run = run_suite(loaded(text), tmp_path / "out", jobs=0)
+    assert (
+        [check.figure.value for check in run.by_scene["crowd"]["near"].checks],
+        run.without_tolerance,
+        list(EnsembleView(run, "crowd", "crowd", *run.ensembles).curves),
+    ) == ([None, None], 0, ["still", "near"])
 
 
 def test_a_measured_history_takes_no_part_in_an_ensemble(loaded):

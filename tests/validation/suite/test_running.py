@@ -166,7 +166,7 @@ def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
     path = write_suite(tmp_path, STILL, FINE.format(model="a"))
     path.write_text(path.read_text().replace("Still", "Fails", 1))
     (check,) = run(path).by_scene["short"]["a"].checks
-    assert (check.verdict, check.reason) == ("fail", "still failed in this scene")
+    assert (check.verdict, check.figure.value, check.figure.unit) == ("fail", None, "alpha")
 
 
 FORM = """

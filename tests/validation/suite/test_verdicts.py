@@ -221,7 +221,14 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
     cells, more, verdict, code, strict
 ):
     runs = [run_of(*cells, strict=how, **more) for how in (False, True)]
-    assert [(run.verdict, run.exit_code) for run in runs] == [(verdict, code), (verdict, strict)]
+    assert [
+        (
+            run.verdict,
+            run.exit_code,
+            any(f"<{red}" in tables.junit(run) for red in ("failure ", "error ")),
+        )
+        for run in runs
+    ] == [(verdict, code, code > 0), (verdict, strict, strict > 0)]
     assert (runs[0].words == "not judged") == (not more.get("judged", True))
     assert [one.get("verdict") for one in tables.summary(runs[0])["cells"]] == [
         None if "judged" in more or not (one.checks or one.reason) else one.verdict for one in cells
