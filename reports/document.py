@@ -288,7 +288,7 @@ TEMPLATES = Environment(
 )
 TEMPLATES.filters |= {
     one.__name__: one for one in (number, unit, duration, moment, window, readable)
-}
+} | {"share": lambda used: _words(Mark(used), Column("used", kind="used"), number)}
 #: The folder beside `index.html` that holds everything else.
 PAGES = "pages"
 
