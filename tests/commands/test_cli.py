@@ -94,7 +94,10 @@ FILES = {
         (["simulate", "table.toml"], "table.toml: blok: unknown key; did you mean 'block'"),
         (["simulate", "unit.toml"], "unit.toml: excitation.unit"),
         (["simulate", "fig5a", "--model", "ebm", "--model", "cm"], "--model: is given twice"),
-        (["simulate", "fig5a", *["--set", "tolerance=1e-8"] * 2], "--set: tolerance is given twice"),
+        (
+            ["simulate", "fig5a", *["--set", "tolerance=1e-8"] * 2],
+            "--set: tolerance is given twice",
+        ),
         (["conformance", "--export", "x", "--tune", "1"], "--export: does not go with --engine"),
         (["conformance", "--histories", "x", "--tune", "1"], "--tune: does not go with"),
         (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 import scipy  # it loads its parts as they are used
 
-from rockcheck.scenes import Finite, Frozen, History, InputError, Scene, printable
+from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, printable
 from rockcheck.scenes.history import outcome_of
 
 CONFIDENCE = 0.95
@@ -67,6 +67,7 @@ class Measured(Frozen):
             history,
             name=scene.name,
             channels=channels,
+            cost=Cost(),  # of a model whose file this is: nothing was simulated here
             outcome=history.outcome if inside[-1] else outcome_of(channels),
             event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             block=scene.block.per_unit_mass,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rockcheck import Event, EventBasedModel, History, load_scene
-from rockcheck.scenes import observation
+from rockcheck.scenes import Cost, observation
 from rockcheck.validation.discrepancy import measured
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.suite import suites
@@ -128,17 +128,20 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     state = np.zeros((301, 6))
     state[:, 2] = np.linspace(0.0, 1.5, 301)
     given = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
-    observation.observe(scene, "measured", state, events=given).save(tmp_path / "a.csv")
+    observation.observe(scene, "measured", state, events=given, cost=Cost(steps=9)).save(
+        tmp_path / "a.csv"
+    )
     later = measured.shifted(History.load(tmp_path / "a.csv"), -0.5)
     assert [e.t for e in later.event_list] == [-0.3, 2.495]
     history = measured.Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
         scene.replace(duration=duration)
     )
-    assert (history.outcome, history.overturned_at, [e.t for e in history.event_list]) == (
-        outcome,
-        fell,
-        events,
-    )
+    assert (
+        history.outcome,
+        history.overturned_at,
+        [e.t for e in history.event_list],
+        history.cost,  # playing a file back costs nothing, whoever wrote it
+    ) == (outcome, fell, events, Cost())
 
 
 # Repeats of a test
