@@ -269,6 +269,13 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
     return found
 
 
+def need_installed(names: Iterable[str], option: str) -> None:
+    """Raise `NotInstalled` for the first model whose engine is not installed."""
+    for name in names:
+        if hint := not_installed(name):
+            raise errors.NotInstalled(hint, f"{option} {name}")
+
+
 def settings_of(words: Iterable[str], option: str = "--set") -> dict[str, Any]:
     """The values of words `key=value` by their keys, as in TOML; a bare value is a string.
 

@@ -23,6 +23,7 @@ from rockcheck.commands import (
     chosen_models,
     completing,
     model_names,
+    need_installed,
     scene_names,
     settings_of,
     studied,
@@ -138,6 +139,7 @@ def assess(
             for word in settings or ()
         ],
     )
+    need_installed(chosen, "--models")
     clear: tuple[float, ...] = ()
     sides = tuple(wall.side for wall in given.scene.walls)
     if tried.gaps is not None:
@@ -399,9 +401,8 @@ def stress(
     from rockcheck.validation.studies.stress.study import Stress, What, places
 
     part: What = errors.one_of("stress", what, get_args(What))
-    for name in model or ():
-        if missing := models.not_installed(errors.one_of("model", name, PLAYERS).split()[0]):
-            raise errors.NotInstalled(missing, name)
+    families = (errors.one_of("model", name, PLAYERS).split()[0] for name in model or ())
+    need_installed(families, "--model")
     if part == "maps" and not places(quick, model or ()):
         raise errors.InputError(
             "maps are of engines and cm: an event-based model has no step", "--model"
@@ -499,8 +500,7 @@ def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool
                 + ", or module:Class" * own,
                 "--engine",
             )
-        if reason := models.not_installed(name):
-            raise errors.InputError(reason, f"--engine {name}")
+    need_installed(names, "--engine")
 
 
 def _export(folder: Path) -> NoReturn:

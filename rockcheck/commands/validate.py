@@ -121,6 +121,8 @@ def run(
             raise InputError(
                 f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
             )
+    if history is not None:
+        check_file(history, "--history", across.recall)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
     from rockcheck.reports import document, site
 

@@ -7,6 +7,7 @@ import pytest
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import history
+from rockcheck.validation.execute.models import FAMILIES, not_installed
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -111,6 +112,12 @@ FILES = {
         (["accept", "scene.toml"], "scene.toml: is a scene, not a suite; `rockcheck validate`"),
         (["validate", "scene.toml", "--strict"], "--strict: scene.toml is a scene, and nothing"),
         (["validate", "scene.toml", "--history", "r"], "--history: scene.toml is a scene, and"),
+        (["validate", "smoke", "--history", "no/runs.jsonl"], "--history: no: no such folder"),
+        *(
+            (["assess", "fig5a", "--models", f"ebm,{name}"], f"--models {name}: ")
+            for name in FAMILIES
+            if not_installed(name)
+        ),
         (["validate", "nothere"], "nothere"),
         (["validate", "scen.toml"], "scen.toml: cannot be read"),
         (["validate", "scene.toml", "--models", "ebm,mujcoo"], "did you mean 'mujoco'"),

@@ -232,8 +232,8 @@ def moment_of(run: results.Run, folder: Path) -> Moment:
     )
 
 
-def remember(path: Path, moment: Moment) -> list[Moment]:
-    """Append a run to the history; returns all its runs of the same suite, the oldest first.
+def recall(path: Path) -> list[Moment]:
+    """The runs of a history, the oldest first; none where there is no file yet.
 
     Raises `InputError`, naming a line that is unusable.
     """
@@ -248,6 +248,15 @@ def remember(path: Path, moment: Moment) -> list[Moment]:
                 f"{printable(path)}, line {n}: not a run of a history:"
                 f" {errors.from_validation(error)}"
             ) from None
+    return known
+
+
+def remember(path: Path, moment: Moment) -> list[Moment]:
+    """Append a run to the history; returns all its runs of the same suite, the oldest first.
+
+    Raises `InputError` (see `recall`), also where the file cannot be written.
+    """
+    known = recall(path)
     try:
         with path.open("a+b") as stream:
             if stream.tell():  # an editor may have left the last line without its end
