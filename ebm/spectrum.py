@@ -91,13 +91,14 @@ def overturning_spectrum(
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
 
     `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing,
-    positive and finite. `scene` gives block, floor, walls and the kind of pulse (Ricker or sine);
-    its duration and the pulse's own size are not used. Where the scene's excitation is a record,
-    `frequency_ratios` are sizes of the block relative to its own (the gaps stay as they are) and
-    `amplitude_ratios` multiply the record. With `refine` only every eighth node is run at first
-    (more of a small grid), then those between nodes that differ (and their neighbours). `jobs`
-    threads, default all cores; `on_progress` gets the nodes done by `model`. `play` runs the
-    nodes elsewhere or by another model, instead of `model` here. Raises `InputError`.
+    positive and finite. `scene` gives block, floor, walls, the kind of pulse (Ricker or sine) and
+    its direction, the sign of its amplitude; its duration and the pulse's own size are not used.
+    Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to
+    its own (the gaps stay as they are) and `amplitude_ratios` multiply the record. With `refine`
+    only every eighth node is run at first (more of a small grid), then those between nodes that
+    differ (and their neighbours). `jobs` threads, default all cores; `on_progress` gets the nodes
+    done by `model`. `play` runs the nodes elsewhere or by another model, instead of `model` here.
+    Raises `InputError`.
     """
     frequencies, amplitudes = (
         _axis(frequency_ratios, "frequency_ratios"),
@@ -267,9 +268,11 @@ def node_scene(
 def node_pulse(scene: Scene, amplitude_ratio: Any, frequency_ratio: Any) -> tuple[Any, Any]:
     """Amplitude (m/s^2) and period (s) of the pulse of one node, or of many.
 
-    They are a = A g tan(alpha) and T = 2 pi/(F p), with the frequency parameter p.
+    They are a = A g tan(alpha), of the sign of the scene's own pulse, and T = 2 pi/(F p), with the
+    frequency parameter p.
     """
-    amplitude = amplitude_ratio * scene.gravity * scene.block.slope
+    sign = math.copysign(1.0, getattr(scene.excitation, "amplitude", 1.0))
+    amplitude = sign * amplitude_ratio * scene.gravity * scene.block.slope
     return amplitude, 2.0 * math.pi / (frequency_ratio * scene.frequency_parameter)
 
 

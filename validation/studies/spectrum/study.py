@@ -286,8 +286,8 @@ class Spectra(Study):
         if isinstance(pulse, Ricker | Sine):
             # amplitude (m/s^2) and period (s) along the axes, and where the user's own one is
             f, a = request.frequencies, request.amplitudes
-            amplitudes, periods = (some.tolist() for some in node_pulse(first.scene, a, f))
-            own = f[0] * periods[0] / pulse.period, a[0] * pulse.amplitude / amplitudes[0]
+            amplitudes, periods = (abs(some).tolist() for some in node_pulse(first.scene, a, f))
+            own = f[0] * periods[0] / pulse.period, a[0] * abs(pulse.amplitude) / amplitudes[0]
             pulses = {
                 "amplitude": amplitudes,
                 "period": periods,
