@@ -24,19 +24,19 @@ class Motion(Frozen):
     """Base of all excitations: a scaled or stretched motion is of the same kind."""
 
     def scaled(self, factor: float) -> Self:
-        """The same motion with `factor` times the acceleration.
+        """The same motion with `factor` times the acceleration, validated like any other.
 
         A negative factor also exchanges left and right.
         """
         return self._times(("amplitude", "scale"), factor)
 
     def stretched(self, factor: float) -> Self:
-        """The same motion with all times multiplied by `factor` (> 0)."""
+        """The same motion with all times multiplied by `factor` (> 0), validated like any other."""
         return self._times(("period", "time_step"), factor)
 
     def _times(self, names: tuple[str, ...], factor: float) -> Self:
-        return self.model_copy(
-            update={
+        return self.replace(
+            **{
                 name: factor * getattr(self, name)
                 for name in names
                 if name in type(self).model_fields

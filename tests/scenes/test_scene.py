@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import PAPER_BLOCK, Block, Floor, Scene, Wall, kinematics, observation
+from rockcheck.scenes import PAPER_BLOCK, Block, Floor, Record, Scene, Wall, kinematics, observation
 
 GOOD = {
     "name": "good",
@@ -317,6 +317,24 @@ def test_initial_state_stands_on_its_pivot(tilt):
     assert y_dot == pytest.approx((later - now) / 1e-7, abs=1e-6)
 
 
-def test_a_change_is_a_new_scene_that_is_validated(fault_of):
-    assert scene().replace(duration=2.0).duration == 2.0
-    assert str(fault_of(scene().replace, duration=-1.0)).startswith("duration: -1.0 is not allowed")
+@pytest.mark.parametrize(
+    ("act", "given", "said"),
+    [
+        (scene().replace, {"duration": -1.0}, "duration: -1.0 is not allowed"),
+        (scene().excitation.scaled, {"factor": math.nan}, "amplitude: nan is not allowed"),
+        (scene().excitation.stretched, {"factor": -1.0}, "period: -"),
+        (
+            Record.from_samples([1.0, 2.0], 0.1).scaled,
+            {"factor": math.inf},
+            "scale: inf is not allowed",
+        ),
+        (
+            Record.from_samples([1.0, 2.0], 0.1).stretched,
+            {"factor": 0.0},
+            "time_step: 0.0 is not allowed",
+        ),
+        (LOADED.scaled, {"factor": -1.0}, "half_width: -"),
+    ],
+)
+def test_a_change_is_validated(act, given, said, fault_of):
+    assert str(fault_of(act, **given)).startswith(said)
