@@ -35,7 +35,7 @@ Nodes = tuple[NDArray[np.int8], NDArray[np.bool_]]
 Player = Callable[[Scene, Floats, Floats], Nodes]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Spectrum(Shown):
     """Outcomes over frequency and amplitude, or over block size and scale of a record.
 

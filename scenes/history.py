@@ -101,9 +101,11 @@ class Cost:
     error_estimate: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class History(Shown):
     """The motion of a block as one model sees it. SI units, signs as in the scene.
+
+    It equals itself only; `compare` says how far two are apart.
 
     `channels` holds one 1-D array a name, all of one length: t, x, y, theta, x_dot, y_dot,
     theta_dot, slip, slip_rate, mode. x and y locate the centre of the box relative to the base (of

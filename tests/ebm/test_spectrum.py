@@ -240,7 +240,7 @@ def test_a_motion_that_fails_is_none():
 
 def test_least_overturning_amplitude_and_area():
     spectrum = overturning_spectrum(scene(), [2.0, 8.0], [1.0, 3.0, 6.0, 9.0])
-    assert spectrum.outcomes.shape == (4, 2)
+    assert (spectrum.outcomes.shape, spectrum in {spectrum}) == ((4, 2), True)
     assert spectrum.safe_area == np.mean(spectrum.outcomes == 0)
     np.testing.assert_array_equal(spectrum.least_overturning_amplitude(), [3.0, np.nan])
 

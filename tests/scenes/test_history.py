@@ -65,6 +65,7 @@ def test_save_and_load_round_trip(history, tmp_path):
     for field in ("name", "model", "outcome", "notes", "block", "cost", "settings", "event_list"):
         assert getattr(again, field) == getattr(history, field), field
     pd.testing.assert_frame_equal(again.frame, history.frame, check_exact=True)
+    assert {history: 1, again: 2}[history] == 1  # and none is taken for another
     assert sorted(p.name for p in tmp_path.iterdir()) == ["run.csv", "run.events.csv"]
 
 
