@@ -69,8 +69,9 @@ LEADS = ("Does it fall?", "How far does it move?", "Which gap is safe?")
 #: What is said where there is no answer.
 ASKS = {
     "How far does it move?": "No run stands.",
-    "Which gap is safe?": "Not asked for: --gaps 0,0.05,0.1.",
-    "At which intensity does it fall?": "Not asked for: --levels pga:0.05:2:40.",
+    "Which gap is safe?": "Not asked for: --gaps 0,0.05,0.1, or left:0,0.05,0.1 without a wall.",
+    "At which intensity does it fall?": "Not asked for: --levels pga:0.05:2:40 with records,"
+    " pga-ratio:1:8:40 with a pulse.",
 }
 
 

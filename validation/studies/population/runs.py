@@ -183,10 +183,12 @@ class Population:
             for event, limit in self.limits.items()
         ]
         names, unit = [one.label for one in played], self.across.unit
-        medians = [f"{one.label} {one.median:.3g} {unit}" for one in curves if one.median > 0.0]
+        medians = [
+            f"{one.label} {one.median:.3g} {unit}".rstrip() for one in curves if one.median > 0.0
+        ]
         return (
             f"{len(self.motions)} motions in both directions, {len(self.levels)} intensities."
-            f" Median {self.across.label}: {', '.join(medians).rstrip() or 'no curve fits'}."
+            f" Median {self.across.label}: {', '.join(medians) or 'no curve fits'}."
         ), [
             *(lines_of(names, peaks[""], self.levels, self.across) if "" in peaks else ()),
             *(blocks_of(curves, self.across, self.other) if curves else ()),
