@@ -49,7 +49,8 @@ def main() -> int:
         if stream is not None and stream is getattr(sys, f"__{name}__") and not stream.isatty():
             pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
             at_once = stream.line_buffering or stream.write_through
-            text = io.TextIOWrapper(pipe, stream.encoding, stream.errors, line_buffering=at_once)
+            # "replace": its encoding may know no ✓
+            text = io.TextIOWrapper(pipe, stream.encoding, "replace", line_buffering=at_once)
             setattr(sys, name, text)
     code = run(began=BEGAN)
     # Compiled code may still run in threads, which Python would wait for.
