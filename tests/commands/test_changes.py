@@ -147,6 +147,10 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     name = "short, near: theta_peak against still"
     first, second, third = (one.figures[name] for one in moments)
     assert (second / first, third) == (pytest.approx(1.05, rel=1e-6), second)
+    # nothing has varied in one run: no empty table
+    assert [
+        table.name for table in across.trend_of(moments[:1]).tables() if table.on == "page"
+    ] == ["runs"]
     page = Path("a/trend/index.html").read_text("utf-8")
     assert [part for part in ("mine over 3 runs", name, head) if part not in page] == []
     assert 'href="trend/index.html"' in Path("a/index.html").read_text("utf-8")

@@ -306,7 +306,7 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     blocks: list[Block] = [
         Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
-        Table("figures", columns, rows, "What varied", on="page"),
+        Table("figures", columns, rows, "What varied", on="page" if rows else "file"),
         Table(
             "runs",
             [*map(text, ("made", "commit", "rockcheck", "verdict")), Column("not_passed")],
