@@ -117,7 +117,7 @@ def compare(
         ),
         pair.start,
         pair.end,
-        *_gap(pair, until),
+        *gap_of((candidate, reference), until),
         histories=(reference, candidate),
     )
 
@@ -187,31 +187,22 @@ def evaluate(
     )
 
 
-def too_short(history: History, until: float | None) -> str:
-    """Why a history does not reach `until`; empty where it does, or ended by overturning."""
-    end = float(history.channels["t"][-1])
-    if until is None or history.outcome in TURNS or end >= until - 1.5 * _step(history):
-        return ""
-    return f"{history.model} ends at {end:g} s, before {until:g} s"
-
-
-def _gap(pair: Pair, until: float | None) -> tuple[str, bool]:
+def gap_of(histories: Sequence[History], until: float | None) -> tuple[str, bool]:
     """Missing part of the requested time, empty if none; True if one block's fall is the cause.
 
-    Nothing is missing where both fell to the same side.
+    Nothing is missing where all fell to the same side. Of two that end together the first is named.
     """
-    starts, ends = (
-        [float(h.channels["t"][k]) for h in (pair.reference, pair.candidate)] for k in (0, -1)
-    )
-    step = 1.5 * float(max(_step(pair.reference), _step(pair.candidate)))
+    starts, ends = ([float(h.channels["t"][k]) for h in histories] for k in (0, -1))
+    step = 1.5 * max(map(_step, histories))
     if max(starts) - min(starts) > step:
-        late = pair.reference if starts[0] > starts[1] else pair.candidate
+        late = histories[int(np.argmax(starts))]
         return f"{late.model} starts only at {max(starts):g} s", False
-    fell_alike = pair.reference.outcome == pair.candidate.outcome in TURNS
+    outcomes = {history.outcome for history in histories}
+    fell_alike = len(outcomes) == 1 and outcomes <= {*TURNS}
     asked = max(ends) if until is None else until
     if fell_alike or asked - min(ends) <= step:
         return "", False
-    short = pair.reference if ends[0] < ends[1] else pair.candidate
+    short = histories[int(np.argmin(ends))]
     fall = short.outcome in TURNS
     return (
         f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",

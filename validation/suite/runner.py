@@ -23,7 +23,7 @@ from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.scenes import History, InputError, ModelFailure, NonNegative, Scene, progress
 from rockcheck.validation.discrepancy import impact_laws, measures
-from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, too_short
+from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, gap_of
 from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
@@ -188,9 +188,9 @@ def by_any(
     name it, that ends at `until` (s; None: the whole time).
     """
     if reference is None:
-        gap = too_short(candidate, until)
+        gap = gap_of((candidate,), until)
         for one in describe(candidate, until=until, scene=scene, measures=measures):
-            yield Compared(one.model_copy(update={"window": window}), gap)
+            yield Compared(one.model_copy(update={"window": window}), *gap)
         return
     wanted = [measure for measure in measures if measure in BY_ANY]
     found = {"": compare(reference, candidate, until=until, scene=scene, measures=measures)} | {
