@@ -110,13 +110,13 @@ class Study(ABC):
     def find(self, store: Store, task: Task) -> Any:
         """The kept record of a task; None if there is none, or its fields do not fit."""
         with suppress(KeyError, ValueError):
-            found = store.get_record(RECORDS, self.file(task)) or {}
+            found = store.get(RECORDS, self.file(task)) or {}
             return self._adapter.validate_python(found["record"])
         return None
 
     def keep(self, store: Store, task: Task, record: Any) -> None:
         """Keep the record of a task."""
-        store.put_record(
+        store.put(
             RECORDS,
             self.file(task),
             {"record": self._adapter.dump_python(record, mode="json")},

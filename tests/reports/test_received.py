@@ -83,15 +83,15 @@ def test_a_kept_result_that_is_no_file_of_the_folder_is_none(tmp_path, trap, suf
     """It is neither read nor waited for; what takes its place is written beside, not through it."""
     store, kept = Store(tmp_path / "run"), tmp_path / "kept"
     files = {".csv.gz": b"1", ".events.csv.gz": b"2"}
-    store.put("a", files, {"n": 1})
+    store.put(HISTORIES, "a", {"n": 1}, files)
     path = tmp_path / "run" / HISTORIES / f"a{suffix}"
     path.rename(kept)
     before = kept.read_bytes(), kept.stat().st_mtime_ns
     TRAPS[trap](path, kept)
-    assert store.get("a") is None
+    assert store.get(HISTORIES, "a") is None
     if trap != "a folder":
-        store.put("a", files, {"n": 1})
-        assert store.get("a") == {"n": 1}
+        store.put(HISTORIES, "a", {"n": 1}, files)
+        assert store.get(HISTORIES, "a") == {"n": 1}
     store.prune(now=4e9)
     assert (kept.read_bytes(), kept.stat().st_mtime_ns) == before
 

@@ -27,7 +27,14 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from rockcheck.commands.cli import main
 from rockcheck.scenes import History, InputError, Scene, load_scene, recordings
 from rockcheck.validation.execute import models
-from rockcheck.validation.execute.store import COMPARISONS, SUFFIXES, TABLE, Store, name_of
+from rockcheck.validation.execute.store import (
+    COMPARISONS,
+    HISTORIES,
+    SUFFIXES,
+    TABLE,
+    Store,
+    name_of,
+)
 from rockcheck.validation.suite import results, suites
 
 fuzzed = settings(
@@ -107,9 +114,10 @@ def stored_files() -> dict[str, bytes]:
         history.save(folder / "h.csv.gz")
         files = {suffix: (folder / f"h{suffix}").read_bytes() for suffix in SUFFIXES}
         Store(folder).put(
+            HISTORIES,
             "short--ebm--0",
-            files,
             {"outcome": history.outcome, "cost": {}, "notes": [], "settings": {}},
+            files,
         )
         record = (folder / "histories" / "short--ebm--0.json").read_bytes()
     run = results.Run(
@@ -137,8 +145,8 @@ def feed_stored_record(content: bytes, folder: Path) -> None:
         (folder / "histories" / f"a{suffix}").write_bytes(stored_files()[suffix])
     (folder / "histories" / "a.json").write_bytes(content)
     (folder / "comparisons" / "a.json").write_bytes(content)
-    assert isinstance(store.get("a"), dict | None)
-    assert isinstance(store.get_record(COMPARISONS, "a"), dict | None)
+    assert isinstance(store.get(HISTORIES, "a"), dict | None)
+    assert isinstance(store.get(COMPARISONS, "a"), dict | None)
 
 
 def feed_command_line(content: bytes, folder: Path) -> None:
@@ -320,7 +328,9 @@ def test_markup_in_a_stored_run_is_text_on_the_page(tmp_path):
     data["cells"][0] |= {"reason": evil, "notes": [evil]}
     data["scenes"]["short"]["description"] = evil
     (tmp_path / "run.json").write_text(json.dumps(data))
-    Store(tmp_path).put("short--ebm--0", {one: stored_files()[one] for one in SUFFIXES}, {})
+    Store(tmp_path).put(
+        HISTORIES, "short--ebm--0", {}, {one: stored_files()[one] for one in SUFFIXES}
+    )
     assert main(["report", str(tmp_path)]) == 0
     pages = [*tmp_path.glob("**/*.html"), *tmp_path.glob("**/data/*.js")]
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
@@ -337,11 +347,11 @@ def test_a_record_names_no_file_but_its_own(tmp_path, name):
     """Found by fuzzing: a record that names a file with a name too long, or elsewhere, is as good
     as none."""
     store = Store(tmp_path)
-    store.put("a", {suffix: stored_files()[suffix] for suffix in SUFFIXES}, {})
-    assert store.get("a") == {}
+    store.put(HISTORIES, "a", {}, {suffix: stored_files()[suffix] for suffix in SUFFIXES})
+    assert store.get(HISTORIES, "a") == {}
     files = json.loads((tmp_path / "histories" / "a.json").read_text())["content"]["files"]
-    store.put_record("histories", "a", {"files": {**files, name: "0"}})
-    assert store.get("a") is None
+    store.put(HISTORIES, "a", {"files": {**files, name: "0"}})
+    assert store.get(HISTORIES, "a") is None
 
 
 def test_a_heading_in_quotes(written):

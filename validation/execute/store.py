@@ -22,6 +22,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
@@ -68,26 +69,28 @@ class Store:
 
     def put(
         self,
+        kind: str,
         name: str,
-        files: Mapping[str, bytes],
-        record: Mapping[str, Any],
+        content: Mapping[str, Any],
+        files: Mapping[str, bytes] = MappingProxyType({}),
         history: History | None = None,
     ) -> None:
-        """Keep a history: its files by suffix (".csv.gz", ".events.csv.gz") and its record.
+        """Keep a result: its files by suffix (".csv.gz", ".events.csv.gz"), if any, and its record.
 
         `history` is the content of the files; if given, it stays in memory.
         """
+        base = self.folder / kind
         writing.write_together(
-            {
-                self.folder / HISTORIES / f"{name}{suffix}": content
-                for suffix, content in files.items()
-            }
+            {base / f"{name}{suffix}": content for suffix, content in files.items()}
         )
-        self.put_record(
-            HISTORIES,
-            name,
-            {**record, "files": {suffix: _hash(content) for suffix, content in files.items()}},
+        hashes = {suffix: _hash(content) for suffix, content in files.items()}
+        record = {**content, "files": hashes} if files else content
+        text = json.dumps(
+            {"content": record, "sha256": _seal(name, record)},
+            sort_keys=True,
+            separators=(",", ":"),
         )
+        writing.write_whole(base / f"{name}.json", text + "\n")
         if history is not None:
             self._recent.append((name, history))
 
@@ -104,38 +107,24 @@ class Store:
             self._recent.append((name, found))
         return found
 
-    def get(self, name: str) -> dict[str, Any] | None:
-        """The record of a history whose files are whole, else None."""
-        base, record = self.folder / HISTORIES, self.get_record(HISTORIES, name) or {}
-        files = record.pop("files", None)
-        if not isinstance(files, dict) or not {TABLE} <= files.keys() <= SUFFIXES:
-            return None
-        try:
-            whole = all(
-                _hash(reading.read_bytes(reading.within(base, f"{name}{suffix}"))) == expected
-                for suffix, expected in files.items()
-            )
-        except InputError:
-            return None
-        return record if whole else None
-
-    def put_record(self, kind: str, name: str, content: Mapping[str, Any]) -> None:
-        """Keep a result that is one record, such as a cell's figures."""
-        text = json.dumps(
-            {"content": content, "sha256": _seal(name, content)},
-            sort_keys=True,
-            separators=(",", ":"),
-        )
-        writing.write_whole(self.folder / kind / f"{name}.json", text + "\n")
-
-    def get_record(self, kind: str, name: str) -> dict[str, Any] | None:
-        """The content of a result that is one record; None where it is missing or damaged."""
+    def get(self, kind: str, name: str) -> dict[str, Any] | None:
+        """The record of a result; None where it, or one of its files, is missing or damaged."""
         try:
             path = reading.within(self.folder, kind, f"{name}.json")
             found = reading.read_json(path)
-            content, seal = found["content"], found["sha256"]
-            whole = isinstance(content, dict) and seal == _seal(name, content)
-        except (InputError, KeyError, TypeError, ValueError, RecursionError):
+            content, sealed = found["content"], found["sha256"] == _seal(name, found["content"])
+            files = content.pop("files", {})
+            whole = (
+                sealed
+                and (kind != HISTORIES or TABLE in files)
+                and files.keys() <= SUFFIXES
+                and all(
+                    _hash(reading.read_bytes(reading.within(path.parent, f"{name}{suffix}")))
+                    == expected
+                    for suffix, expected in files.items()
+                )
+            )
+        except (InputError, AttributeError, KeyError, TypeError, ValueError, RecursionError):
             return None
         if whole:
             with contextlib.suppress(OSError):  # a read-only store can still be read
@@ -146,9 +135,9 @@ class Store:
         """The kept value of type `form`; computed and kept where it is missing or invalid."""
         adapter: TypeAdapter[T] = TypeAdapter(form)
         with contextlib.suppress(KeyError, TypeError, ValueError):
-            return adapter.validate_python((self.get_record(kind, name) or {})["kept"])
+            return adapter.validate_python((self.get(kind, name) or {})["kept"])
         found = compute()
-        self.put_record(kind, name, {"kept": adapter.dump_python(found, mode="json")})
+        self.put(kind, name, {"kept": adapter.dump_python(found, mode="json")})
         return found
 
     def prune(self, now: float = 0.0) -> None:

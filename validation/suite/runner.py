@@ -427,7 +427,7 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> Any:
         """The kept record of a batch, or of a cell whose history is whole; else None."""
-        found = store.get_record(COMPARISONS, task.name) if task.ensemble else store.get(task.name)
+        found = store.get(COMPARISONS if task.ensemble else HISTORIES, task.name)
         # a kept record may lack fields that it must have
         with suppress(ValueError):
             self.ended[task] = task.record(found or {})
@@ -443,10 +443,10 @@ class SuiteStudy(Study):
         if record.traceback:  # some scenes of a batch failed: not to be read back
             self.traces.add(task)
         elif task.ensemble is None:
-            self.store.put(task.name, record.files, record.record, record.history)
+            self.store.put(HISTORIES, task.name, record.record, record.files, record.history)
             self._compare(task.place)
         else:
-            self.store.put_record(COMPARISONS, task.name, record.record)
+            self.store.put(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
         cells, found = self.planned[scene], dict[str, results.Cell]()

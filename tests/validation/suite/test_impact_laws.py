@@ -140,7 +140,7 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file, tmp_path
             "rockcheck.validation.discrepancy.impact_laws.parting_landing", lambda scene: None
         )
         assert runner.landing_of(store, scene) == first
-    store.put_record(COMPARISONS, kept.stem, {"kept": {"t": 1.0}})
+    store.put(COMPARISONS, kept.stem, {"kept": {"t": 1.0}})
     assert runner.landing_of(store, scene) == first
 
 

@@ -61,7 +61,7 @@ def plain(run):
 
 def sealed(path, content):
     """Replace a record by another one with its right hash."""
-    Store(path.parent.parent).put_record(path.parent.name, path.stem, content)
+    Store(path.parent.parent).put(path.parent.name, path.stem, content)
 
 
 DAMAGE = {
@@ -120,7 +120,7 @@ def test_a_record_that_is_a_pipe_is_not_waited_for(tmp_path, run):
     for path in stored(tmp_path):
         path.unlink()
         os.mkfifo(path)
-        assert Store(tmp_path / "out").get_record(path.parent.name, path.stem) is None
+        assert Store(tmp_path / "out").get(path.parent.name, path.stem) is None
         path.unlink()
     assert plain(run()) == before
 
