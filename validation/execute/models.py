@@ -248,14 +248,16 @@ class Work:
 class Played:
     """The result of a worker: the record, and the history's files by suffix.
 
-    `history` is the content of the files, None for a batch and for a user-defined model, which may
-    return anything. `traceback` is that of an exception in a scene of a batch.
+    `read_back`: it was not played, but kept by an earlier run. `history` is the content of the
+    files, None for a batch and for a user-defined model, which may return anything. `traceback` is
+    that of an exception in a scene of a batch.
     """
 
-    record: dict[str, Any]
+    record: Any
     files: dict[str, bytes] = field(default_factory=dict, repr=False)
     history: History | None = field(default=None, repr=False)
     traceback: str = ""
+    read_back: bool = False
 
 
 def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:

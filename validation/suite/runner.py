@@ -9,7 +9,7 @@ import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
 from operator import attrgetter
@@ -75,12 +75,13 @@ class Planned(Task):
             played = models.play_batch(
                 self.variant, [self.ensemble.drawn(self.scene, n) for n in self.numbers]
             )
-        self.record(played.record)  # a user-defined model's history may say nonsense
-        return played
+        # a user-defined model's history may say nonsense
+        return replace(played, record=self.kept[1](**played.record))
 
-    def record(self, given: Mapping[str, Any]) -> "CellRecord | BatchRecord":
-        """The record of what was played or kept; raises `InputError` where it is none."""
-        return BatchRecord(**given) if self.ensemble else CellRecord(**given)
+    @property
+    def kept(self) -> tuple[str, Any]:
+        """The kind of its result in the store, and the type of its record."""
+        return (COMPARISONS, BatchRecord) if self.ensemble else (HISTORIES, CellRecord)
 
 
 class CellRecord(Stored):
@@ -355,16 +356,13 @@ class SuiteStudy(Study):
             for found in by_model.values()
             for item in found
         ]
-        #: The record of each that has ended, or why it has none.
+        #: What each that has ended gave, without files, or why it gave nothing.
         self.ended: dict[Planned, Any] = {
             item: pool.Failure(missing)
             for item in self.items
             if (missing := models.not_installed(item.variant.family))
         }
         self.playable = [item for item in self.items if item not in self.ended]
-        self.read_back: set[Planned] = set()
-        #: Batches of which some scenes failed without a result.
-        self.traces: set[Planned] = set()
         self.compared: dict[str, list[results.Cell]] = {}
 
     def _planned(
@@ -427,11 +425,10 @@ class SuiteStudy(Study):
 
     def find(self, store: Store, task: Any) -> Any:
         """The kept record of a batch, or of a cell whose history is whole; else None."""
-        found = store.get(COMPARISONS if task.ensemble else HISTORIES, task.name)
-        # a kept record may lack fields that it must have
-        with suppress(ValueError):
-            self.ended[task] = task.record(found or {})
-            self.read_back.add(task)
+        kind, form = task.kept
+        with suppress(ValueError):  # a kept record may lack fields that it must have
+            found = form(**(store.get(kind, task.name) or {}))
+            self.ended[task] = models.Played(found, read_back=True)
         return self.ended.get(task)
 
     def keep(self, store: Store, task: Any, record: models.Played) -> None:
@@ -439,14 +436,12 @@ class SuiteStudy(Study):
 
         So scenes are compared while others are still played.
         """
-        self.ended[task] = task.record(record.record)
-        if record.traceback:  # some scenes of a batch failed: not to be read back
-            self.traces.add(task)
-        elif task.ensemble is None:
-            self.store.put(HISTORIES, task.name, record.record, record.files, record.history)
+        self.ended[task] = replace(record, files={}, history=None)
+        if not record.traceback:  # else some scenes of a batch failed: not to be read back
+            content = record.record.model_dump(mode="json")
+            self.store.put(task.kept[0], task.name, content, record.files, record.history)
+        if task.ensemble is None:
             self._compare(task.place)
-        else:
-            self.store.put(COMPARISONS, task.name, record.record)
 
     def _compare(self, scene: str) -> None:
         cells, found = self.planned[scene], dict[str, results.Cell]()
@@ -532,11 +527,7 @@ class SuiteStudy(Study):
         status = "failed" if reason else "done"
         if missing := models.not_installed(variant.family):
             status = "absent" if models.class_of(variant.family).has_wheel() else "unavailable"
-        traced = [
-            f"{FAULTS}/{part.name}.txt"
-            for part in parts
-            if part in self.traces or getattr(self.ended[part], "traceback", None)
-        ]
+        traced = [f"{FAULTS}/{part.name}.txt" for part in parts if self.ended[part].traceback]
         return {
             "scene": first.place,
             "model": variant.label,
@@ -546,17 +537,17 @@ class SuiteStudy(Study):
             else first.key,
             "status": status,
             "reason": missing or reason,
-            "read_back": all(part in self.read_back for part in parts),
+            "read_back": all(getattr(self.ended[part], "read_back", False) for part in parts),
             "traceback": traced[0] if traced else "",
             # in a user's own model an exception is that model's fault, not rockcheck's
             "unexpected": bool(traced) and not models.is_own(variant.family),
         }
 
     def _cell(self, parts: Sequence[Planned], reference: results.Cell | None) -> results.Cell:
-        (planned,), record = parts, self.ended[parts[0]]
-        if isinstance(record, pool.Failure):
-            return results.Cell(**self._about(parts, record.reason))
-        scene, own = planned.scene, self.own[planned.place]
+        (planned,), played = parts, self.ended[parts[0]]
+        if isinstance(played, pool.Failure):
+            return results.Cell(**self._about(parts, played.reason))
+        record, scene, own = played.record, planned.scene, self.own[planned.place]
         required = own.required(scene.name, planned.model)
         found = self._compared(planned, required)
         floor = partial(tolerances.floor_of, scene=scene, numerical=record.numerical)
@@ -668,7 +659,8 @@ class SuiteStudy(Study):
         """
         own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
         scatters = {
-            one.model: self.ended[self.planned[scene][one.model][0]].uncertainty for one in done
+            one.model: self.ended[self.planned[scene][one.model][0]].record.uncertainty
+            for one in done
         }
         for cell in self.compared[scene]:
             against = {own.given.reference, own.given.model_form} - {cell.model}
@@ -696,11 +688,14 @@ class SuiteStudy(Study):
     def _batch(self, planned: Planned) -> BatchRecord:
         """The record of a batch; of one that failed, each scene has its reason."""
         found, count = self.ended[planned], len(planned.numbers)
-        if isinstance(found, pool.Failure):
-            found = BatchRecord(
+        record: BatchRecord = (
+            BatchRecord(
                 peaks=(None,) * count, outcomes=(found.reason,) * count, cost=results.CostRecord()
             )
-        return found
+            if isinstance(found, pool.Failure)
+            else found.record
+        )
+        return record
 
     def _ensemble_cell(
         self,
