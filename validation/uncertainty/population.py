@@ -8,7 +8,7 @@ number matters most.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -32,20 +32,12 @@ NO_FIT = math.nan, math.nan
 class Runs(Stored):
     """Runs of scenes by one model, one value a run.
 
-    `side` is -1 overturned left, +1 right, 0 neither. The other fields of a `failed` run mean
-    nothing. `figures` by name: peak_rotation (alpha).
+    `side` is -1 overturned left, +1 right, 0 neither; of a run that failed it means nothing.
+    `peaks` are rotations, alpha: infinite of a block that overturned, NaN where the run failed.
     """
 
     side: tuple[int, ...]
-    failed: tuple[bool, ...]
-    figures: Mapping[str, tuple[float, ...]]
-
-    @property
-    def peaks(self) -> Floats:
-        """Peak rotations, alpha: infinite of a block that overturned, NaN where the run failed."""
-        return np.where(
-            self.failed, np.nan, np.where(self.side, np.inf, self.figures["peak_rotation"])
-        )
+    peaks: tuple[float, ...]
 
 
 def play(scenes: Sequence[Scene], model: EventBasedModel) -> Runs:
@@ -58,11 +50,8 @@ def play(scenes: Sequence[Scene], model: EventBasedModel) -> Runs:
 
     found = run_decided(pack(scenes, model), model, jobs=1)
     rotations = found.peak / np.array([scene.block.alpha for scene in scenes])
-    return Runs(
-        side=found.side.tolist(),
-        failed=found.failed.tolist(),
-        figures={"peak_rotation": rotations.tolist()},
-    )
+    peaks = np.where(found.failed, np.nan, np.where(found.side, np.inf, rotations))
+    return Runs(side=found.side.tolist(), peaks=peaks.tolist())
 
 
 @dataclass(frozen=True)
