@@ -109,7 +109,7 @@ class SceneView(View):
             {
                 "label": q.label,
                 "unit": q.unit,
-                "by_model": {model: getattr(one, q.name) for model, one in motions.items()},
+                "by_model": {model: one[q.name] for model, one in motions.items()},
             }
             for q in QUANTITIES[1:]
         ]

@@ -12,7 +12,7 @@ from rockcheck.reports.style import save_as
 from rockcheck.scenes import History, InputError, Scene, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
 from rockcheck.validation.discrepancy import figures, measured, measures
-from rockcheck.validation.discrepancy.compare import motion_of
+from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.suite import across, results
 
@@ -106,7 +106,11 @@ def _finding(
     blocks: list[Block] = [
         Text(headline),
         Text(
-            facts=[(role, ", ".join(one.words())) for role, one in motions.items() if one.words()]
+            facts=[
+                (role, ", ".join(words))
+                for role, one in motions.items()
+                if (words := motion_words(one))
+            ]
         ),
         Text(f"{models}, {found.start:g} to {found.end:g} s"),
         Table(
@@ -138,7 +142,7 @@ def _finding(
             "shift": shift,
             "gap": found.gap,
             "headline": headline,
-            "motion": {role: motion.model_dump() for role, motion in motions.items()},
+            "motion": motions,
             "notes": {role: history.notes for role, history in histories.items()},
             "figures": [
                 {"measure": f.measure, "value": f.value, "unit": f.unit, "note": f.note}

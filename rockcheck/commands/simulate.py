@@ -31,7 +31,7 @@ from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history import check_format
 from rockcheck.scenes.progress import LISTENER, ONE_RUN, announcing, within
-from rockcheck.validation.discrepancy.compare import motion_of
+from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.execute import models, pool, store
 from rockcheck.validation.finding import Column, Finding, Table, Text, text
 
@@ -148,7 +148,7 @@ def run(
         ) from None
     motion = motion_of(history, what)
     console().print(
-        f"{title}: {', '.join([history.fate, *motion.words()])},"
+        f"{title}: {', '.join([history.fate, *motion_words(motion)])},"
         f" simulated in {history.cost.wall_seconds:.2g} s"
     )
     notes = Text(items=[f"note: {note}" for note in history.notes], verdict="changed")
@@ -161,8 +161,8 @@ def run(
             "scene": what.name,
             "model": model,
             "outcome": history.outcome,
-            "peak_rotation_alpha": motion.peak_rotation,
-            "motion": motion.model_dump(),
+            "peak_rotation_alpha": motion["peak_rotation"],
+            "motion": motion,
             "overturned_at_s": history.overturned_at,
             "wall_seconds": history.cost.wall_seconds,
             "rules": dict(history.cost.rules),

@@ -19,7 +19,6 @@ from rockcheck.validation.discrepancy.figures import (
     Figure,
     Measure,
     Pair,
-    Stored,
     Unavailable,
     WindowedHistory,
 )
@@ -241,30 +240,12 @@ QUANTITIES = (
 )
 
 
-class Motion(Stored):
-    """How far a block moves; None where unknown and, except `wall_speed`, for a fallen block.
+def motion_of(history: History, scene: Scene | None = None) -> dict[str, float | None]:
+    """How far a block moves: the four figures of a history, by their names.
 
-    `peak_rotation` over alpha; `slip` and `top_displacement` in m, the largest along the floor and
-    of a top corner from where it began; `wall_speed` in m/s, the largest with which the block
-    struck a wall, None where it struck none.
+    None where unknown and, except `wall_speed`, for a fallen block; `wall_speed` is None where the
+    block struck no wall. `scene` gives the walls, and the block where the file has none.
     """
-
-    peak_rotation: float | None
-    slip: float | None
-    top_displacement: float | None
-    wall_speed: float | None
-
-    def words(self) -> list[str]:
-        """The known figures, with their units."""
-        return [
-            f"{q.label} {value:.4g} {q.unit}"
-            for q in QUANTITIES
-            if (value := getattr(self, q.name)) is not None
-        ]
-
-
-def motion_of(history: History, scene: Scene | None = None) -> Motion:
-    """The figures of a history; `scene` gives the walls, and the block where the file has none."""
     block, channels = scene.block if scene else history.block, history.channels
     theta = np.asarray(channels["theta"], dtype=float)
     stands = not history.outcome.startswith("overturned")
@@ -274,12 +255,18 @@ def motion_of(history: History, scene: Scene | None = None) -> Motion:
         if "x" in channels:
             places = kinematics.top_corners(block, np.asarray(channels["x"], dtype=float), theta)
             top = float(np.max(np.abs(places - places[:, :1])))
-    return Motion(
-        peak_rotation=peak,
-        slip=largest_slip(history) if stands and "slip" in channels else None,
-        top_displacement=top,
-        wall_speed=max(wall_speeds(history, scene), default=None) if scene else None,
-    )
+    return {
+        "peak_rotation": peak,
+        "slip": largest_slip(history) if stands and "slip" in channels else None,
+        "top_displacement": top,
+        "wall_speed": max(wall_speeds(history, scene), default=None) if scene else None,
+    }
+
+
+def motion_words(motion: Mapping[str, float | None]) -> list[str]:
+    """The known figures of how far a block moves, with their units."""
+    values = ((q, motion[q.name]) for q in QUANTITIES)
+    return [f"{q.label} {value:.4g} {q.unit}" for q, value in values if value is not None]
 
 
 def largest_slip(history: History) -> float:

@@ -7,7 +7,6 @@ import pytest
 
 from rockcheck import load_scene
 from rockcheck.scenes import files
-from rockcheck.validation.discrepancy.compare import Motion
 from rockcheck.validation.finding import Mark, Text
 from rockcheck.validation.studies.population.answers import Assessment, Found, finding_of
 from rockcheck.validation.studies.population.runs import LAW, Played, Ran, Sure
@@ -16,7 +15,7 @@ from rockcheck.validation.uncertainty import numerical
 
 def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
     figures = {"peak_rotation": peak, "slip": slip, "top_displacement": top, "wall_speed": speed}
-    return Ran(outcome=outcome, motion=Motion(**figures), slid=slip or 0.0, **more)
+    return Ran(outcome=outcome, motion=figures, slid=slip or 0.0, **more)
 
 
 def sure(u_num, **more):

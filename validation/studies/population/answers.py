@@ -128,7 +128,7 @@ class Found:
             q.name: [
                 (value, case)
                 for case, run in self.each
-                if not run.fell and (value := getattr(run.motion, q.name, None)) is not None
+                if not run.fell and (value := run.motion.get(q.name)) is not None
             ]
             for q in QUANTITIES
         }
@@ -358,7 +358,7 @@ def gaps_of(found: Found) -> dict[str, Any]:
     """
     rows: list[dict[str, Any]] = []
     for gap, runs in found.at_gaps.items():
-        speeds = [v for run in runs if (v := getattr(run.motion, "wall_speed", None)) is not None]
+        speeds = [v for run in runs if (v := run.motion.get("wall_speed")) is not None]
         speed = spread(speeds)
         rows.append(
             {
@@ -816,7 +816,7 @@ def _runs(found: Found) -> Iterator[Block]:
             [
                 Mark(case, link=file_of(case) if played.history else ""),
                 played.runs[0].outcome or "failed",
-                *(getattr(played.runs[0].motion, q.name, None) for q in QUANTITIES),
+                *(played.runs[0].motion.get(q.name) for q in QUANTITIES),
             ]
             for case, played in found.shown.items()
         ],

@@ -31,7 +31,7 @@ from rockcheck.scenes import (
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy import figures, impact_laws
-from rockcheck.validation.discrepancy.compare import Motion, largest_reach, largest_slip, motion_of
+from rockcheck.validation.discrepancy.compare import largest_reach, largest_slip, motion_of
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.finding import (
     Axis,
@@ -469,7 +469,7 @@ class Ran(figures.Stored):
     """
 
     outcome: str
-    motion: Motion | None = None
+    motion: Mapping[str, float | None] = Field(default_factory=dict)
     slid: float = 0.0
     reach: Mapping[Side, float] = Field(default_factory=dict)
     reason: str = ""
@@ -482,7 +482,7 @@ class Ran(figures.Stored):
     @property
     def peak(self) -> float:
         """Peak rotation, alpha; 1, the balance point, where the block fell."""
-        turned = self.motion.peak_rotation if self.motion else None
+        turned = self.motion.get("peak_rotation")
         return 1.0 if turned is None else min(turned, 1.0)
 
     @property
