@@ -75,14 +75,11 @@ class Store:
         files: Mapping[str, bytes] = MappingProxyType({}),
         history: History | None = None,
     ) -> None:
-        """Keep a result: its files by suffix (".csv.gz", ".events.csv.gz"), if any, and its record.
+        """Keep a result: its record, and its files by suffix (".csv.gz", ".events.csv.gz"), if any.
 
+        All of them are new, or all are as they were.
         `history` is the content of the files; if given, it stays in memory.
         """
-        base = self.folder / kind
-        writing.write_together(
-            {base / f"{name}{suffix}": content for suffix, content in files.items()}
-        )
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
         record = {**content, "files": hashes} if files else content
         text = json.dumps(
@@ -90,7 +87,10 @@ class Store:
             sort_keys=True,
             separators=(",", ":"),
         )
-        writing.write_whole(base / f"{name}.json", text + "\n")
+        whole = {**files, ".json": f"{text}\n".encode()}
+        writing.write_together(
+            {self.folder / kind / f"{name}{at}": one for at, one in whole.items()}
+        )
         if history is not None:
             self._recent.append((name, history))
 
