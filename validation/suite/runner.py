@@ -347,15 +347,9 @@ class SuiteStudy(Study):
         self.memory_mb = max((part.given.limits.memory_mb for part in suite.parts), default=None)
         #: By scene or ensemble, and by model: the cell, or the batches of it.
         self.planned: dict[str, dict[str, list[Planned]]] = {}
-        for scene, variant, ensemble in suite.cells():
-            found = list(self._planned(scene, variant, ensemble))
-            self.planned.setdefault(found[0].place, {})[variant.label] = found
-        self.items = [
-            item
-            for by_model in self.planned.values()
-            for found in by_model.values()
-            for item in found
-        ]
+        self.items = [item for cell in suite.cells() for item in self._planned(*cell)]
+        for item in self.items:
+            self.planned.setdefault(item.place, {}).setdefault(item.model, []).append(item)
         #: What each that has ended gave, without files, or why it gave nothing.
         self.ended: dict[Planned, Any] = {
             item: pool.Failure(missing)
