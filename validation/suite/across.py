@@ -18,7 +18,8 @@ import re
 import shutil
 import subprocess
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal
 
@@ -47,6 +48,8 @@ from rockcheck.validation.suite import results, tolerances
 ROUNDING = 1e-9
 #: Most moved figures that the changes between two runs list.
 MOST_MOVED = 20
+#: What each cell tells: that it is there.
+THERE: Mapping[Any, str] = {("cell", ""): "there"}
 #: Environment variables in which continuous integration gives its commit.
 COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
 
@@ -82,20 +85,14 @@ def changes(before: results.Run, after: results.Run) -> list[Change]:
         raise InputError(
             f"the runs are of two suites, {printable(before.suite)} and {printable(after.suite)}"
         )
-    found = (
-        [Change(what="verdict", before=before.words, after=after.words)]
-        if before.words != after.words
-        else []
+    old, new = (  # by scene and model; the run's own verdict first
+        {("", ""): {("verdict", ""): run.words}}
+        | {(cell.scene, cell.model): _told(cell) for cell in run.cells}
+        for run in (before, after)
     )
-    old, new = ({(cell.scene, cell.model): cell for cell in run.cells} for run in (before, after))
-    for place in old | new:
-        if place in old and place in new:
-            found += _of_cell(old[place], new[place])
-        else:
-            was, now = ("there", None) if place in old else (None, "there")
-            found.append(Change(scene=place[0], model=place[1], what="cell", before=was, after=now))
+    every = (_changed(at, old.get(at, {}), new.get(at, {})) for at in old | new)
     order = ("verdict", "cell", "outcome", "figure")
-    return sorted(found, key=lambda change: (order.index(change.what), -change.size))
+    return sorted(chain(*every), key=lambda change: (order.index(change.what), -change.size))
 
 
 def difference(before: results.Run, after: results.Run) -> Finding:
@@ -141,27 +138,25 @@ def difference(before: results.Run, after: results.Run) -> Finding:
     )
 
 
-def _of_cell(old: results.Cell, new: results.Cell) -> Iterator[Change]:
-    place = {"scene": old.scene, "model": old.model}
-    said: list[dict[tuple[Any, str], str]] = [
-        {("verdict", ""): cell.words, ("outcome", ""): cell.fate}
+def _told(cell: results.Cell) -> dict[tuple[Any, str], Any]:
+    """What a cell's run told, by its kind and name; not the peak of a block that fell."""
+    return (
+        {**THERE, ("verdict", ""): cell.words, ("outcome", ""): cell.fate}
         | {("verdict", check.figure.title): check.words for check in cell.checks}
-        for cell in (old, new)
-    ]
-    for what, name in said[0] | said[1]:
-        was, now = (one.get((what, name)) for one in said)
-        if was != now:
-            yield Change(**place, what=what, name=name, before=was, after=now)
-    figures = {figure.title: figure for figure in new.figures}
-    for figure in old.figures:
-        other = figures.get(figure.title)
-        if (
-            other
-            and not (figure.of_a_fall or other.of_a_fall)
-            and _moved(figure.measure, figure.value, other.value)
-        ):
+        | {("figure", one.title): one.value for one in cell.figures if not one.of_a_fall}
+    )
+
+
+def _changed(
+    place: tuple[str, str], was: Mapping[Any, Any], now: Mapping[Any, Any]
+) -> Iterator[Change]:
+    """What a place tells otherwise in two runs; of one that only one of them has, that alone."""
+    shared = was.keys() & now.keys()
+    for key in {**was, **now} if shared else THERE:
+        (what, name), one, other = key, was.get(key), now.get(key)
+        if one != other if what != "figure" else key in shared and _moved(name, one, other):
             yield Change(
-                **place, what="figure", name=other.title, before=figure.value, after=other.value
+                scene=place[0], model=place[1], what=what, name=name, before=one, after=other
             )
 
 
