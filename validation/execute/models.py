@@ -275,7 +275,6 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
             )
         except (ModelFailure, InputError) as error:
             found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
-    cost = {key: value for key, value in vars(history.cost).items() if value is not None}
     return Played(
         {
             "outcome": history.outcome,
@@ -287,8 +286,8 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
                 for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
             },
             "uncertainty": dict(history.uncertainty),
-            "numerical": found and found.model_dump(mode="json"),
-            "cost": {**cost, "worker_seconds": time.perf_counter() - began},
+            "numerical": found,
+            "cost": {**vars(history.cost), "worker_seconds": time.perf_counter() - began},
         },
         history.packed(),
         None if is_own(work.family) else history,
