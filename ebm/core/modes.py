@@ -55,19 +55,11 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
 
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
-_FLAT_TRIES = 4
-
-
-# The numbers of the candidates to try, by the walls that a tilted block touches: row 0 is none, 1
-# the tip wall, 2 the far wall, 3 both; the last row is a flat block's. Behind them stands -1.
-_WALLS = _CANDIDATES[1]["tip"] + 2 * _CANDIDATES[1]["far"]
-_TILTS = (_CANDIDATES[1]["family"] == Family.TILT) & (_CANDIDATES[1]["sense"] > 0)
-_TRIES = np.full((_FLAT_TRIES + 1, len(_WALLS) + 1), -1, dtype=np.int8)
-_TRIES[_FLAT_TRIES, :-1] = range(len(_WALLS))
-for _touched in range(_FLAT_TRIES):
-    # The first tilted one is a flat block's only.
-    _found = np.flatnonzero(_TILTS & (_WALLS & ~_touched == 0))[1:]
-    _TRIES[_touched, : len(_found)] = _found
+# The numbers of the candidates to try: of an upright block all, of one that tips those of its side.
+# The first one that tilts is an upright block's only.
+_ALL = np.arange(_CANDIDATES.shape[1])
+_TILTS = np.flatnonzero((_CANDIDATES[1]["family"] == Family.TILT) & (_CANDIDATES[1]["sense"] > 0))
+_OF_A_SIDE = _TILTS[1:]
 
 
 @inner_kernel
@@ -249,8 +241,8 @@ def _clean(block, motion, floor):
 #: What a selection begins with: the side to which the block would rather tip (0: either) and the
 #: side that is tried first; whether the block touches the floor, and its slip velocity; the walls
 #: that it touches, as bits: flat (left and right), as it tips to the first side, and to the other;
-#: and the row of `_TRIES`.
-_Touching = namedtuple("_Touching", "favoured first floor v upright_walls near away tries")
+#: and the numbers of the candidates to try.
+_Touching = namedtuple("_Touching", "favoured first floor v upright_walls near away numbers")
 
 
 @inner_kernel
@@ -263,10 +255,10 @@ def _touching(block, base, state):
     first = side or 1
     near = touched_walls(block, motion, first, False)
     if lean != 0.0:
-        return _Touching(side, first, floor, v, 0, near, 0, near)
+        return _Touching(side, first, floor, v, 0, near, 0, _OF_A_SIDE)
     walls = touched_walls(block, motion, 1, True)
     away = touched_walls(block, motion, -first, False)
-    return _Touching(side, first, floor, v, walls, near, away, _FLAT_TRIES)
+    return _Touching(side, first, floor, v, walls, near, away, _ALL)
 
 
 @called_kernel
@@ -308,9 +300,8 @@ def _least_wrong(block, base, run, at, trial):
     been tried at this instant.
     """
     least, chosen = np.inf, -1
-    for place in range(_TRIES.shape[1]):
-        number = _TRIES[at.tries, place]
-        if number < 0 or least == 0.0:
+    for number in at.numbers:
+        if least == 0.0:
             break
         if _comes_up(block, run.state, at, number, trial == 2):
             wrong = wrong_by(block, base, run, trial > 0)
