@@ -58,12 +58,8 @@ _TRIALS = np.array(
 _BITS, _FREE = _TRIALS["bits"], _TRIALS["friction"] == Friction.FREE
 _ON_FLOOR = _BITS & (1 << Contact.FOOT | 1 << Contact.OTHER) != 0
 _LARGEST_FIRST = np.flatnonzero(_FREE)[np.argsort(-_TRIALS["count"][_FREE], kind="stable")]
-# By the contacts that take part, as bits: the trials of no others, with friction where the floor is
-# among them, by their numbers; and then -1.
-_WITHIN = np.full((1 << CONTACTS, len(_TRIALS) + 1), -1, dtype=np.int16)
-for _bits in range(1 << CONTACTS):
-    _inside = np.flatnonzero((_BITS & ~_bits == 0) & (_ON_FLOOR != _FREE))
-    _WITHIN[_bits, : len(_inside)] = _inside
+# What a stage tries: with friction where the floor is among the contacts.
+_STRIKING = np.flatnonzero(_ON_FLOOR != _FREE)
 # The horizontal part of each contact's row (see `contact_rows`).
 _ALONG = np.array([0.0, 0.0, 1.0, 1.0, -1.0, -1.0, 1.0])
 # Rounding of a velocity, of the velocities at play; rows of contacts that are nearer to parallel
@@ -248,12 +244,9 @@ def _strike(block, impact):
     (Painleve), the one that contradicts it least is taken, and the result is False.
     """
     least, lowest = np.inf, np.inf
-    bits = _bits_of(impact.taking)
-    for place in range(_WITHIN.shape[1]):
-        number = _WITHIN[bits, place]
-        if number < 0:
-            break
-        if not _try(block, impact, number):
+    others = ~_bits_of(impact.taking)
+    for number in _STRIKING:
+        if _TRIALS[number].bits & others != 0 or not _try(block, impact, number):
             continue
         scale = _size(impact.v) + _size(impact.trial) + _size(impact.lam)
         wrong = _violation(block, impact, number, ROUNDING * scale)
