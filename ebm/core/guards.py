@@ -56,8 +56,8 @@ _MOST = max(map(len, GUARDS.values())) - 2
 _COMBINES = np.array(
     [[*GUARDS[which][2:], *[Row.GUARD] * _MOST][:_MOST] for which in range(len(GUARDS))]
 )
-# The columns of the table: the weight of each series, a constant, and whether there is the guard.
-_CONSTANT, _THERE = Row.GUARD + 1, Row.GUARD + 2
+# The columns of the table: the weight of each series, and a constant.
+_CONSTANT = Row.GUARD + 1
 #: A force is the second derivative of a truncated series: its zero is found to rounding from nearby
 #: only, within this share of a step.
 _NEARBY = 0.25
@@ -72,21 +72,20 @@ def _enter(a, which, constant, *weights):
     row = Row.TABLE + which
     for k in range(_MOST):
         a[row, _COMBINES[which, k]] = weights[k] if k < len(weights) else 0.0
-    a[row, _CONSTANT], a[row, _THERE] = constant, 1.0
+    a[row, _CONSTANT], a[Row.THERE, which] = constant, 1.0
 
 
 @inner_kernel
 def drop(a, which):
     """Removes a guard from the table."""
-    a[Row.TABLE + which, _THERE] = 0.0
+    a[Row.THERE, which] = 0.0
 
 
 @inner_kernel
 def fill_guards(block, state, a):
     """Writes the guards of the mode into the table."""
     mode = state.mode
-    for which in range(len(KIND)):
-        drop(a, which)
+    a[Row.THERE, :] = 0.0
     if block.walls:
         _fill_gap(block, state, a, True)
         _fill_gap(block, state, a, False)
@@ -262,7 +261,7 @@ def starts_positive(which, ahead, a):
     A guard that the mode does not have needs no proof: True.
     """
     row = Row.TABLE + which
-    if a[row, _THERE] == 0.0:
+    if a[Row.THERE, which] == 0.0:
         return True
     if KIND[which] == Kind.RATE:
         return False
@@ -284,7 +283,7 @@ def _stays_positive(which, order, until, slack, a):
     It starts higher than it falls.
     """
     row = Row.TABLE + which
-    if a[row, _THERE] == 0.0:
+    if a[Row.THERE, which] == 0.0:
         return True
     if KIND[which] == Kind.RATE:
         return False

@@ -66,8 +66,10 @@ Row = _rows(
         # The last angle whose sine and cosine were taken, and these: the end of a step is the start
         # of the next one.
         "ANGLE": 1,
-        # The guards of the mode: the weights of the series in each (see ebm.core.guards).
+        # The guards of the mode: the weights of the series in each (see ebm.core.guards), and which
+        # there are.
         "TABLE": len(Guard) - 1,
+        "THERE": 1,
         # Bouc-Wen friction: the square of z, the slip velocity, the friction of z's later terms.
         "Z2": 1,
         "V": 1,

@@ -147,7 +147,7 @@ class Core:
         found = {
             name: Polynomial(a[Row.GUARD, : guards.guard(which, order, a) + 1].copy())
             for name, which in GUARDS.items()
-            if a[Row.TABLE + which, guards._THERE]
+            if a[Row.THERE, which]
         }
         rock = mode.floor == "stick" and not mode.tip and not mode.far
         places = {"xi": Row.SIN, "y": Row.COS} if rock else {"xi": Row.XI, "y": Row.Y}
