@@ -255,28 +255,6 @@ def seen(kind, smooth):
 
 
 @inner_kernel
-def starts_positive(which, ahead, a):
-    """A cheap proof, without writing the guard, that it leaves zero upward within `ahead`.
-
-    A guard that the mode does not have needs no proof: True.
-    """
-    row = Row.TABLE + which
-    if a[Row.THERE, which] == 0.0:
-        return True
-    if KIND[which] == Kind.RATE:
-        return False
-    terms = _coefficients(which, 0, a)
-    later = lanes.shifted(terms)
-    floor = (
-        max(series.NOISE[KIND[which]], contacts.CLOSED)
-        if Guard.LANDING <= which <= Guard.FAR_GAP
-        else series.NOISE[KIND[which]]
-    )
-    begin, half_bend = lanes.first(terms) + a[row, _CONSTANT], lanes.first(lanes.shifted(later))
-    return series.leads_up(begin, lanes.first(later), half_bend, floor, ahead)
-
-
-@inner_kernel
 def _stays_positive(which, order, until, slack, a):
     """A cheap proof, without writing the guard, that it is positive up to a time.
 

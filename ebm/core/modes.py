@@ -105,8 +105,8 @@ def wrong_by(block, base, run, measured):
     smooth = ground.smooth_until(base, t) - t
     worst = 0.0
     for which in range(len(guards.KIND)):
-        ahead = guards.seen(guards.KIND[which], smooth)
-        if not guards.starts_positive(which, ahead, a):
+        if a[Row.THERE, which] != 0.0:
+            ahead = guards.seen(guards.KIND[which], smooth)
             worst = max(worst, _guard_wrong_by(state, which, order, ahead, a, measured))
             if worst == np.inf:
                 break

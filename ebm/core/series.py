@@ -184,16 +184,6 @@ def leading(a, row, n, floor, ahead):
 
 
 @inner_kernel
-def leads_up(begin, rate, half_bend, floor, ahead):
-    """Whether the first three coefficients show that c leaves tau = 0 upward.
-
-    As `leading`, where c is positive beyond all noise.
-    """
-    noise = _ERROR * max(begin, ahead * abs(rate), ahead * ahead * abs(half_bend))
-    return max(floor, noise) < begin < math.inf
-
-
-@inner_kernel
 def _order_of_zero(a, row, n, floor, ahead):
     """The index of the first coefficient of c that counts; n + 1 where there is none.
 

@@ -194,14 +194,6 @@ def test_what_is_noise_at_first_may_grow(noise):
     )
 
 
-@pytest.mark.parametrize(("share", "leads"), [(0.99, True), (1.01, False)])
-@pytest.mark.parametrize("ahead", [0.1, 10.0])
-def test_a_start_leads_up_where_it_is_beyond_the_noise_of_the_next_terms(ahead, share, leads):
-    rate, bend = share / (NOISES[0] * ahead), share / (NOISES[0] * ahead**2)
-    terms = ((rate, 0.0, 0.0), (0.0, -bend, 0.0), (0.0, 0.0, share))
-    assert [series.leads_up(1.0, *one, ahead) for one in terms] == [leads] * 3
-
-
 @pytest.mark.parametrize("seed", range(40))
 def test_what_stays_below_a_level_is_below_it(seed):
     r = np.random.default_rng(seed)
