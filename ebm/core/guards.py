@@ -86,9 +86,8 @@ def fill_guards(block, state, a):
     """Writes the guards of the mode into the table."""
     mode = state.mode
     a[Row.THERE, :] = 0.0
-    if block.walls:
-        _fill_gap(block, state, a, True)
-        _fill_gap(block, state, a, False)
+    _fill_gap(block, state, a, True)
+    _fill_gap(block, state, a, False)
     if mode.family == Family.FLAT:
         _fill_flat(block, state, a)
         return
@@ -337,12 +336,11 @@ def rock_guards_hold(block, run):
     order, h, a = run.state.order, run.state.length, run.a
     if a[Row.PHI, 0] > 0.5:
         return False
-    if block.walls:
-        for which in (Guard.TIP_GAP, Guard.FAR_GAP):
-            drop(a, which)
-            _fill_gap(block, run.state, a, which == Guard.TIP_GAP)
-            if not _stays_positive(which, order, h, 1.0, a):
-                return False
+    for which in (Guard.TIP_GAP, Guard.FAR_GAP):
+        drop(a, which)
+        _fill_gap(block, run.state, a, which == Guard.TIP_GAP)
+        if not _stays_positive(which, order, h, 1.0, a):
+            return False
     if block.no_slip and not block.unilateral:
         return True
     mu, share = (1.0, 0.0) if block.no_slip else (block.mu_s, 1.0)

@@ -211,8 +211,6 @@ def touched_walls(block, motion, sense, flat):
     As it tips to `sense`, the tip wall and the far one; of a flat block with sense 1 the left and
     the right wall.
     """
-    if not block.walls:
-        return 0
     return (1 if contacts.closed_wall(block, motion, sense, False) else 0) + (
         2 if contacts.closed_wall(block, motion, -sense, not flat) else 0
     )
