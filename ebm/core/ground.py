@@ -10,6 +10,7 @@ import numpy as np
 
 from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
+from rockcheck.ebm.core.series import RECIPROCAL
 from rockcheck.scenes import Floats, Record, Rest, Ricker, Sine
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -50,7 +51,6 @@ _SAME, _EPSILON = 2.0**-30, 2.0**-52
 _SOME = 30
 #: The sign with which an acceleration leaves zero is read this much later.
 _SOON = 1e-6
-_RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, 40)])
 
 
 def ground_of(
@@ -129,7 +129,7 @@ def _fill_gaussian(g, t, sign, n, a, row):
     fall = spread * tau
     for k in range(n + 1):
         a[row, k] = q0 * bell + q1 * e1 + q2 * e2 + q3 * e3
-        r = _RECIPROCAL[k + 1]
+        r = RECIPROCAL[k + 1]
         # Two operations from one coefficient to the next.
         bell, e1, e2, e3 = (fall * r) * bell + (spread * r) * e1, bell, e1, e2
 

@@ -33,11 +33,9 @@ from rockcheck.ebm.core.block import side_of, wall_corner, wall_turn
 from rockcheck.ebm.core.ground import fill_series
 from rockcheck.ebm.core.lanes import LANES, first, load, put, ramp, shifted, store, zeros
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Row, Shape
-from rockcheck.ebm.core.series import NOISE, WIDTH, product, slope, value
+from rockcheck.ebm.core.series import NOISE, RECIPROCAL, product, slope, value
 from rockcheck.ebm.core.state import on_wall, rocks
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
-
-RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, WIDTH + 2)])
 
 
 @inner_kernel

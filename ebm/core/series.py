@@ -22,6 +22,8 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 ORDER = 2 * lanes.LANES - 1
 #: Width of the rows that hold a polynomial, and behind it what else is kept with it.
 WIDTH = 32
+#: 1/k.
+RECIPROCAL = np.array([np.inf] + [1.0 / k for k in range(1, WIDTH + 2)])
 #: Natural time at which the first coefficients of a guard are compared.
 AHEAD = 2e-2
 #: Error bounds of a position, a velocity and a force: a coefficient below its bound is rounding.
