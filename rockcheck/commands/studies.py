@@ -327,15 +327,18 @@ def spectrum(
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
     request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
-        if name != "ebm":
-            raise errors.InputError(
-                "cannot be given together with --model: all are compared", "--agreement"
-            )
-        if not 2 <= agreement <= grid.size**2:
-            raise errors.InputError(
+        errors.refuse(
+            (
+                name != "ebm",
+                "cannot be given together with --model: all are compared",
+                "--agreement",
+            ),
+            (
+                not 2 <= agreement <= grid.size**2,
                 f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes",
                 "--agreement",
-            )
+            ),
+        )
         tell_missing()
     studied(Spectra(panels, request, agreement or 0), played)
 

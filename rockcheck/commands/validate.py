@@ -30,7 +30,7 @@ from rockcheck.commands import (
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.scenes import InputError, printable
+from rockcheck.scenes import InputError, errors, printable
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import across, results, runner, suites, tables
 
@@ -116,11 +116,11 @@ def run(
     rockcheck itself.
     """
     asked = _scene if suites.is_scene(what) else _suite
-    for option, given in (("--strict", strict), ("--history", history)):
-        if given and asked is _scene:
-            raise InputError(
-                f"{printable(what)} is a scene, and nothing of it is judged: give a suite", option
-            )
+    said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
+    errors.refuse(
+        (strict and asked is _scene, said, "--strict"),
+        (history and asked is _scene, said, "--history"),
+    )
     if history is not None:
         check_file(history, "--history", across.recall)
     suite, folder = asked(what, of_scene, played.out, allow_code or ())
@@ -164,9 +164,10 @@ def run(
 def _suite(
     name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
 ) -> tuple[suites.Suite, Path]:
-    for option, given in vars(of_scene).items():
-        if given and given != ALL:
-            raise InputError("is for a scene: a suite says which models play what", f"--{option}")
+    said = "is for a scene: a suite says which models play what"
+    errors.refuse(
+        *((given and given != ALL, said, f"--{option}") for option, given in vars(of_scene).items())
+    )
     folder = usable_folder(out)
     suite = suites.load_suite(name or "paper", allow_code=allow_code)
     tell_left_out(suite.left_out)

@@ -126,12 +126,16 @@ def written(folder: Path) -> Player:
     """A folder with a CSV for each scene, and an `engine.toml` that says whose they are."""
     allowed = {"engine": str, "version": str, "settings": str, "step": float, "lacks": list}
     about = {"engine": ""} | files.read_toml(folder / ABOUT)
-    for key, value in about.items():
-        if not isinstance(value, allowed.get(key, ())) or (key == "engine" and not value):
-            raise errors.InputError(
+    errors.refuse(
+        *(
+            (
+                not isinstance(value, allowed.get(key, ())) or (key == "engine" and not value),
                 f"{printable(repr(value))} is not allowed; allowed: {', '.join(allowed)}",
                 f"{printable(folder / ABOUT)}: {printable(key)}",
             )
+            for key, value in about.items()
+        )
+    )
     return Player(
         about["engine"],
         about.get("settings") or AS_IT_COMES,

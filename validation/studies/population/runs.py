@@ -388,15 +388,21 @@ def ida(
     an unknown measure, fewer than two motions, or one without motion.
     """
     label, unit, of = measure_of(measure)
-    if len(motions) < FEWEST:
-        raise InputError(f"{len(motions)} is too few: give at least {FEWEST} records", "records")
     sized = [
         (name, Record.from_samples(one.samples, one.time_step), float(of(one, scene)))
         for name, one in motions
     ]
-    for name, _, own in sized:
-        if own <= 0.0:
-            raise InputError(f"{name}: a record without motion has no intensity", "records")
+    errors.refuse(
+        (
+            len(motions) < FEWEST,
+            f"{len(motions)} is too few: give at least {FEWEST} records",
+            "records",
+        ),
+        *(
+            (own <= 0.0, f"{name}: a record without motion has no intensity", "records")
+            for name, _, own in sized
+        ),
+    )
     return Population(
         cases={"": scene},
         motions=sized,
