@@ -19,8 +19,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
-from rockcheck.reports.drawers import figure_of, live_data, side_by_side
-from rockcheck.reports.show.spectrum import write_scripts
+from rockcheck.reports.drawers import figure_of, live_data, side_by_side, write_scripts
 from rockcheck.reports.show.words import (
     duration,
     moment,

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel, overturning_spectrum
 from rockcheck.engines import MuJoCo, PyBullet
+from rockcheck.reports.drawers import draw_spectrum
 from rockcheck.reports.show.drawing import draw_block
-from rockcheck.reports.show.spectrum import draw
 from rockcheck.reports.style import PAGE, STYLE, looks, save_as
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height
@@ -185,7 +185,7 @@ def spectra() -> Figure:
     axes = figure.subplots(1, 2, sharey=True)
     grid = np.linspace(0.5, 8.0, 120), np.linspace(1.0, 12.0, 120)
     for ax, gap in zip(axes, (None, 0.053), strict=True):
-        draw(overturning_spectrum(bookcase(gap), *grid), ax)
+        draw_spectrum(overturning_spectrum(bookcase(gap), *grid), ax)
         ax.set_title("no wall" if gap is None else f"left wall at {1e3 * gap:g} mm, e = 0.5")
     axes[1].set_ylabel("")
     return figure

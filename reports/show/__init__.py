@@ -14,5 +14,5 @@ VIEWS = {
     ),
     History: View(html=words.history_html, figure=f"{__name__}.drawing:history_figure"),
     Discrepancy: View(html=words.discrepancy_html, figure=f"{__name__}.drawing:discrepancy_figure"),
-    Spectrum: View(html=words.spectrum_html, figure=f"{__name__}.spectrum:spectrum_figure"),
+    Spectrum: View(html=words.spectrum_html, figure=f"{__name__}.drawing:spectrum_figure"),
 }

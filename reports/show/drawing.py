@@ -1,4 +1,4 @@
-"""Figures of scenes, histories, comparisons and recordings, as `.plot()` returns them.
+"""Figures of scenes, histories, comparisons, spectra and recordings, as `.plot()` returns them.
 
 Import this module only to draw: it imports matplotlib, which takes a second.
 """
@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
+from rockcheck.ebm import Spectrum
+from rockcheck.reports.drawers import draw_spectrum
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
@@ -168,4 +170,11 @@ def recordings_figure(recordings: list[tuple[str, Recording]]) -> Figure:
             axes.set_ylabel(label, fontsize=7)
             axes.set_xlabel(below, fontsize=7)
             axes.tick_params(labelsize=7)
+    return figure
+
+
+def spectrum_figure(spectrum: Spectrum) -> Figure:
+    """One overturning spectrum as a figure."""
+    figure = NotebookFigure(figsize=(4.5, 3.6), layout="constrained")
+    draw_spectrum(spectrum, figure.subplots())
     return figure

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.reports.document import FIGURES, belongings, publish
-from rockcheck.reports.drawers import figure_of
-from rockcheck.reports.show.spectrum import COLOURS, LAW_MARK, OWN_MARK, draw
+from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, OWN_MARK, draw_spectrum, figure_of
 from rockcheck.scenes import reading
 from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
 from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
@@ -54,12 +53,12 @@ def test_the_papers_colours(panel, overturned):
         model=None,
     )
     axes = Figure().subplots()
-    draw(spectrum, axes)
+    draw_spectrum(spectrum, axes)
     (mesh,) = axes.collections
     axes.figure.draw_without_rendering()
     colours = mesh.get_facecolor().reshape(SIZE, SIZE, 4)[[0, 7, 11], 0]
     np.testing.assert_allclose(
-        colours, [to_rgba(COLOURS[name]) for name in ("safe", overturned, "counterclockwise")]
+        colours, [to_rgba(OUTCOMES[name]) for name in ("safe", overturned, "counterclockwise")]
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
-from rockcheck.reports.show.spectrum import COLOURS
+from rockcheck.reports.drawers import OUTCOMES
 from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import (
     Axis,
@@ -216,8 +216,11 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(visit):
         });
     }"""
     free = page.evaluate(colours, [0, [[3, 9], [9, 9], [0, 0]]])
-    assert free == [COLOURS["safe"], COLOURS["clockwise"], COLOURS["undecided"]]
-    assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [COLOURS["safe"], COLOURS["overturned"]]
+    assert free == [OUTCOMES["safe"], OUTCOMES["clockwise"], OUTCOMES["undecided"]]
+    assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [
+        OUTCOMES["safe"],
+        OUTCOMES["overturned"],
+    ]
 
 
 def test_a_node_is_named_in_every_panel_and_keys_do_what_the_mouse_does(visit):
