@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
-from rockcheck.reports.drawers import figure_of, live_data, side_by_side, write_scripts
+from rockcheck.reports import drawers, style
 from rockcheck.reports.show.words import (
     duration,
     moment,
@@ -27,15 +27,6 @@ from rockcheck.reports.show.words import (
     readable,
     unit,
     window,
-)
-from rockcheck.reports.style import (
-    BY_KEY,
-    LOOKS,
-    label_of,
-    looks,
-    save_as,
-    stamp_in,
-    stamp_of,
 )
 from rockcheck.scenes import InputError, errors, printable, reading, writing
 from rockcheck.validation.execute.pool import Call, Pool
@@ -79,7 +70,7 @@ def _words(mark: Mark, column: Column, write: Callable[[float, int], str]) -> st
         case _, value if value is None or value != value:  # NaN
             said = ""
         case "model", value:
-            said = label_of(str(value))
+            said = style.label_of(str(value))
         case _, bool(value):
             said = "yes" if value else "no"
         case "used", int(value) | float(value) if value > 1.0:
@@ -169,11 +160,11 @@ def block_markdown(block: Table | Plot | Text) -> str:
 
 
 def _draw(plot: Plot, path: Path, stamp: str) -> None:
-    save_as(figure_of(plot), path, stamp=stamp, named=False)
+    style.save_as(drawers.figure_of(plot), path, stamp=stamp, named=False)
 
 
 def _draw_again(data: Path, path: Path) -> None:
-    save_as(figure_of(PLOT.validate_python(reading.read_json(data))), path)
+    style.save_as(drawers.figure_of(PLOT.validate_python(reading.read_json(data))), path)
 
 
 def write_figure(folder: Path, name: str, path: Path) -> Path:
@@ -211,8 +202,8 @@ def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
     for data in (folder / FIGURES).glob("*.json"):
         svg = data.with_suffix(".svg")
         if data.stem not in drawn and (
-            stamp_in(svg).split()[:1]
-            == stamp_of(reading.head_of(data, reading.MOST_BYTES)).split()[:1]
+            style.stamp_in(svg).split()[:1]
+            == style.stamp_of(reading.head_of(data, reading.MOST_BYTES)).split()[:1]
         ):
             yield from (data, svg)
 
@@ -241,12 +232,12 @@ def publish(found: Finding, folder: Path) -> Path:
         drawn = replace(plot, played=None)
         data, path = writing.json_text(asdict(drawn)), figures / f"{plot.name}.svg"
         writing.write_whole(path.with_suffix(".json"), data)
-        stamp = stamp_of(data)
-        if stamp_in(path) != stamp:
+        stamp = style.stamp_of(data)
+        if style.stamp_in(path) != stamp:
             calls.append(Call(_draw, (drawn, path, stamp)))
-    list(side_by_side(calls))
+    list(drawers.side_by_side(calls))
     write_assets(folder)
-    if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
+    if live := [drawers.live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
         writing.write_whole(
             folder / "curves.js",
             writing.script_text("window.rockcheckCurves", writing.finite(live)),
@@ -267,9 +258,9 @@ def publish(found: Finding, folder: Path) -> Path:
             script
             for plot in plots
             if plot.live and plot.kind == "spectra"
-            for script in write_scripts(plot, figures)
+            for script in drawers.write_scripts(plot, figures)
         ),
-        looks=looks(LOOKS),
+        looks=style.looks(style.LOOKS),
         row_cells=row_cells,
         formats=(),
     )
@@ -312,7 +303,7 @@ def belongings(page: Path) -> set[str]:
 
     No other file is taken for one, whatever is linked by a page that somebody sent.
     """
-    if not stamp_in(page):
+    if not style.stamp_in(page):
         return set()
     names = re.findall(
         r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*)"',
@@ -340,6 +331,6 @@ def write_assets(folder: Path) -> None:
         target / "models.css",
         "".join(
             f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"
-            for look in BY_KEY.values()
+            for look in style.BY_KEY.values()
         ),
     )

@@ -14,8 +14,7 @@ import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, new_figure, power_of_ten
-from rockcheck.scenes import writing
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS
+from rockcheck.scenes import recordings, writing
 from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Axis, Panel, Plot
 
@@ -316,7 +315,7 @@ def _places(
 def _units(axes: Any, data: Any) -> None:
     """Add axes with the frequency (Hz) and the peak acceleration (g) of the pulses."""
     hertz = 1.0 / data["pulse"]["period"][0] / data["frequencies"][0]
-    g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / GRAVITY_OF_RECORDS
+    g = data["pulse"]["amplitude"][0] / data["amplitudes"][0] / recordings.GRAVITY_OF_RECORDS
     axes.secondary_xaxis(
         "top",
         functions=(lambda x: x * hertz, lambda x: x / hertz),

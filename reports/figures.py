@@ -32,8 +32,7 @@ from rockcheck.reports.view import (
     View,
     slugs_of,
 )
-from rockcheck.scenes import Scene
-from rockcheck.scenes.excitations import GRAVITY_OF_RECORDS
+from rockcheck.scenes import Scene, excitations
 from rockcheck.validation.discrepancy import figures, measures
 from rockcheck.validation.finding import (
     Axis,
@@ -104,7 +103,9 @@ def histories_figure(view: SceneView, against: str | None = None) -> Figure:
         figure.subplots_adjust(
             0.95 / PAGE, bottom / height, 1.0 - 0.08 / PAGE, 1.0 - top / height, hspace=space / 0.7
         )
-        axes[0].plot(view.t, view.ground / GRAVITY_OF_RECORDS, color="#666666", linewidth=0.5)
+        axes[0].plot(
+            view.t, view.ground / excitations.GRAVITY_OF_RECORDS, color="#666666", linewidth=0.5
+        )
         axes[0].set_ylabel("base\n(g)")
         panels = iter(axes[1:])
         for channel in PAPER_CHANNELS:
@@ -202,7 +203,7 @@ def payload(view: SceneView) -> dict[str, Any]:
         "duration": float(view.t[-1]),
         "step": scene.output_step * view.stride,
         "rows": len(view.t),
-        "ground": line(view.ground / GRAVITY_OF_RECORDS),
+        "ground": line(view.ground / excitations.GRAVITY_OF_RECORDS),
         "alpha": scene.block.alpha,
         "frequencyParameter": scene.frequency_parameter,
         "block": [scene.block.half_width, scene.block.half_height],

@@ -15,27 +15,8 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from rockcheck.reports import tables
-from rockcheck.reports.document import (
-    FIGURES,
-    PAGES,
-    belongings,
-    csv,
-    remove,
-    row_cells,
-    write_assets,
-    write_page,
-)
-from rockcheck.reports.drawers import figure_of, side_by_side
-from rockcheck.reports.figures import (
-    EnsembleView,
-    histories_figure,
-    payload,
-    summary,
-    thumbnail,
-)
+from rockcheck.reports import document, drawers, figures, style, tables
 from rockcheck.reports.show.words import scene_facts
-from rockcheck.reports.style import looks, save, save_as, stamp_in, stamp_of
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import (
     Record,
@@ -113,7 +94,7 @@ def keep(run: results.Run, folder: Path) -> Path:
     """
     with _turn(folder):
         for table in files_of(run):
-            writing.write_whole(folder / f"{table.name}.csv", csv(table))
+            writing.write_whole(folder / f"{table.name}.csv", document.csv(table))
         writing.write_whole(folder / "junit.xml", junit(run))
         writing.write_whole(folder / "summary.md", markdown(run))
         return run.save(folder)
@@ -126,13 +107,13 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     reference. Raises `InputError` for what the run does not have.
     """
     view = _Pages(folder, (name,)).views[name]
-    if not (view.curves if isinstance(view, EnsembleView) else view.histories):
+    if not (view.curves if isinstance(view, figures.EnsembleView) else view.histories):
         raise errors.InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
-    if isinstance(view, EnsembleView):
-        return save_as(figure_of(view.distributions()), path)
-    return save_as(histories_figure(view), path)
+    if isinstance(view, figures.EnsembleView):
+        return style.save_as(drawers.figure_of(view.distributions()), path)
+    return style.save_as(figures.histories_figure(view), path)
 
 
 def write_site(
@@ -154,12 +135,12 @@ def write_site(
     """
     with _turn(folder):
         pages = _Pages(folder, wanted)
-        write_assets(folder)
+        document.write_assets(folder)
         stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
         waiting = {
             name: stamp
             for name, stamp in stamps.items()
-            if afresh or stamp_in(folder / pages.links[name]) != stamp
+            if afresh or style.stamp_in(folder / pages.links[name]) != stamp
         }
         few = sum(PRINTED if pages.views[name].printed else 1 for name in waiting) < FEW
         calls = [
@@ -168,7 +149,7 @@ def write_site(
             else pool.Call(_write_page, (folder, pages.wanted, *one))
             for one in (*waiting.items(), ("", ""))
         ]
-        written = side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
+        written = drawers.side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
         for done, _ in enumerate(written, 1):
             on_progress(done, len(calls))
         _remove(folder, {INDEX, *pages.links.values()})
@@ -183,9 +164,9 @@ def remove_site(folder: Path) -> None:
 
 def _remove(folder: Path, kept: Collection[str] = ()) -> None:
     """Remove pages with their figures and data, by their stamps; addresses that are `kept` stay."""
-    for page in (folder / INDEX, *(folder / PAGES).glob("*.html")):
-        if page.relative_to(folder).as_posix() not in kept and stamp_in(page):
-            remove(page.parent, [page.name, *belongings(page)])
+    for page in (folder / INDEX, *(folder / document.PAGES).glob("*.html")):
+        if page.relative_to(folder).as_posix() not in kept and style.stamp_in(page):
+            document.remove(page.parent, [page.name, *document.belongings(page)])
 
 
 class _Pages:
@@ -203,11 +184,12 @@ class _Pages:
             raise errors.unknown_name("scene of the run", unknown[0], slugs)
         self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
-            EnsembleView(self.run, one.name, slugs[one.name], one) for one in self.run.ensembles
+            figures.EnsembleView(self.run, one.name, slugs[one.name], one)
+            for one in self.run.ensembles
         ]
-        found: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
+        found: list[SceneView | figures.EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in found}
-        self.links = {view.name: f"{PAGES}/{view.slug}.html" for view in found}
+        self.links = {view.name: f"{document.PAGES}/{view.slug}.html" for view in found}
         #: What every page shows, and calls.
         self.common: dict[str, Any] = {
             "site": {
@@ -218,28 +200,30 @@ class _Pages:
                 ],
             },
             "run": self.run,
-            "looks": looks(self.run.models),
+            "looks": style.looks(self.run.models),
             "channels": CHANNELS,
             "SEVERITY": results.SEVERITY,
             "VERDICTS": tables.VERDICTS,
             "tables": tables,
-            "row_cells": row_cells,
+            "row_cells": document.row_cells,
         }
 
     def write(self, name: str, stamp: str) -> None:
         """Write figures and data, and last the page, with its `stamp`; without a name the index."""
         view, address = self.views.get(name), self.links.get(name, INDEX)
         page = self.folder / address
-        before = belongings(page)
+        before = document.belongings(page)
         match view:
             case SceneView():
                 template, shown = "scene.html", self._write_scene(view)
-            case EnsembleView():
+            case figures.EnsembleView():
                 template, shown = "finding.html", self._write_ensemble(view)
             case None:
                 template, shown = "index.html", self._write_index()
-        write_page(self.folder, address, template, view=view, stamp=stamp, **shown, **self.common)
-        remove(page.parent, before - belongings(page))
+        document.write_page(
+            self.folder, address, template, view=view, stamp=stamp, **shown, **self.common
+        )
+        document.remove(page.parent, before - document.belongings(page))
 
     def _write_scene(self, view: SceneView) -> dict[str, Any]:
         """Write a scene's figures and data; returns what its page shows beside the view.
@@ -247,60 +231,63 @@ class _Pages:
         The figures are a thumbnail of all rotations, and where the run asks for them those for a
         paper, one a reference.
         """
-        figures = writing.made(self.folder, PAGES, FIGURES)
+        drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
-        save_as(thumbnail(curves), figures / f"{view.slug}-small.svg", named=False)
+        style.save_as(figures.thumbnail(curves), drawn / f"{view.slug}-small.svg", named=False)
         slugs = slugs_of([str(against) for against in view.figure_references])
         stems = {
             against: f"{view.slug}-against-{slugs[str(against)]}" if number else view.slug
             for number, against in enumerate(view.figure_references)
         }
         for against, stem in stems.items() if view.printed else ():
-            save(histories_figure(view, against), figures / stem)
+            style.save(figures.histories_figure(view, against), drawn / stem)
         writing.write_whole(
-            writing.made(self.folder, PAGES, "data") / f"{view.slug}.js",
-            writing.script_text("window.rockcheck", payload(view)),
+            writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js",
+            writing.script_text("window.rockcheck", figures.payload(view)),
         )
         beside = [None, *self.scenes, None]
         place = beside.index(view)
         return {
             "files": write_scene_file(
-                view.scene, writing.made(self.folder, PAGES, "scene-files"), view.slug
+                view.scene, writing.made(self.folder, document.PAGES, "scene-files"), view.slug
             ),
             "previous": beside[place - 1],
             "following": beside[place + 1],
             "facts": scene_facts(view.scene),
             "beyond": experience.outside(view.scene),
-            "summary": summary(view),
+            "summary": figures.summary(view),
             "stems": stems,
         }
 
-    def _write_ensemble(self, view: EnsembleView) -> dict[str, Any]:
+    def _write_ensemble(self, view: figures.EnsembleView) -> dict[str, Any]:
         """Write an ensemble's figures and tables; returns what its page shows beside the view."""
-        page, figures = view.page(), writing.made(self.folder, PAGES, FIGURES)
+        page, drawn = view.page(), writing.made(self.folder, document.PAGES, document.FIGURES)
         curves = [
             (*view.curves[model], look)
             for model, look in view.looks.items()
             if model in view.curves
         ]
-        save_as(thumbnail(curves, step=True), figures / f"{view.slug}-small.svg", named=False)
+        style.save_as(
+            figures.thumbnail(curves, step=True), drawn / f"{view.slug}-small.svg", named=False
+        )
         for plot in page.plots():
-            save(figure_of(plot), figures / plot.name)
+            style.save(drawers.figure_of(plot), drawn / plot.name)
         for table in page.tables():
             *parts, name = table.name.split("/")
             writing.write_whole(
-                writing.made(self.folder, PAGES, *parts) / f"{name}.csv", csv(table)
+                writing.made(self.folder, document.PAGES, *parts) / f"{name}.csv",
+                document.csv(table),
             )
         return {"found": page}
 
     def _write_index(self) -> dict[str, Any]:
         """Write the figures of the index; returns what it shows."""
-        figures = writing.made(self.folder, PAGES, FIGURES)
+        drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
         blocks, matrix = tables.accuracy(self.run), tables.matrix(self.run)
         for plot in (block for block in blocks if isinstance(block, Plot)):
-            save(figure_of(plot), figures / plot.name)
+            style.save(drawers.figure_of(plot), drawn / plot.name)
         return {
             "scenes": self.scenes,
             "ensembles": self.ensembles,
@@ -316,15 +303,15 @@ class _Pages:
             "glance": tables.glance(self.run, matrix),
         }
 
-    def stamp(self, view: SceneView | EnsembleView) -> str:
+    def stamp(self, view: SceneView | figures.EnsembleView) -> str:
         """The stamp of a page (`stamp_of`), for all that it shows.
 
         When the run was, and what was read back, does not count.
         """
-        return stamp_of(
+        return style.stamp_of(
             {
                 "what": view.record.model_dump(mode="json")
-                if isinstance(view, EnsembleView)
+                if isinstance(view, figures.EnsembleView)
                 else [self.run.scenes[view.name], view.stride, view.printed],
                 "cells": [
                     cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells

@@ -14,8 +14,7 @@ import numpy as np
 from rockcheck.reports.style import Look, looks
 from rockcheck.scenes import Floats, History, InputError, Scene, kinematics, reading
 from rockcheck.scenes.history import COLUMNS, events_path
-from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.discrepancy.compare import QUANTITIES, motion_of
+from rockcheck.validation.discrepancy import compare, figures
 from rockcheck.validation.suite import results
 
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
@@ -104,14 +103,16 @@ class SceneView(View):
     @cached_property
     def moved(self) -> list[dict[str, Any]]:
         """Slip, top displacement, speed at the wall by model: (label, unit, values) where known."""
-        motions = {model: motion_of(one, self.scene) for model, one in self.histories.items()}
+        motions = {
+            model: compare.motion_of(one, self.scene) for model, one in self.histories.items()
+        }
         rows: list[dict[str, Any]] = [
             {
                 "label": q.label,
                 "unit": q.unit,
                 "by_model": {model: one[q.name] for model, one in motions.items()},
             }
-            for q in QUANTITIES[1:]
+            for q in compare.QUANTITIES[1:]
         ]
         return [row for row in rows if any(v is not None for v in row["by_model"].values())]
 

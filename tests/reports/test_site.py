@@ -11,10 +11,11 @@ import pandas as pd
 import pytest
 
 from rockcheck.commands import OUT, studies
+from rockcheck.reports.document import PAGES
 from rockcheck.reports.drawers import GREY, colours
 from rockcheck.reports.figures import EnsembleView
 from rockcheck.reports.show.words import duration, number
-from rockcheck.reports.site import PAGES, STUDIES, write_site
+from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History

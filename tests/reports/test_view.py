@@ -11,9 +11,10 @@ import pytest
 from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
+from rockcheck.reports.document import PAGES
 from rockcheck.reports.figures import histories_figure
 from rockcheck.reports.show.words import number, ratio, readable
-from rockcheck.reports.site import PAGES, write_scene_file
+from rockcheck.reports.site import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import (
     accuracy,

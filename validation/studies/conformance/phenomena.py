@@ -23,8 +23,8 @@ from rockcheck.scenes import (
     Scene,
     Sine,
     Wall,
+    kinematics,
 )
-from rockcheck.scenes.kinematics import energy
 from rockcheck.validation.criteria import (
     newmark_slip,
     overturning_velocity,
@@ -243,7 +243,7 @@ def energy_gained(m: Motion) -> float:
     """
     rates = [np.diff(channel) / np.diff(m.t) for channel in (m.x, m.y, m.theta)]
     y, theta = (0.5 * (channel[1:] + channel[:-1]) for channel in (m.y, m.theta))
-    total = energy(TUMBLE.block, G, y, theta, *rates)
+    total = kinematics.energy(TUMBLE.block, G, y, theta, *rates)
     return float(np.max(total - np.minimum.accumulate(total)) / total[0])
 
 

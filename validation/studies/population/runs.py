@@ -26,12 +26,11 @@ from rockcheck.scenes import (
     Wall,
     errors,
     files,
+    recordings,
     writing,
 )
-from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation.criteria import CRITERIA, base_of
-from rockcheck.validation.discrepancy import figures, impact_laws
-from rockcheck.validation.discrepancy.compare import largest_reach, largest_slip, motion_of
+from rockcheck.validation.discrepancy import compare, figures, impact_laws
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.finding import (
     Axis,
@@ -48,7 +47,7 @@ from rockcheck.validation.study import Study, Task
 from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
 
-Motions = Sequence[tuple[str, Recording]]
+Motions = Sequence[tuple[str, recordings.Recording]]
 #: The event-based model that plays populations, draws and gaps.
 SWIFT = "ebm-unilateral"
 #: Usual time of a run, s, of compiled models and of others; total time up to which separate
@@ -335,11 +334,11 @@ def lines_of(
     ]
 
 
-Measure = tuple[str, str, Callable[[Recording, Scene], float]]
+Measure = tuple[str, str, Callable[[recordings.Recording, Scene], float]]
 #: Measures of intensity: label, unit, and value of a record for a scene.
 MEASURES: Mapping[str, Measure] = {
-    "pga": ("PGA", "g", lambda record, scene: intensity.peak_acceleration(record)),
-    "pgv": ("PGV", "m/s", lambda record, scene: intensity.peak_velocity(record)),
+    "pga": ("PGA", "g", lambda record, scene: recordings.intensity.peak_acceleration(record)),
+    "pgv": ("PGV", "m/s", lambda record, scene: recordings.intensity.peak_velocity(record)),
     "pga-ratio": (
         "PGA/(g tan α)",
         "",
@@ -349,7 +348,7 @@ MEASURES: Mapping[str, Measure] = {
         "p PGV/(g tan α)",
         "",
         lambda record, scene: (
-            intensity.peak_velocity(record)
+            recordings.intensity.peak_velocity(record)
             * scene.frequency_parameter
             / (scene.gravity * scene.block.slope)
         ),
@@ -364,7 +363,7 @@ def measure_of(word: str) -> Measure:
         return (
             f"Sa({at:g} s), 5 %",
             "g",
-            lambda r, scene: intensity.spectral_acceleration(r, at),
+            lambda r, scene: recordings.intensity.spectral_acceleration(r, at),
         )
     if word not in MEASURES:
         raise InputError(
@@ -437,7 +436,7 @@ def fragility(
         raise InputError("are needed: the scene's excitation is no pulse", "records")
     unit = scene.frequency_parameter / (2.0 * math.pi)
     free = {"without a wall": scene.replace(walls=())}
-    in_g = slope / GRAVITY_OF_RECORDS
+    in_g = slope / recordings.GRAVITY_OF_RECORDS
     return Population(
         cases={"with the wall": scene, **free} if scene.walls else free,
         motions=[
@@ -562,9 +561,9 @@ def _ran(scene: Scene, numbers: Numbers, model: Any) -> tuple[Ran, History | Non
         return Ran(outcome="", reason=str(failure)), None
     return Ran(
         outcome=history.outcome,
-        motion=motion_of(history, scene),
-        slid=largest_slip(history),
-        reach={side: largest_reach(history, scene, side) for side in get_args(Side)},
+        motion=compare.motion_of(history, scene),
+        slid=compare.largest_slip(history),
+        reach={side: compare.largest_reach(history, scene, side) for side in get_args(Side)},
     ), history
 
 

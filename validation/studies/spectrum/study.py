@@ -32,7 +32,6 @@ from rockcheck.validation.paper import (
     paper_panels,
 )
 from rockcheck.validation.studies.spectrum import tiles
-from rockcheck.validation.studies.spectrum.tiles import Book, Request, letters_of
 from rockcheck.validation.study import Study
 
 Indices = NDArray[np.int64]
@@ -77,7 +76,7 @@ class Spectra(Study):
     """
 
     panels: tuple[Panel, ...]
-    request: Request = field(default_factory=Request)
+    request: tiles.Request = field(default_factory=tiles.Request)
     compared: int = 0
     name = "spectrum"
     record = tiles.Played
@@ -89,13 +88,13 @@ class Spectra(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
         """The nodes that are still to be played."""
-        book = Book(done)
+        book = tiles.Book(done)
         self._found(book)
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The complete spectra, and the findings from them."""
-        by_panel, motions, paper, compared = self._found(Book(done))
+        by_panel, motions, paper, compared = self._found(tiles.Book(done))
         panels, spectra = list(by_panel), list(by_panel.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
         answer = (
@@ -145,7 +144,7 @@ class Spectra(Study):
         return panel.name + ("" if self.request.model == "ebm" else f"--{self.request.model}")
 
     def _found(
-        self, book: Book
+        self, book: tiles.Book
     ) -> tuple[
         dict[Panel, Spectrum], dict[Panel, tiles.Played], measures.Paper | None, Agreement | None
     ]:
@@ -172,7 +171,7 @@ class Spectra(Study):
             agree(book, spectra, self.request, self.compared) if whole and self.compared else None,
         )
 
-    def _spectrum(self, book: Book, panel: Panel) -> Spectrum | None:
+    def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
         request, walls = self.request, panel.scene.walls
         player = models.build(request.model, request.settings)
@@ -201,7 +200,7 @@ class Spectra(Study):
             scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings, what
         )
 
-    def _paper(self, book: Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
         scanned = {
             measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
                 one.scene,
@@ -331,7 +330,7 @@ class Spectra(Study):
         return {
             "title": panel.title,
             "free": wall is None,
-            "outcomes": "".join(letters_of(one.outcomes, one.undecided).ravel()),
+            "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
             "law": [] if one.depends_on_law is None else one.depends_on_law.tolist(),
             "place": place,
             "nodes": [
@@ -400,7 +399,7 @@ def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.i
     """
     near = vary(spectrum.outcomes, 2 * NEAR + 1)
     random = np.random.default_rng(zlib.crc32(name.encode()))
-    decided = letters_of(spectrum.outcomes, spectrum.undecided) != tiles.UNDECIDED
+    decided = tiles.letters_of(spectrum.outcomes, spectrum.undecided) != tiles.UNDECIDED
     inside, outside = np.argwhere(near & decided), np.argwhere(~near & decided)
     wanted = max(min(count // 2, len(inside)), min(count - len(outside), len(inside)))
     return [
@@ -409,7 +408,7 @@ def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.i
     ]
 
 
-def plays(request: Request, panel: Panel) -> bool:
+def plays(request: tiles.Request, panel: Panel) -> bool:
     """Whether the model can play the contacts of the panel.
 
     An engine without restitution does not play walls or a floor that bounce.
@@ -420,7 +419,7 @@ def plays(request: Request, panel: Panel) -> bool:
 
 
 def agree(
-    book: Book, spectra: Mapping[Panel, Spectrum], request: Request, count: int
+    book: tiles.Book, spectra: Mapping[Panel, Spectrum], request: tiles.Request, count: int
 ) -> Agreement | None:
     """Equal outcomes of the other models at nodes of each spectrum, and their maps.
 
@@ -470,7 +469,7 @@ def agree(
 
 
 def _shares(
-    book: Book, panel: Panel, spectrum: Spectrum, others: Sequence[Request], count: int
+    book: tiles.Book, panel: Panel, spectrum: Spectrum, others: Sequence[tiles.Request], count: int
 ) -> Iterator[dict[str, Any]]:
     chosen = choose_nodes(spectrum, count, panel.name)
     sides = {"ebm": [spectrum.outcomes[tuple(part.T)] for part in chosen]}
@@ -514,7 +513,7 @@ def mapped(panels: Sequence[Panel]) -> list[Panel]:
 
 
 def _maps(
-    book: Book, panels: Sequence[Panel], requests: Mapping[str, Request]
+    book: tiles.Book, panels: Sequence[Panel], requests: Mapping[str, tiles.Request]
 ) -> Iterator[dict[str, Any]]:
     chosen = mapped(panels)
     drawn = {
@@ -523,7 +522,7 @@ def _maps(
     if book.wanted:
         return
     letters = {
-        model: np.array([letters_of(one.outcomes, one.undecided) for one in some if one])
+        model: np.array([tiles.letters_of(one.outcomes, one.undecided) for one in some if one])
         for model, some in drawn.items()
     }
     for model, mine in letters.items():

@@ -26,21 +26,6 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.work_precision import runs, timings
-from rockcheck.validation.studies.work_precision.runs import (
-    FAMILIES,
-    LEVEL,
-    LINES,
-    MEMBERS,
-    QUICK,
-    QUICK_MEMBERS,
-    QUICK_WALLS,
-    REFERENCES,
-    WALLS,
-    BenchmarkRun,
-    DiagramLine,
-    Play,
-    prepared,
-)
 from rockcheck.validation.study import Study, Task
 
 What = Literal["all", "ebm", "models", "skipping", "convergence"]
@@ -82,7 +67,7 @@ TIMED: Mapping[str, Callable[[str, int], Iterable[Any]]] = {
     "cold start": lambda name, size: [timings.cold_start(cached=name == "filled", times=size)],
     "saving": timings.measured,
 }
-Row = BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart | timings.Saving
+Row = runs.BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart | timings.Saving
 
 
 @dataclass(frozen=True)
@@ -133,18 +118,18 @@ class WorkPrecision(Study):
         """
         lines = [
             (line, value)
-            for line in LINES.values()
+            for line in runs.LINES.values()
             if not models.not_installed(line.model)
             for value in (line.quick if self.quick else line.values)
         ]
         for member, family, (line, value) in itertools.product(
-            range(QUICK_MEMBERS if self.quick else MEMBERS),
-            QUICK if self.quick else FAMILIES,
+            range(runs.QUICK_MEMBERS if self.quick else runs.MEMBERS),
+            runs.QUICK if self.quick else runs.FAMILIES,
             lines,
         ):
             step = value if line.knob == "time_step" else math.inf
             if not (self.quick and member and (step <= 1e-4 or line.label == "dart adaptive")):
-                yield Play(
+                yield runs.Play(
                     family,
                     member,
                     line.label,
@@ -156,16 +141,18 @@ class WorkPrecision(Study):
     def _convergence(self) -> Iterator[Task]:
         lines = [
             line
-            for line in LINES.values()
+            for line in runs.LINES.values()
             if line.converge and not models.not_installed(line.model)
         ]
         for place, line, name in itertools.product(
-            (1, 0) if self.quick else (2, 1, 0), lines, QUICK_WALLS if self.quick else WALLS
+            (1, 0) if self.quick else (2, 1, 0),
+            lines,
+            runs.QUICK_WALLS if self.quick else runs.WALLS,
         ):
-            bounces = WALLS[name].walls[0].restitution > 0.0
+            bounces = runs.WALLS[name].walls[0].restitution > 0.0
             if place < len(line.converge) and not (line.model == "drake" and bounces):
                 value = line.converge[place]
-                yield Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
+                yield runs.Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The tables and diagrams of what was measured."""
@@ -176,14 +163,15 @@ class WorkPrecision(Study):
             *(
                 task.record(failure=one.reason)
                 for task, one in done.items()
-                if isinstance(task, Play) and isinstance(one, pool.Failure)
+                if isinstance(task, runs.Play) and isinstance(one, pool.Failure)
             ),
         ]
         samples, times, sizes, starts, saved = (
             [row for row in rows if isinstance(row, kind)] for kind in get_args(Row)
         )
         plain, walls = (
-            [one for one in samples if (one.family in WALLS) == beside] for beside in (False, True)
+            [one for one in samples if (one.family in runs.WALLS) == beside]
+            for beside in (False, True)
         )
         parts: Sequence[tuple[Callable[[Any], Iterator[Block]], Sequence[Any]]] = (
             (_models, plain),
@@ -203,7 +191,7 @@ class WorkPrecision(Study):
         )
 
 
-def _usual(line: DiagramLine, value: float, seconds: float) -> float:
+def _usual(line: runs.DiagramLine, value: float, seconds: float) -> float:
     """The usual CPU time (s) of a run that simulates some `seconds`."""
     return A_STEP * seconds / value if line.knob == "time_step" else A_RUN
 
@@ -211,7 +199,7 @@ def _usual(line: DiagramLine, value: float, seconds: float) -> float:
 def _answer(tables: Mapping[str, list[dict[str, Any]]]) -> str:
     """What the tables say first: the cheapest engine, the batches, the finest steps."""
     said = [
-        f"The cheapest engine at an error of {LEVEL:g} alpha is {row['line']}:"
+        f"The cheapest engine at an error of {runs.LEVEL:g} alpha is {row['line']}:"
         f" {row['cost']:.2g} ms of CPU a simulated second."
         for row in tables.get("league", [])[:1]
         if math.isfinite(row["cost"])
@@ -221,16 +209,16 @@ def _answer(tables: Mapping[str, list[dict[str, Any]]]) -> str:
         said.append(f"A run of the event-based model costs, in right-hand sides: {costs}.")
     if levels := tables.get("levels"):
         # of each model the last row, the finest
-        finest = {row["model"]: row[f"median_{REFERENCES[0]}"] for row in levels}
+        finest = {row["model"]: row[f"median_{runs.REFERENCES[0]}"] for row in levels}
         errors = ", ".join(f"{model} {error:.1e}" for model, error in finest.items())
         said.append(
-            f"Beside a wall, median errors against {REFERENCES[0]} at the finest setting, alpha:"
-            f" {errors}."
+            f"Beside a wall, median errors against {runs.REFERENCES[0]} at the finest setting,"
+            f" alpha: {errors}."
         )
     return " ".join(said) or "Nothing was measured."
 
 
-def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
+def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
     frame = runs.frame_of(samples)
     points, pooled = runs.points_of(frame), runs.pooled(frame)
     trends, families = runs.trends_of(points), list(dict.fromkeys(points.family))
@@ -239,7 +227,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             "league",
             [
                 Column("line", "engine", kind="text"),
-                Column("cost", f"cost at {LEVEL:g} alpha", "ms", digits=2),
+                Column("cost", f"cost at {runs.LEVEL:g} alpha", "ms", digits=2),
                 Column("error", f"error at {1e3 * runs.EQUAL_COST:g} ms", "alpha", digits=2),
                 Column("best", "least error", "alpha", digits=2),
                 Column("best_cost", "at a cost of", "ms", digits=2),
@@ -269,7 +257,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
                 ]
                 for line, met, least in steps
             ],
-            f"The step at which an engine first meets {LEVEL:g} alpha",
+            f"The step at which an engine first meets {runs.LEVEL:g} alpha",
             "Median RMS error of theta over the scenes of a kind. Adaptive: the largest step.",
         )
     for title, starts in SHEETS.items():
@@ -282,7 +270,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         "ratios",
         [text("line", "model"), *(Column(family, digits=2) for family in families)],
         [[label, *(of.get((label, family)) for family in families)] for label in labels],
-        f"Run time at an error of {LEVEL:g} alpha, over the EBM's",
+        f"Run time at an error of {runs.LEVEL:g} alpha, over the EBM's",
         on="page",
     )
     yield Table(
@@ -290,7 +278,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
         [
             text("line", "model"),
             Column("order"),
-            text("ratio", f"run time / ebm's at {LEVEL:g} alpha"),
+            text("ratio", f"run time / ebm's at {runs.LEVEL:g} alpha"),
             text("reached"),
         ],
         [_spread(label, trends[trends.line == label]) for label in labels],
@@ -305,7 +293,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
             Column("horizon", "compared up to", "s"),
             Column("model_form", "model form", "alpha", digits=2),
         ],
-        [[family, FAMILIES[family].words, *_about(family)] for family in families],
+        [[family, runs.FAMILIES[family].words, *_about(family)] for family in families],
         "Scenes",
         on="page",
         folded=True,
@@ -327,7 +315,7 @@ def _models(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
 
 
 def _about(family: str) -> tuple[float, float]:
-    members = [prepared(family, k) for k in range(MEMBERS)]
+    members = [runs.prepared(family, k) for k in range(runs.MEMBERS)]
     return median(one.scene.duration for one in members), median(one.model_form for one in members)
 
 
@@ -365,7 +353,7 @@ def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
                 mine.rms.tolist(),
                 mine.rms_10.clip(lower=FLOOR).tolist(),
                 mine.rms_90.clip(upper=3.0).tolist(),
-                LINES[label].model,
+                runs.LINES[label].model,
                 LOOKS.get(label.split()[-1], "line"),
             )
             for (label,), mine in runs.grouped(shown, "line")
@@ -380,12 +368,12 @@ def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
     )
 
 
-def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
+def _converged(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
     frame = runs.frame_of(samples)
     levels = runs.levels_of(frame)
     orders = runs.orders_of(frame, levels)
     form = median(
-        prepared(name, 0).model_form for name in dict.fromkeys(one.family for one in samples)
+        runs.prepared(name, 0).model_form for name in dict.fromkeys(one.family for one in samples)
     )
     slopes = {(o.model, o.reference): o.order for o in orders.itertuples() if not o.scene}
     rows = []
@@ -405,10 +393,10 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
                 (
                     Column(f"median_{reference}", f"against {reference}", "alpha", digits=2),
                     Column(f"largest_{reference}", "largest", "alpha", digits=2, brief=False),
-                    text(f"within_{reference}", f"within {LEVEL:g}", brief=False),
+                    text(f"within_{reference}", f"within {runs.LEVEL:g}", brief=False),
                     Column(f"order_{reference}", "order", digits=3),
                 )
-                for reference in REFERENCES
+                for reference in runs.REFERENCES
             ),
         ],
         rows,
@@ -427,13 +415,13 @@ def _converged(samples: Sequence[BenchmarkRun]) -> Iterator[Block]:
 
 def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
     panels = []
-    for reference in REFERENCES:
+    for reference in runs.REFERENCES:
         good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
         series = []
         for (model,), mine in runs.grouped(levels[levels.reference == reference], "model"):
             series += [
                 Series(model, one.step.tolist(), one[reference].tolist(), look=model, style="thin")
-                for one in (good.get((model, name), frame[:0]) for name in WALLS)
+                for one in (good.get((model, name), frame[:0]) for name in runs.WALLS)
             ] + [
                 Series(
                     model, mine.step.tolist(), mine["median"].clip(upper=3.0).tolist(), look=model
