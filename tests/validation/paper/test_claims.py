@@ -14,7 +14,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
-from rockcheck.validation.studies.spectrum.tiles import nodes_of
+from rockcheck.validation.studies.spectrum.tiles import Request
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
 
@@ -233,7 +233,7 @@ def test_impacts_before_the_fall_are_counted():
     scene, amplitudes = paper_panels(6)[0].scene, np.linspace(1.0, 12.0, 23)
     nodes = scene, amplitudes, np.full(23, 2.5)
     sides, _ = play_nodes(*nodes, model=MODEL)
-    (task,) = nodes_of(*nodes, "ebm", {"tolerance": TOLERANCE}, "one impact")
+    (task,) = Request(settings={"tolerance": TOLERANCE}).nodes(*nodes, "one impact")
     after_one = np.array([letter == "Y" for letter in task.play().letters]) & (sides == 1)
     assert after_one.any()
     expected = ["floor impact", "overturned right"]

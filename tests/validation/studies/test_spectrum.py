@@ -31,7 +31,6 @@ from rockcheck.validation.studies.spectrum.tiles import (
     Book,
     Request,
     differing,
-    nodes_of,
 )
 from rockcheck.validation.study import run
 
@@ -55,9 +54,7 @@ def outcomes(found):
 
 
 def on_grid(frequencies, amplitudes, **how):
-    request = Request(size=len(amplitudes), **how)
-    request.__dict__.update(frequencies=np.asarray(frequencies), amplitudes=np.asarray(amplitudes))
-    return request
+    return Request(2, tuple(frequencies), tuple(amplitudes), **how)
 
 
 @pytest.mark.parametrize(
@@ -91,15 +88,19 @@ def test_a_task_that_failed_leaves_its_nodes_undecided():
     study = Spectra((PANELS["figure-8-gap-3-e-0"],), Request(4))
     done = {study.tasks({})[0]: pool.Failure("crashed")}
     spectrum = Book(done).spectrum(study.panels[0], study.request)
-    found = (len(spectrum.undecided), spectrum.safe_area, study.gather(done).exit_code)
-    assert found == (16, 0.0, 3)
+    assert (
+        len(spectrum.undecided),
+        spectrum.safe_area,
+        study.gather(done).exit_code,
+    ) == (16, 0.0, 3)
 
 
 def test_a_tile_depends_on_all_that_its_outcomes_do():
     scene, a = PANELS["figure-8-gap-3-e-0"].scene, np.array([1.0, 2.0])
 
     def key(scene=scene, a=a, f=a, model="ebm", tolerance=1e-8, what="outcomes"):
-        return nodes_of(scene, a, f, model, {"tolerance": tolerance}, what)[0].key
+        (nodes,) = Request(model=model, settings={"tolerance": tolerance}).nodes(scene, a, f, what)
+        return nodes.key
 
     assert key() == key(scene.replace(name="other", duration=9.0))
     others = [
@@ -136,7 +137,7 @@ def test_a_model_that_is_simulated_plays_until_the_outcome_is_certain(
     monkeypatch, name, frequency, amplitudes, letters
 ):
     a = np.array(amplitudes)
-    (nodes,) = nodes_of(PANELS[name].scene, a, np.full(len(a), frequency), "cm", {})
+    (nodes,) = Request(model="cm").nodes(PANELS[name].scene, a, np.full(len(a), frequency))
     assert nodes.play().letters == letters
     monkeypatch.setattr(ContinuousModel, "simulate", Mock(side_effect=ModelFailure("too much")))
     assert nodes.play().letters == "U" * len(a)

@@ -20,7 +20,7 @@ from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.horizon import may_fly, other_laws
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse, vary
 from rockcheck.engines.engine import Engine
-from rockcheck.scenes import Ricker, Scene, Sine, reading, writing
+from rockcheck.scenes import Ricker, Sine, reading, writing
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
 from rockcheck.validation.paper import (
@@ -156,9 +156,10 @@ class Spectra(Study):
             panel: one for panel in self.panels if (one := self._spectrum(book, panel)) is not None
         }
         fast = tiles.compiled(models.build(self.request.model, self.request.settings))
-        i, j = np.meshgrid(*[_spread(self.request.size)] * 2, indexing="ij")
+        i, j = _kept(self.request.size).T
+        at = self.request.amplitudes[i], self.request.frequencies[j]
         motions = {
-            panel: book.ask(self._nodes(panel.scene, i.ravel(), j.ravel(), "motions"))[0]
+            panel: book.ask(self.request.nodes(panel.scene, *at, "motions"))[0]
             if fast
             else tiles.Played()
             for panel in self.panels
@@ -188,32 +189,37 @@ class Spectra(Study):
         laws = [
             played
             for law in others
-            if (played := book.spectrum(panel, request, {**request.settings, "impacts": law}))
+            if (
+                played := book.spectrum(
+                    panel, replace(request, settings={**request.settings, "impacts": law})
+                )
+            )
         ]
         if one is None or not laws or len(laws) < len(others):
             return one
         return replace(one, depends_on_law=tiles.differing(one, laws))
 
-    def _nodes(self, scene: Scene, i: Indices, j: Indices, what: tiles.What) -> list[tiles.Nodes]:
-        one = self.request
-        return tiles.nodes_of(
-            scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings, what
-        )
-
     def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
         scanned = {
             measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
-                one.scene,
-                measures.SCANNED,
-                np.full(len(measures.SCANNED), measures.SCANNED_AT),
-                self.request.model,
-                self.request.settings,
+                self.request.nodes(
+                    one.scene,
+                    measures.SCANNED,
+                    np.full(len(measures.SCANNED), measures.SCANNED_AT),
+                )
             )
             for one in spectra
             if one.scene.name in measures.SCANNED_WALLS
         }
         struck = [(one, *measures.near_one_impact(one)) for one in spectra if not one.scene.walls]
-        records = [book.ask(self._nodes(one.scene, i, j, "one impact")) for one, i, j in struck]
+        records = [
+            book.ask(
+                self.request.nodes(
+                    one.scene, self.request.amplitudes[i], self.request.frequencies[j], "one impact"
+                )
+            )
+            for one, i, j in struck
+        ]
         if book.wanted:
             return None
         tongues = {}
@@ -323,20 +329,16 @@ class Spectra(Study):
         )
 
     def _panel(self, panel: Panel, one: Spectrum, motions: tiles.Played) -> dict[str, Any]:
-        wall, spread = panel.wall, _spread(self.request.size)
         place = [0, 4, 0] if panel.figure is None else [1, 2, 0]
-        if panel.figure is not None and wall:
-            place = [0 if wall.restitution == 0.0 else 2, 2, 1 + GAPS.index(wall.gap)]
+        if panel.figure is not None and panel.wall:
+            place = [2 if panel.wall.restitution else 0, 2, 1 + GAPS.index(panel.wall.gap)]
         return {
             "title": panel.title,
-            "free": wall is None,
+            "free": panel.wall is None,
             "outcomes": "".join(tiles.letters_of(one.outcomes, one.undecided).ravel()),
             "law": [] if one.depends_on_law is None else one.depends_on_law.tolist(),
             "place": place,
-            "nodes": [
-                [int(spread[n // len(spread)]), int(spread[n % len(spread)])]
-                for n in motions.played
-            ],
+            "nodes": _kept(self.request.size)[[*motions.played]].tolist(),
         }
 
     def _files(self, panel: Panel, one: Spectrum) -> dict[str, bytes]:
@@ -387,8 +389,10 @@ class Spectra(Study):
         }
 
 
-def _spread(size: int) -> NDArray[np.int64]:
-    return np.unique(np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64))
+def _kept(size: int) -> Indices:
+    """The nodes (i, j) whose histories are kept, a row each."""
+    spread = np.round(np.linspace(0, size - 1, min(size, KEPT_AN_AXIS))).astype(np.int64)
+    return np.stack(np.meshgrid(*[np.unique(spread)] * 2, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def choose_nodes(spectrum: Spectrum, count: int, name: str) -> list[NDArray[np.int64]]:
@@ -483,7 +487,7 @@ def _shares(
         )
         i, j = np.concatenate([part[:half] for part, half in zip(chosen, halves, strict=True)]).T
         outcomes, failed = book.outcomes(
-            panel.scene, one.amplitudes[i], one.frequencies[j], one.model, one.settings
+            one.nodes(panel.scene, one.amplitudes[i], one.frequencies[j])
         )
         ends = [len(chosen[0][: halves[0]])]
         mine, fine = np.split(outcomes, ends), np.split(~failed, ends)

@@ -131,41 +131,6 @@ def _letter(scene: Scene, player: Any) -> str:
     return LETTERS[SAFE - LEFT]
 
 
-def nodes_of(
-    scene: Scene,
-    amplitudes: Floats,
-    frequencies: Floats,
-    model: str,
-    settings: Mapping[str, Any],
-    what: What = "outcomes",
-) -> list[Nodes]:
-    """The tasks that play nodes (1-D arrays of one length) of a spectrum, in order."""
-    fast = compiled(models.build(model, settings))
-    neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
-    how = provenance.code_digest(__name__) if fast else f"{SETTLE} {ENOUGH}"
-    base = provenance.cell_key(neutral, model, settings) + what + how
-    size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
-    one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
-    parts = (
-        [np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)]
-        for first in range(0, len(amplitudes), max(size, 1))
-    )
-    return [
-        Nodes(
-            provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
-            what,
-            scene,
-            a,
-            f,
-            model,
-            settings,
-            expected=one * len(a),
-            where="here" if fast else "worker",
-        )
-        for a, f in parts
-    ]
-
-
 def letters_of(sides: NDArray[np.int8], undecided: NDArray[np.int64]) -> NDArray[np.str_]:
     """A letter a node of an array of sides; `undecided` are indices of nodes, a row each."""
     letters = np.array(list(LETTERS))[sides - LEFT]
@@ -266,6 +231,35 @@ class Request:
                 raise InputError(f"{low:g} to {high:g} is not allowed: {what}", f"--{name}")
             object.__setattr__(self, name, np.linspace(low, high, self.size))
 
+    def nodes(
+        self, scene: Scene, amplitudes: Floats, frequencies: Floats, what: What = "outcomes"
+    ) -> list[Nodes]:
+        """The tasks that play nodes (1-D arrays of one length) of a scene's spectrum, in order."""
+        fast = compiled(models.build(self.model, self.settings))
+        neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
+        how = provenance.code_digest(__name__) if fast else f"{SETTLE} {ENOUGH}"
+        base = provenance.cell_key(neutral, self.model, self.settings) + what + how
+        size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
+        one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
+        parts = (
+            [np.ascontiguousarray(axis[first : first + size]) for axis in (amplitudes, frequencies)]
+            for first in range(0, len(amplitudes), max(size, 1))
+        )
+        return [
+            Nodes(
+                provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
+                what,
+                scene,
+                a,
+                f,
+                self.model,
+                self.settings,
+                expected=one * len(a),
+                where="here" if fast else "worker",
+            )
+            for a, f in parts
+        ]
+
 
 class _Waiting(Exception):
     """Nodes that a spectrum needs have not been played."""
@@ -288,14 +282,14 @@ class Book:
             for task in tasks
         ]
 
-    def outcomes(self, *nodes: Any) -> Outcomes:
-        """Sides (-1, 0, +1) and failures of the nodes of `nodes_of`."""
-        letters = np.array([*"".join(one.letters for one in self.ask(nodes_of(*nodes)))])
+    def outcomes(self, tasks: Sequence[Nodes]) -> Outcomes:
+        """Sides (-1, 0, +1) and failures of the nodes of these tasks."""
+        letters = np.array([*"".join(one.letters for one in self.ask(tasks))])
         return np.select(
             [letters == LETTERS[side - LEFT] for side in (LEFT, RIGHT)], [LEFT, RIGHT], SAFE
         ).astype(np.int8), letters == UNDECIDED
 
-    def spectrum(self, panel: Panel, request: Request, settings: Any = None) -> Spectrum | None:
+    def spectrum(self, panel: Panel, request: Request) -> Spectrum | None:
         """A spectrum; None where nodes are still to be played.
 
         Refinement then begins again with all that is known.
@@ -303,7 +297,7 @@ class Book:
         before = len(self.wanted)
 
         def known(scene: Scene, a: Floats, f: Floats) -> Outcomes:
-            found = self.outcomes(scene, a, f, request.model, settings or request.settings)
+            found = self.outcomes(request.nodes(scene, a, f))
             if len(self.wanted) > before:
                 raise _Waiting
             return found
