@@ -92,11 +92,10 @@ def keep(run: results.Run, folder: Path) -> Path:
 
     The histories are there already. Two runs take turns.
     """
+    told = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
+    told |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
-        for table in files_of(run):
-            writing.write_whole(folder / f"{table.name}.csv", document.csv(table))
-        writing.write_whole(folder / "junit.xml", junit(run))
-        writing.write_whole(folder / "summary.md", markdown(run))
+        writing.write_together({folder / name: content for name, content in told.items()})
         return run.save(folder)
 
 
