@@ -87,14 +87,17 @@ def _turn(folder: Path) -> Iterator[None]:
         lock.release()
 
 
-def keep(run: results.Run, folder: Path) -> Path:
+def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     """Write run.json, its schema and the tables; returns run.json.
 
-    The histories are there already. Two runs take turns.
+    The histories are there already. Unless it is to have `pages`, those of an earlier run are
+    removed: they show other numbers. Two runs take turns.
     """
     told = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
     told |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
+        if not pages:
+            _remove(folder)
         writing.write_together({folder / name: content for name, content in told.items()})
         return run.save(folder)
 
@@ -153,12 +156,6 @@ def write_site(
             on_progress(done, len(calls))
         _remove(folder, {INDEX, *pages.links.values()})
     return folder / INDEX
-
-
-def remove_site(folder: Path) -> None:
-    """Remove the pages of an earlier run in `folder`: they show other numbers than its run.json."""
-    with _turn(folder):
-        _remove(folder)
 
 
 def _remove(folder: Path, kept: Collection[str] = ()) -> None:

@@ -133,7 +133,7 @@ def run(
         force=force,
         strict="both" if strict == "both" else strict is not None,
     )
-    page = site.keep(finished, folder)
+    page = site.keep(finished, folder, pages=report)
     document.show(tables.finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
@@ -151,8 +151,6 @@ def run(
                 afresh=False,
                 on_progress=on_progress,
             )
-    else:
-        site.remove_site(folder)
     left_out = {} if suite.judged else {"left_out": suite.left_out}
     told(
         Finding("validate", suite.name, "", exit_code=finished.exit_code),
