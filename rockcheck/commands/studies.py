@@ -313,8 +313,7 @@ def spectrum(
     rockcheck spectrum paper --agreement 200               against the other models
     rockcheck spectrum shelf.toml --amplitudes 1 6 --refine    your own block and pulse
     """
-    from rockcheck.validation.studies.spectrum.study import Spectra
-    from rockcheck.validation.studies.spectrum.tiles import Request
+    from rockcheck.validation.studies.spectrum import study, tiles
 
     if what in PAPER:
         panels = paper_panels(*PAPER[what])
@@ -325,7 +324,7 @@ def spectrum(
     hops = what not in PAPER and panels[0].wall is not None
     given = settings_of(settings or ())
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
-    request = Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
+    request = tiles.Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
     if agreement is not None:
         errors.refuse(
             (
@@ -340,7 +339,7 @@ def spectrum(
             ),
         )
         tell_missing()
-    studied(Spectra(panels, request, agreement or 0), played)
+    studied(study.Spectra(panels, request, agreement or 0), played)
 
 
 def benchmark(
@@ -508,12 +507,11 @@ def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool
 
 def _export(folder: Path) -> NoReturn:
     from rockcheck.reports.site import write_scene_file
-    from rockcheck.validation.studies.conformance.phenomena import SCENES
-    from rockcheck.validation.studies.conformance.study import export
+    from rockcheck.validation.studies.conformance import phenomena, study
 
-    for name, scene in SCENES.items():
+    for name, scene in phenomena.SCENES.items():
         write_scene_file(scene, folder, name)
-    names = export(folder)
+    names = study.export(folder)
     lines = [
         f"{len(names)} scenes in {folder}, README.md says how they are meant; then:",
         f"  rockcheck conformance --histories {folder}",

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel, Spectrum
-from rockcheck.ebm.horizon import may_fly, other_laws
+from rockcheck.ebm import EventBasedModel, Spectrum, horizon
 from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, node_pulse, vary
 from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Ricker, Sine, reading, writing
@@ -177,10 +176,10 @@ class Spectra(Study):
         request, walls = self.request, panel.scene.walls
         player = models.build(request.model, request.settings)
         others = (
-            other_laws(
+            horizon.other_laws(
                 player,
                 walls=any(wall.restitution > 0.0 for wall in walls),
-                flat=may_fly(panel.scene),
+                flat=horizon.may_fly(panel.scene),
             )
             if isinstance(player, EventBasedModel)
             else ()

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from rockcheck.ebm import EventBasedModel, predictability_horizon
-from rockcheck.ebm.spectrum import node_pulse
+from rockcheck.ebm import EventBasedModel, predictability_horizon, spectrum
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.discrepancy.compare import compare
@@ -56,7 +55,7 @@ def pulse(
         excitation=Rest(),
         duration=3.0,
     )
-    amplitude, period = node_pulse(still, amplitude_ratio, frequency_ratio)
+    amplitude, period = spectrum.node_pulse(still, amplitude_ratio, frequency_ratio)
     return still.replace(excitation=Ricker(amplitude=amplitude, period=period))
 
 

@@ -22,10 +22,9 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm import EventBasedModel, natural, spectrum
 from rockcheck.ebm.batch import pack, pack_pulses, run_batch
 from rockcheck.ebm.core.ground import Ground, acceleration
-from rockcheck.ebm.spectrum import node_pulse
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Floats,
@@ -117,7 +116,7 @@ def grid(scene: Scene, nodes: int) -> tuple[Floats, Floats]:
     frequency, amplitude = np.meshgrid(
         np.linspace(*FREQUENCY_RATIOS, nodes), np.linspace(*AMPLITUDE_RATIOS, nodes)
     )
-    return node_pulse(scene, amplitude.ravel(), frequency.ravel())
+    return spectrum.node_pulse(scene, amplitude.ravel(), frequency.ravel())
 
 
 BESIDE = PLAIN.replace(walls=(Wall(side="left", gap=0.053),))
@@ -137,7 +136,7 @@ def batch_size(runs: int, threads: int) -> BatchSize:
     scene, model = PLAIN, EventBasedModel(tolerance=LEVEL)
     random = np.random.default_rng(1)
     frequencies = random.uniform(*FREQUENCY_RATIOS, runs)
-    pulses = node_pulse(scene, random.uniform(*AMPLITUDE_RATIOS, runs), frequencies)
+    pulses = spectrum.node_pulse(scene, random.uniform(*AMPLITUDE_RATIOS, runs), frequencies)
     cost = _timed(
         lambda _: run_batch(pack_pulses(scene, model, *pulses), model, strict=False, jobs=threads),
         runs,
