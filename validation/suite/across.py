@@ -154,7 +154,8 @@ def _changed(
     shared = was.keys() & now.keys()
     for key in {**was, **now} if shared else THERE:
         (what, name), one, other = key, was.get(key), now.get(key)
-        if one != other if what != "figure" else key in shared and _moved(name, one, other):
+        both = key in shared
+        if (both and _moved(name, one, other)) if what == "figure" else one != other:
             yield Change(
                 scene=place[0], model=place[1], what=what, name=name, before=one, after=other
             )
