@@ -6,7 +6,7 @@ And how far a block moves: the four figures of a history that an engineer reads 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -275,7 +275,7 @@ def largest_slip(history: History) -> float:
     return largest if largest > ROUNDING * getattr(history.block, "half_height", 0.0) else 0.0
 
 
-def wall_speeds(history: History, scene: Scene) -> list[float]:
+def wall_speeds(history: History, scene: Scene) -> Iterator[float]:
     """Speeds (m/s) with which the block struck walls, one per event "wall impact".
 
     The speed of the outermost corner in the last row before the event, extrapolated to the event
@@ -283,16 +283,13 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
     """
     names = ("t", "x", "theta", "x_dot", "theta_dot")
     if not scene.walls or any(name not in history.channels for name in names):
-        return []
+        return
     t, x, theta, x_dot, theta_dot = (
         np.asarray(history.channels[name], dtype=float) for name in names
     )
     times = np.array([event.t for event in history.event_list])
-    found = []
-    for event in history.event_list:
+    for event in (one for one in history.event_list if one.kind == "wall impact"):
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
-        if event.kind != "wall impact":
-            continue
         rows = slice(max(row - 1, 0), row + 1)
         wall = min(
             scene.walls,
@@ -304,8 +301,7 @@ def wall_speeds(history: History, scene: Scene) -> list[float]:
         speed = rates[-1]
         if len(rates) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
             speed += (rates[1] - rates[0]) * (event.t - t[row]) / (t[row] - t[row - 1])
-        found.append(max(float(speed), 0.0))
-    return found
+        yield max(float(speed), 0.0)
 
 
 def largest_reach(history: History, scene: Scene, side: str) -> float:

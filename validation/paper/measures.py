@@ -526,13 +526,12 @@ class Claim:
     rows: Sequence[Row]
 
 
-def claims_of(paper: Paper) -> list[Claim]:
+def claims_of(paper: Paper) -> Iterator[Claim]:
     """The paper's sentences with their verdicts.
 
     A sentence holds if all its rows hold, or, where it says "generally", more than `GENERALLY` of
     them.
     """
-    claims = []
     for about in SENTENCES["claim"]:
         rows, says = globals()[about["measure"]](paper, **about.get("with", {}))
         counts = Counter(map(operator.attrgetter("holds"), rows))
@@ -543,8 +542,7 @@ def claims_of(paper: Paper) -> list[Claim]:
         if held and 0 < len(against) <= MOST_NAMED:
             said += f" Not so: {'; '.join(against)}."
         verdict = "holds" if enough else "holds in part" if held else "does not hold"
-        claims.append(Claim(about, verdict, said, rows))
-    return claims
+        yield Claim(about, verdict, said, rows)
 
 
 def findings_of(paper: Paper) -> list[Beyond]:

@@ -25,7 +25,7 @@ of it. All uncertainties here are expanded ones: intervals that are meant to hol
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -105,7 +105,9 @@ def numerical_uncertainty(
     given = history or model.simulate(scene)
     if hasattr(model, "coarser"):
         runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
-        return Numerical(method="steps h, 2h, 3h and 4h", quantities=_from_steps(scene, runs))
+        return Numerical(
+            method="steps h, 2h, 3h and 4h", quantities=tuple(_from_steps(scene, runs))
+        )
     method, finer = "a hundredth of the tolerance", model.finer().simulate(scene)
     if _side(given) != _side(finer):
         return failed(given, "the outcome changes with the tolerance", method)
@@ -132,7 +134,7 @@ def failed(history: History, reason: str, method: str = "") -> Numerical:
     )
 
 
-def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
+def _from_steps(scene: Scene, runs: Sequence[History]) -> Iterator[Quantity]:
     alpha, finest = scene.block.alpha, runs[0]
     units = {"alpha": 1.0, "m": alpha * scene.block.radius, "s": 1.0 / scene.frequency_parameter}
     changes = [_changes(scene, finest, coarser) for coarser in runs[1:]]
@@ -153,13 +155,12 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> tuple[Quantity, ...]:
     if 0 < top < len(theta) - 1:
         missed = float(abs(theta[top - 1] - 2.0 * theta[top] + theta[top + 1])) / 8.0
     between = {"peak_rotation": missed / alpha, "end_time": scene.output_step}
-    found = []
     for name, unit, value in shown:
         own = [one[name] for one in changes]
         u = SAFETY * max(own) if converge else POOR_SAFETY * max(apart) * units[unit]
         u = math.hypot(u, between.get(name, 0.0))
-        found.append(_quantity(name, unit, value, u, reason, _order(own)))
-    return (*found, _quantity("outcome", "", finest.outcome, reason=unsure))
+        yield _quantity(name, unit, value, u, reason, _order(own))
+    yield _quantity("outcome", "", finest.outcome, reason=unsure)
 
 
 def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:

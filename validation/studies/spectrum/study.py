@@ -103,7 +103,7 @@ class Spectra(Study):
         )
         blocks: list[Block] = [*self._blocks(by_panel, motions)]
         if paper:
-            claims = measures.claims_of(paper)
+            claims = list(measures.claims_of(paper))
             tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
