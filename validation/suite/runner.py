@@ -286,11 +286,9 @@ def _other_outcome(
 
 def _both(name: str, both: Iterable[numerical.Numerical | None]) -> tuple[float | None, str]:
     """The combined numerical uncertainty of both runs; None and the reason if one is unknown."""
-    known = [one for one in both if one]
-    parts = [one.u_num(name) for one in known]
-    if None in parts:
-        return None, known[parts.index(None)].reason(name)
-    return math.hypot(*(u for u in parts if u is not None)), ""
+    parts = [(one.u_num(name), one.reason(name)) for one in both if one]
+    unsure = [reason for u, reason in parts if u is None]
+    return (None, unsure[0]) if unsure else (math.hypot(*(u or 0.0 for u, _ in parts)), "")
 
 
 #: Remark on a gap in a measured history.
