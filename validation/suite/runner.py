@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import partial
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from types import MappingProxyType
@@ -463,16 +464,12 @@ class SuiteStudy(Study):
             )
             for name, given in suite.uncertain.items()
         }
-        cells: list[results.Cell] = []
-        ensembles: list[results.EnsembleRecord] = []
-        for place in self.planned:
-            if place in suite.ensembles:
-                record, of_ensemble = self._ensemble(place)
-                ensembles.append(record)
-                cells += of_ensemble
-            else:
-                self._compare(place)
-                cells += self._explained(place, inputs.get(place))
+        drawn = [self._ensemble(name) for name in suite.ensembles if name in self.planned]
+        of_scenes = (
+            self._explained(place, inputs.get(place))
+            for place in self.planned
+            if place not in suite.ensembles
+        )
         finished = results.Run(
             suite=suite.name,
             description=suite.given.description,
@@ -481,8 +478,8 @@ class SuiteStudy(Study):
             model_form=suite.given.model_form,
             scenes={name: scene.model_dump(mode="json") for name, scene in suite.scenes.items()},
             models=tuple(suite.models),
-            cells=tuple(cells),
-            ensembles=tuple(ensembles),
+            cells=tuple(chain(*of_scenes, *(cells for _, cells in drawn))),
+            ensembles=tuple(record for record, _ in drawn),
             inputs=inputs,
             printed=tuple(name for name in suite.scenes if self.own[name].given.print_figures),
             faults=tuple(
@@ -649,6 +646,7 @@ class SuiteStudy(Study):
 
         Only of those that finished, and whose numerical error is known.
         """
+        self._compare(scene)
         own, done = self.own[scene], [one for one in self.compared[scene] if one.status == "done"]
         scatters = {
             one.model: self.ended[self.planned[scene][one.model][0]].record.uncertainty
