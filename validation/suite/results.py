@@ -316,9 +316,7 @@ class Run(Stored):
 
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""
-        for cell in self.cells:
-            for check in cell.checks:
-                yield cell, check
+        return ((cell, check) for cell in self.cells for check in cell.checks)
 
     def load_scene(self, name: str) -> Scene:
         """The scene of that name, rebuilt."""
