@@ -253,10 +253,11 @@ def summary(view: SceneView) -> str:
     """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
     said = []
     for model, history in view.histories.items():
-        impacts = len(figures.WindowedHistory(history).events(*figures.IMPACTS))
+        whole = figures.WindowedHistory(history)
+        impacts = "" if whole.silent else f"{len(whole.events(*figures.IMPACTS))} impacts, "
         peak = number(history.peak_rotation / view.scene.block.alpha)
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
-        said.append(f"{model}: {reached}{impacts} impacts, {history.fate}")
+        said.append(f"{model}: {reached}{impacts}{history.fate}")
     return "; ".join(said) + "."
 
 

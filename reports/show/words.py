@@ -121,13 +121,14 @@ def history_html(history: History) -> str:
     """
     time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
     peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
-    kinds = Counter(
-        event.kind for event in figures.WindowedHistory(history).events(*figures.IMPACTS)
-    )
+    whole = figures.WindowedHistory(history)
+    kinds = Counter(event.kind for event in whole.events(*figures.IMPACTS))
     facts = {
         "outcome": history.fate,
         "peak rotation": peak if history.overturned_at is None else "",
-        "impacts": f"{kinds['floor impact']} on the floor, {kinds['wall impact']} on walls",
+        "impacts": ""
+        if whole.silent
+        else f"{kinds['floor impact']} on the floor, {kinds['wall impact']} on walls",
         "time": f"{number(float(time[0]))} to {number(float(time[-1]), 4)} s, {len(time)} rows",
         "settings": ", ".join(f"{key} {value}" for key, value in history.settings.items()),
         "cost": f"{number(1e3 * cost.wall_seconds)} ms, {cost.steps} steps" if cost.steps else "",

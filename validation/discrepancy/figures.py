@@ -14,7 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, kinematics
+from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, history, kinematics
 
 #: Start of the note of a figure that is undefined here, such as a ratio to zero.
 NOT_DEFINED = "not defined here"
@@ -186,6 +186,12 @@ class WindowedHistory:
             if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
         ]
 
+    @property
+    def silent(self) -> bool:
+        """Whether impacts were not recorded: it rocks to both sides without any event."""
+        theta, still = self.history.channels["theta"], history.STILL
+        return not self.history.event_list and bool(theta.min() < -still < still < theta.max())
+
     def heights(self) -> Floats:
         """Height of the lowest corner above the floor, m."""
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
@@ -280,15 +286,16 @@ class Pair:
     def impacts(self) -> MatchedImpacts:
         """The impacts of both within the common time, matched.
 
-        A history without any event, unlike the other's, does not record them: raises `Unavailable`.
+        A history without any event, unlike the other's, does not record them: raises `Unavailable`;
+        so does one that is `silent`.
         """
         both = [
             WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
             for one in (self.reference, self.candidate)
         ]
-        for history, others in ((self.reference, both[1]), (self.candidate, both[0])):
-            if others and not history.event_list:
-                raise Unavailable(f"{history.model} has no events")
+        for one, others in ((self.reference, both[1]), (self.candidate, both[0])):
+            if WindowedHistory(one).silent or (others and not one.event_list):
+                raise Unavailable(f"{one.model} has no events")
         return match_impacts(*both)
 
 

@@ -290,6 +290,11 @@ def _deepest(motion: figures.WindowedHistory) -> float:
     return float(np.maximum(np.max([-np.min(gap) for gap in gaps]), 0.0))
 
 
+def _impacts(motion: figures.WindowedHistory, kind: str) -> tuple[float, str]:
+    count = float(sum(figures.strong(motion.events(kind))))
+    return (math.nan, f"{motion.history.model} has no events") if motion.silent else (count, "")
+
+
 #: A figure without an ideal value is judged by its expected value.
 _quantity = partial(figures.Measure, ideal=None)
 FIGURES = figures.by_name(
@@ -334,7 +339,7 @@ FIGURES = figures.by_name(
         "floor impacts",
         "1",
         "Number of floor impacts stronger than 1 % of the strongest.",
-        lambda motion: float(sum(figures.strong(motion.events("floor impact")))),
+        partial(_impacts, kind="floor impact"),
         resolution=0.0,
     ),
     _quantity(
@@ -342,7 +347,7 @@ FIGURES = figures.by_name(
         "wall impacts",
         "1",
         "Number of wall impacts stronger than 1 % of the strongest.",
-        lambda motion: float(sum(figures.strong(motion.events("wall impact")))),
+        partial(_impacts, kind="wall impact"),
         resolution=0.0,
     ),
     _quantity(

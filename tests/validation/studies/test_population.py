@@ -383,5 +383,5 @@ def test_the_command_writes_curves_tables_and_page(records, tmp_path, told):
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, told):
     assert told("new", "pulse.toml") == {"file": "pulse.toml"}
     tables = told("assess", "pulse.toml", "--levels", "1:6:6")["tables"]
-    assert [1.0 < fit["median"] < 6.0 for fit in tables["fits"]] == [True, True]
-    assert not [one for one in tables["answers"] if " ," in one["answer"]]
+    within = [1.0 < fit["median"] < 6.0 for fit in tables["fits"]]
+    assert (within, " ," in str(tables["answers"])) == ([True, True], False)
