@@ -55,11 +55,12 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
 
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
-# The numbers of the candidates to try: of an upright block all, of one that tips those of its side.
-# The first one that tilts is an upright block's only.
+# The numbers of the candidates to try: of an upright block all, of one that tips those of its side,
+# which end with the seven that no wall takes part in. The first one that tilts is an upright
+# block's only.
 _ALL = np.arange(_CANDIDATES.shape[1])
 _TILTS = np.flatnonzero((_CANDIDATES[1]["family"] == Family.TILT) & (_CANDIDATES[1]["sense"] > 0))
-_OF_A_SIDE = _TILTS[1:]
+_OF_A_SIDE, _FREE = _TILTS[1:], _TILTS[-7:]
 
 
 @inner_kernel
@@ -253,7 +254,7 @@ def _touching(block, base, state):
     first = side or 1
     near = touched_walls(block, motion, first, False)
     if lean != 0.0:
-        return _Touching(side, first, floor, v, 0, near, 0, _OF_A_SIDE)
+        return _Touching(side, first, floor, v, 0, near, 0, _OF_A_SIDE if near else _FREE)
     walls = touched_walls(block, motion, 1, True)
     away = touched_walls(block, motion, -first, False)
     return _Touching(side, first, floor, v, walls, near, away, _ALL)
