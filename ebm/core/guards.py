@@ -213,7 +213,7 @@ def _coefficients(which, half, a):
 @inner_kernel
 def guard(which, order, a):
     """Writes a guard that the mode has into the workspace; returns its degree."""
-    for half in (0, lanes.LANES):
+    for half in range(0, order + 1, lanes.LANES):
         lanes.store(a, Row.GUARD, half, _coefficients(which, half, a))
     a[Row.GUARD, 0] += a[Row.TABLE + which, _CONSTANT]
     if Guard.LANDING <= which <= Guard.FAR_GAP:
