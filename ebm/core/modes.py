@@ -56,11 +56,11 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
 # The numbers of the candidates to try: of an upright block all, of one that tips those of its side,
-# which end with the seven that no wall takes part in. The first one that tilts is an upright
-# block's only.
+# `_FREE` those that no wall takes part in. The first one that tilts is an upright block's only.
 _ALL = np.arange(_CANDIDATES.shape[1])
-_TILTS = np.flatnonzero((_CANDIDATES[1]["family"] == Family.TILT) & (_CANDIDATES[1]["sense"] > 0))
-_OF_A_SIDE, _FREE = _TILTS[1:], _TILTS[-7:]
+_LEFT = _CANDIDATES[1]
+_OF_A_SIDE = np.flatnonzero((_LEFT["family"] == Family.TILT) & (_LEFT["sense"] > 0))[1:]
+_FREE = _OF_A_SIDE[(_LEFT["tip"] | _LEFT["far"])[_OF_A_SIDE] == 0]
 
 
 @inner_kernel
