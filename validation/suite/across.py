@@ -283,7 +283,8 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     least, most = values.min(), values.max()
     spread = ((most - least) / values.abs().max()).fillna(0.0)
     names = sorted(every, key=lambda name: -spread[name])
-    found = [name for name in names if spread[name] > 0.0]
+    # what some of the runs did not have varied, too
+    found = [name for name in names if spread[name] > 0.0 or values[name].isna().nunique() > 1]
     before, moved = "", []
     if len(moments) > 1:
         before = f" since {moments[-2].commit or moments[-2].created}"
