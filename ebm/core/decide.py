@@ -75,8 +75,9 @@ def _by_energy(block, state, ahead):
         falls = phi > side.alpha or energy > side.radius - block.height
         return 0.5 * math.pi if free and falls and mode.sense * motion.w >= 0.0 else -1.0
     highest, beyond = _highest(block, side, most), _highest(block, other, most)
-    if free and beyond <= max(peak, highest):
-        return max(peak, highest if mode.sense * motion.w > 0.0 else phi)
+    reached = max(peak, highest if mode.sense * motion.w > 0.0 else phi)
+    if free and beyond <= reached:
+        return reached
     least = (_MARGIN if block.walls else 1.0) * corner
     return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < least else -1.0
 

@@ -35,7 +35,7 @@ def may_go_on(block, base, run):
         state.peak = verdict
         state.ending = Ending.DONE
         if verdict >= 0.5 * math.pi:
-            motion.theta = math.copysign(verdict, motion.theta)
+            motion.theta = math.copysign(verdict, float(state.mode.sense))
             state.ending = Ending.OVERTURNED
     elif state.steps >= run.state.control.most_steps:
         state.ending = Ending.TOO_MANY_STEPS

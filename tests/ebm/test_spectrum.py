@@ -12,7 +12,7 @@ from rockcheck.ebm import EventBasedModel, batch, natural, overturning_spectrum
 from rockcheck.ebm.core.decide import quiet_from
 from rockcheck.ebm.core.names import Ending
 from rockcheck.ebm.spectrum import node_scene, play_motions, play_nodes
-from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Wall
+from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Sine, Wall
 
 RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
 
@@ -158,21 +158,28 @@ def decided_early(scenes, tolerance, **near):
     return early
 
 
-def grid_beside(wall, most):
+def grid(most, *walls, **about):
     nodes = itertools.product(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
-    return [node_scene(scene(wall), *node, settle=60.0) for node in nodes]
+    return [node_scene(scene(*walls, **about), *node, settle=60.0) for node in nodes]
+
+
+@pytest.mark.parametrize("cycles", [1, 2, 3])
+def test_where_the_base_stops_the_next_swing_tells_side_and_peak(cycles):
+    """At an impact theta is a zero of either sign; on its way down a block may yet rise higher."""
+    sine = Sine(amplitude=1.0, period=1.0, cycles=cycles)
+    decided_early(grid(12.0, excitation=sine), 1e-9, rtol=1e-6)
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
 def test_no_swing_that_loses_or_gains_is_taken_for_the_one_before(restitution):
     decided_early(
-        grid_beside(Wall(side="right", gap=0.053, restitution=restitution), 9.0), 1e-9, rtol=1e-6
+        grid(9.0, Wall(side="right", gap=0.053, restitution=restitution)), 1e-9, rtol=1e-6
     )
 
 
 def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     """What is left of the pulse bounds the energy that it can still bring."""
-    nodes = grid_beside(Wall(side="left", gap=0.003), 5.0)
+    nodes = grid(5.0, Wall(side="left", gap=0.003))
     early = decided_early(nodes, 1e-9, rtol=1e-6)
     quiet = np.array([quiet_from(natural.base_of(node), 1e-9) for node in nodes])
     safe = (early.side == 0) & (early.peak > 0.0)
