@@ -55,8 +55,8 @@ def _by_energy(block, state, ahead):
     standing, grows by no other work: dE/dt <= |u| sqrt(2 E), so that sqrt(2 E) grows by at most I.
     A block that can never reach the energy of standing on its lower corner cannot overturn: it is
     safe once that energy cannot lift it, on either corner, above the peak it has had. After the
-    excitation a block that only rocks conserves its energy up to its next impact, so that its peak
-    is known at once, unless with as much it would turn farther on its other corner.
+    excitation a block that only rocks conserves its energy up to its next impact. So as it rises
+    its peak is known, unless with as much it would turn farther on its other corner.
     """
     mode, motion, peak = state.mode, state.motion, state.peak
     phi = abs(motion.theta)
@@ -75,8 +75,8 @@ def _by_energy(block, state, ahead):
         falls = phi > side.alpha or energy > side.radius - block.height
         return 0.5 * math.pi if free and falls and mode.sense * motion.w >= 0.0 else -1.0
     highest, beyond = _highest(block, side, most), _highest(block, other, most)
-    reached = max(peak, highest if mode.sense * motion.w > 0.0 else phi)
-    if free and beyond <= reached:
+    reached = max(peak, highest)
+    if free and mode.sense * motion.w > 0.0 and beyond <= reached:
         return reached
     least = (_MARGIN if block.walls else 1.0) * corner
     return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < least else -1.0

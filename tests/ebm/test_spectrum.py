@@ -17,10 +17,10 @@ from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Si
 RECORD = Record.from_samples(3.0 * np.sin(2.0 * np.pi * np.arange(0.0, 2.0, 0.02)), 0.02)
 
 
-def scene(*walls, friction=0.3, excitation=None):
+def scene(*walls, friction=0.3, excitation=None, block=PAPER_BLOCK):
     return Scene(
         name="spectrum",
-        block=PAPER_BLOCK,
+        block=block,
         floor=Floor(friction=friction),
         walls=walls,
         excitation=excitation or Ricker(amplitude=1.0, period=1.0),
@@ -163,11 +163,22 @@ def grid(most, *walls, **about):
     return [node_scene(scene(*walls, **about), *node, settle=60.0) for node in nodes]
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.2], ids=["even", "uneven"])
 @pytest.mark.parametrize("cycles", [1, 2, 3])
-def test_where_the_base_stops_the_next_swing_tells_side_and_peak(cycles):
-    """At an impact theta is a zero of either sign; on its way down a block may yet rise higher."""
-    sine = Sine(amplitude=1.0, period=1.0, cycles=cycles)
-    decided_early(grid(12.0, excitation=sine), 1e-9, rtol=1e-6)
+def test_where_the_base_stops_the_next_swing_tells_side_and_peak(cycles, offset):
+    """At an impact theta is a zero of either sign; on its way down a block may yet rise higher, on
+    its other corner or, a swing later, on the weaker one of the two."""
+    block = PAPER_BLOCK.replace(centre_of_mass=(offset, 0.0))
+    still, sine = scene(excitation=Rest(), block=block), Sine(amplitude=1, period=1, cycles=cycles)
+    pushed = [
+        still.replace(
+            initial_rotation=tilt * block.alpha,
+            initial_angular_velocity=-rate * tilt * block.alpha,
+            duration=60.0,
+        )
+        for tilt, rate in itertools.product((-0.5, -0.2, 0.2, 0.5), (0.5, 2.0, 4.0, 5.0))
+    ]
+    decided_early([*pushed, *grid(12.0, excitation=sine, block=block)], 1e-9, rtol=1e-6)
 
 
 @pytest.mark.parametrize("restitution", [0.9, 0.99, 1.0])
