@@ -55,12 +55,11 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
 
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
-# The numbers of the candidates to try: of an upright block all, of one that tips those of its side,
-# `_FREE` those that no wall takes part in. The first one that tilts is an upright block's only.
-_ALL = np.arange(_CANDIDATES.shape[1])
+# The numbers of those that tilt to the first side, but for the first one of all, which is an upright
+# block's only. They follow one another; those that no wall takes part in come last, from `_FREE` on.
 _LEFT = _CANDIDATES[1]
-_OF_A_SIDE = np.flatnonzero((_LEFT["family"] == Family.TILT) & (_LEFT["sense"] > 0))[1:]
-_FREE = _OF_A_SIDE[(_LEFT["tip"] | _LEFT["far"])[_OF_A_SIDE] == 0]
+_TILTS = np.flatnonzero((_LEFT["family"] == Family.TILT) & (_LEFT["sense"] > 0))[1:]
+_FREE = _TILTS[(_LEFT["tip"] | _LEFT["far"])[_TILTS] == 0][0]
 
 
 @inner_kernel
@@ -240,8 +239,9 @@ def _clean(block, motion, floor):
 #: What a selection begins with: the side to which the block would rather tip (0: either) and the
 #: side that is tried first; whether the block touches the floor, and its slip velocity; the walls
 #: that it touches, as bits: flat (left and right), as it tips to the first side, and to the other;
-#: and the numbers of the candidates to try.
-_Touching = namedtuple("_Touching", "favoured first floor v upright_walls near away numbers")
+#: and the number of the first candidate to try, and that behind the last one: of an upright block
+#: all, of one that tips those of its side.
+_Touching = namedtuple("_Touching", "favoured first floor v upright_walls near away begin end")
 
 
 @inner_kernel
@@ -254,10 +254,11 @@ def _touching(block, base, state):
     first = side or 1
     near = touched_walls(block, motion, first, False)
     if lean != 0.0:
-        return _Touching(side, first, floor, v, 0, near, 0, _OF_A_SIDE if near else _FREE)
+        begin = _TILTS[0] if near else _FREE
+        return _Touching(side, first, floor, v, 0, near, 0, begin, _TILTS[-1] + 1)
     walls = touched_walls(block, motion, 1, True)
     away = touched_walls(block, motion, -first, False)
-    return _Touching(side, first, floor, v, walls, near, away, _ALL)
+    return _Touching(side, first, floor, v, walls, near, away, 0, _CANDIDATES.shape[1])
 
 
 @called_kernel
@@ -299,7 +300,7 @@ def _least_wrong(block, base, run, at, trial):
     been tried at this instant.
     """
     least, chosen = np.inf, -1
-    for number in at.numbers:
+    for number in range(at.begin, at.end):
         if least == 0.0:
             break
         if _comes_up(block, run.state, at, number, trial == 2):
