@@ -30,7 +30,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, batch
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
     Block,
@@ -45,6 +45,7 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
+from rockcheck.scenes.history import LYING
 
 Mask = NDArray[np.bool_]
 #: A contact is closed, R, and a pivot slips, sqrt(g R), beyond these.
@@ -261,6 +262,12 @@ INVARIANTS = {
             " is not (1: so it is)",
             0.0,
         ),
+        (
+            "decided",
+            "peak of a run that ends once it is certain, against the whole run's, rad (pi: another"
+            " side)",
+            1e-6,
+        ),
         # of models that approximate contact
         (
             "depth",
@@ -283,6 +290,8 @@ DISTURBANCE, SEEN, DISTURBED, EXACT = 1e-7, 5e-7, 6, 1e-10
 #: Rows of an audited history: this fraction of the shortest time in the scene, and at most this
 #: many.
 FINE, MOST_ROWS = 64, 4000
+#: A whole run goes on for this time (sqrt(R/g)) after the base, and ends in at most so many steps.
+SETTLED, MOST_STEPS = 300.0, 50_000
 #: No condition is checked within this time (sqrt(R/g)) of an event or a jump.
 NEAR = 1e-9
 #: The reach of a block is known where it is this many times the largest change between two rows.
@@ -321,7 +330,7 @@ def check_run(
 ) -> CheckedRun:
     """Plays a scene and checks every invariant, or only one.
 
-    With `audit` also those that ask for many rows: energy, clearance.
+    With `audit` also those that ask for many rows or a long run: energy, clearance, decided.
     """
     played = audited(scene) if audit else scene
     try:
@@ -339,6 +348,7 @@ def check_run(
             figures |= {"energy": energy} if energy is not None else {}
         with suppress(ModelFailure):
             figures["clearance"] = float(_wrong_clearance(model, played, seed))
+        figures["decided"] = _decided_apart(model, scene)
     bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
         figures["impacts"] = (
@@ -401,6 +411,28 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     ] != [False, True]
 
 
+def _decided_apart(model: EventBasedModel, scene: Scene) -> float:
+    """How far the peak of a run that ends once it is certain is from the whole run's, rad.
+
+    Pi where they overturn to other sides. 0 where no run ends so (Bouc-Wen), or the whole one has
+    not ended `SETTLED` after the base.
+    """
+    if not model.decides:
+        return 0.0
+    rows, capped = batch.pack([scene], model), model.model_copy(update={"most_steps": MOST_STEPS})
+    quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
+    ends = rows.durations / scene.duration * quiet + SETTLED
+    early, whole = (
+        batch.run_batch(
+            rows._replace(durations=ends), capped, until_decided=decided, strict=False, jobs=1
+        )
+        for decided in (True, False)
+    )
+    if early.failed[0] or not (whole.side[0] or whole.at_rest[0]):
+        return 0.0
+    return float(abs(early.peak - whole.peak)[0]) if early.side == whole.side else math.pi
+
+
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:
     """The energy's error, or None where it cannot be judged.
 
@@ -437,7 +469,10 @@ def _contradicts(scene: Scene, history: History) -> bool:
     times = [event.t for event in history.event_list] + [scene.duration * (1.0 + 1e-12)]
     backward = bool(np.any(np.diff(times) < 0.0))
     if history.outcome.startswith("overturned"):
-        return backward or not falls == [history.outcome] == [history.event_list[-1].kind]
+        # A run may end just before it is down.
+        lies = not falls and abs(history.channels["theta"][-1]) >= LYING
+        ends = falls == [history.outcome] == [one.kind for one in history.event_list[-1:]]
+        return backward or not (lies or ends)
     whole = len(history.channels["t"]) == len(scene.output_times)
     upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
     return backward or bool(falls) or not (whole and upright)

@@ -85,7 +85,7 @@ class EventBased(Player):
         return {key: value for key, (given, value) in every.items() if given}
 
     def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
-        """Plays the scene and checks every invariant; energy and clearance in each tenth run."""
+        """Plays the scene and checks every invariant; those of an audit in each tenth run."""
         return check_run(
             EventBasedModel(
                 **{
@@ -98,7 +98,7 @@ class EventBased(Player):
             ),
             scene,
             seed=seed,
-            audit=only in ("energy", "clearance") or (not only and number % AUDIT == 0),
+            audit=only in ("energy", "clearance", "decided") or (not only and number % AUDIT == 0),
             only=only,
         )
 
