@@ -134,7 +134,6 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     fine = EventBasedModel(tolerance=1e-13)
     whole = batch.run_batch(batch.pack(nodes, fine), fine, until_decided=False)
     assert early.steps.max() < 500 < whole.steps.min()
-    assert (whole.t / early.t).min() > 20.0
     np.testing.assert_allclose(
         early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9
     )  # errors before the wall grow
@@ -159,8 +158,10 @@ def decided_early(scenes, tolerance, **near):
 
 
 def grid(most, *walls, **about):
-    nodes = itertools.product(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
-    return [node_scene(scene(*walls, **about), *node, settle=60.0) for node in nodes]
+    return [
+        node_scene(scene(*walls, **about), *node, settle=60.0)
+        for node in itertools.product(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
+    ]
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.2], ids=["even", "uneven"])

@@ -11,7 +11,6 @@ import pytest
 from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
-from rockcheck.reports.document import PAGES
 from rockcheck.reports.figures import histories_figure
 from rockcheck.reports.show.words import number, ratio, readable
 from rockcheck.reports.site import write_scene_file
@@ -31,7 +30,7 @@ from rockcheck.validation.suite import results
 
 
 def payload_of(site, slug):
-    text = (site / PAGES / "data" / f"{slug}.js").read_text("utf-8")
+    text = (site / "pages" / "data" / f"{slug}.js").read_text("utf-8")
     data = json.loads(text.removeprefix("window.rockcheck = ").rstrip(";\n"))
     places = np.frombuffer(zlib.decompress(base64.b64decode(data["lines"])), np.uint8)
     return data, np.ascontiguousarray(places.reshape(4, -1).T).view("<f4").reshape(-1, data["rows"])
@@ -275,7 +274,7 @@ def test_index_shows_peaks_against_the_reference_s(site, run, index):
     assert crowd["scenes_here"] > 30
     assert crowd["scatter_here"] == pytest.approx(0.14, abs=0.02)  # 0.2 sin k
     assert f"{crowd['bias_here']:.4g}" in index
-    assert (site / PAGES / "figures" / "overview-peaks.svg").stat().st_size > 1000
+    assert (site / "pages" / "figures" / "overview-peaks.svg").stat().st_size > 1000
 
 
 def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(site):
