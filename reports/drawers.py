@@ -355,7 +355,7 @@ def _legend(data: Any) -> tuple[list[Any], int]:
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
     if (data.get("pulse") or {}).get("own"):
         handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0}))
-    return handles, 4 if "key" not in data else 1
+    return handles, 1 if "key" in data else 2 if len(data["panels"]) == 1 else 4
 
 
 def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
