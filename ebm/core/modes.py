@@ -55,8 +55,8 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
 
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
-# The numbers of those that tilt to the first side, but for the first one of all, which is an upright
-# block's only. They follow one another; those that no wall takes part in come last, from `_FREE` on.
+# The numbers of those that tilt to the first side, but for the first of all, an upright block's
+# only. They follow one another; those that no wall takes part in come last, from `_FREE` on.
 _LEFT = _CANDIDATES[1]
 _TILTS = np.flatnonzero((_LEFT["family"] == Family.TILT) & (_LEFT["sense"] > 0))[1:]
 _FREE = _TILTS[(_LEFT["tip"] | _LEFT["far"])[_TILTS] == 0][0]
