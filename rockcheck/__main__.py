@@ -46,10 +46,12 @@ def main() -> int:
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         # not where somebody else has put another in its place
-        if stream is not None and stream is getattr(sys, f"__{name}__") and not stream.isatty():
+        if stream is None or stream is not getattr(sys, f"__{name}__"):
+            continue
+        stream.reconfigure(errors="replace")  # its encoding may know no ✓
+        if not stream.isatty():
             pipe = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
             at_once = stream.line_buffering or stream.write_through
-            # "replace": its encoding may know no ✓
             text = io.TextIOWrapper(pipe, stream.encoding, "replace", line_buffering=at_once)
             setattr(sys, name, text)
     code = run(began=BEGAN)
