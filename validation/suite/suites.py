@@ -60,6 +60,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from rockcheck.ebm.horizon import may_fly
 from rockcheck.scenes import Frozen, Positive, Scene, errors, files, printable
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.execute.models import (
@@ -240,8 +241,7 @@ class Suite:
     def kind(self, place: Place) -> results.Kind:
         """The kind of a check.
 
-        With a wall, a bouncing floor or an initial height, a model that cannot fly differs in form
-        from one that can.
+        Where the block may fly, a model that cannot differs in form from one that can.
         """
         if place.against == OWN_FIGURES:
             return "exact" if measure_of(place.what).exact else "absolute"
@@ -253,9 +253,8 @@ class Suite:
             if place.scene in self.ensembles
             else self.scenes[place.scene]
         )
-        may_hop = bool(scene.walls) or scene.floor.restitution > 0.0 or scene.initial_height > 0.0
         differ = len({family(name).flies for name in families}) > 1
-        return "model form" if may_hop and differ else "numerical"
+        return "model form" if differ and may_fly(scene) else "numerical"
 
 
 def named_suites() -> dict[str, Path]:
