@@ -286,17 +286,25 @@ class Pair:
     def impacts(self) -> MatchedImpacts:
         """The impacts of both within the common time, matched.
 
-        A history without any event, unlike the other's, does not record them: raises `Unavailable`;
-        so does one that is `silent`.
+        A counterpart may lie just beyond it. A history without any event, unlike the other's, does
+        not record them: raises `Unavailable`; so does one that is `silent`.
         """
         both = [
-            WindowedHistory(one, until=self.end).events(*IMPACTS, *TURNS, start=self.start)
+            WindowedHistory(one, until=self.end + SAME_IMPACT).events(
+                *IMPACTS, *TURNS, start=self.start - SAME_IMPACT
+            )
             for one in (self.reference, self.candidate)
         ]
         for one, others in ((self.reference, both[1]), (self.candidate, both[0])):
             if WindowedHistory(one).silent or (others and not one.event_list):
                 raise Unavailable(f"{one.model} has no events")
-        return match_impacts(*both)
+
+        def inside(*events: Event) -> bool:
+            return any(self.start - 1e-9 <= event.t <= self.end + 1e-9 for event in events)
+
+        pairs, *alone = match_impacts(*both)
+        first, second = ([event for event in events if inside(event)] for events in alone)
+        return [pair for pair in pairs if inside(*pair)], first, second
 
 
 #: Matched impacts as (reference, candidate), and those of either without a counterpart.

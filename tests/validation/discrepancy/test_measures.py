@@ -209,17 +209,28 @@ def test_falls_without_events_are_timed_by_their_rotation(made):
     assert compare(slow, made(WAVE, T)).figure("overturning_time").note == "infinite"
 
 
-def test_events_agree_until_the_first_without_counterpart(made):
+@pytest.mark.parametrize(
+    ("end", "said", "alone"),
+    [
+        (None, (3.0, "floor impact only in r"), 2.0),
+        (1.002, (1.002, "all events agree"), 0.0),
+        (3.001, (3.0, "floor impact only in r"), 1.0),
+        (2.99, (2.99, "all events agree"), 0.0),
+    ],
+)
+def test_events_agree_until_the_first_without_counterpart(made, end, said, alone):
+    # a counterpart may come just after the end of the window
     events = {
         "r": [impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)],
         "c": [impact(1.004), impact(2.0), impact(3.1), impact(5.0, 0.001)],
     }
-    found = compare(*(made(WAVE, T, model=name, events=of) for name, of in events.items()))
+    found = compare(
+        *(made(WAVE, T, model=name, events=of) for name, of in events.items()), until=end
+    )
     until = found.figure("events_agree_until")
     assert (until.value, until.note, found["unmatched_impacts"], found["impact_time"]) == (
-        3.0,
-        "floor impact only in r",
-        2.0,
+        *said,
+        alone,
         pytest.approx(0.004),
     )
 
