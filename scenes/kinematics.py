@@ -47,11 +47,23 @@ def clearance(block: Block, side: str, gap: float, x: Any, theta: Any) -> Any:
     return OUTWARD[side] * x + block.half_width + gap - reach
 
 
-def reach_rate(block: Block, side: str, theta: Any, x_dot: Any, theta_dot: Any) -> Any:
-    """Velocity of the block's outermost corner toward `side`, m/s."""
-    tilt = np.where(theta == 0.0, np.abs(theta_dot), np.sign(theta) * theta_dot)
-    return (
-        block.half_diagonal * np.cos(block.box_angle + np.abs(theta)) * tilt - OUTWARD[side] * x_dot
+def side_corners(
+    block: Block, side: str, gap: float, x: Any, theta: Any, x_dot: Any, theta_dot: Any
+) -> Any:
+    """Distances of the corners on `side` from its plane, m, and velocities toward it, m/s.
+
+    Shape (2: bottom and top, 2, ...); the plane is that of `clearance`.
+    """
+    out, s, c = -OUTWARD[side], np.sin(theta), np.cos(theta)
+    width, h = out * block.half_width, block.half_height
+    return np.array(
+        [
+            [
+                block.half_width + gap - out * (x + width * c - z * s),
+                out * (x_dot - (width * s + z * c) * theta_dot),
+            ]
+            for z in (-h, h)
+        ]
     )
 
 

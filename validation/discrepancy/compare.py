@@ -278,30 +278,31 @@ def largest_slip(history: History) -> float:
 def wall_speeds(history: History, scene: Scene) -> Iterator[float]:
     """Speeds (m/s) with which the block struck walls, one per event "wall impact".
 
-    The speed of the outermost corner in the last row before the event, extrapolated to the event
-    from the last two rows if no other event lies between; of an event at the start in that row.
+    The speed of the corner that strikes, in the last row before the event, extrapolated to the
+    event from the last two rows if no other event lies between; of an event at the start in that
+    row. It is the corner that is nearest to its wall at the event, at its speed in that row.
     """
     names = ("t", "x", "theta", "x_dot", "theta_dot")
     if not scene.walls or any(name not in history.channels for name in names):
         return
-    t, x, theta, x_dot, theta_dot = (
-        np.asarray(history.channels[name], dtype=float) for name in names
-    )
-    times = np.array([event.t for event in history.event_list])
+    columns = np.array([history.channels[name] for name in names], dtype=float)
+    t, times = columns[0], np.array([event.t for event in history.event_list])
     for event in (one for one in history.event_list if one.kind == "wall impact"):
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
-        rows = slice(max(row - 1, 0), row + 1)
-        wall = min(
-            scene.walls,
-            key=lambda w: kinematics.clearance(scene.block, w.side, w.gap, x[row], theta[row]),
-        )
-        rates = kinematics.reach_rate(
-            scene.block, wall.side, theta[rows], x_dot[rows], theta_dot[rows]
-        )
+        rows, rest = slice(max(row - 1, 0), row + 1), event.t - t[row]
+        corners = [
+            corner
+            for wall in scene.walls
+            for corner in kinematics.side_corners(
+                scene.block, wall.side, wall.gap, *columns[1:, rows]
+            )
+        ]
+        # the nearest one then, which need not be the nearest in the row
+        _, rates = min(corners, key=lambda c: (c[0, -1] - c[1, -1] * rest, -c[1, -1]))
         speed = rates[-1]
         if len(rates) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
-            speed += (rates[1] - rates[0]) * (event.t - t[row]) / (t[row] - t[row - 1])
-        yield max(float(speed), 0.0)
+            speed += (rates[1] - rates[0]) * rest / (t[row] - t[row - 1])
+        yield max(0.0, float(speed))
 
 
 def largest_reach(history: History, scene: Scene, side: str) -> float:

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from dask.distributed import LocalCluster
 
-from rockcheck import Event, EventBasedModel, Record, load_scene
+from rockcheck import Event, EventBasedModel, Record, Wall, load_scene
 from rockcheck.scenes import files
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy.compare import motion_of, wall_speeds
@@ -159,18 +159,34 @@ def test_the_speed_at_the_wall_is_that_of_the_outermost_corner_as_it_strikes(loo
 
 
 @pytest.mark.parametrize(
-    ("before", "at", "speed"),
-    [(None, 0.3, 0.4), (0.15, 0.3, 0.3), (None, 0.05, 0.1), (None, 1e-12, 0.1)],
+    ("before", "at", "speed", "near", "turn"),
+    [
+        (None, 0.3, 0.4, {}, 0.0),
+        (0.15, 0.3, 0.3, {}, 0.0),
+        (None, 0.05, 0.1, {}, 0.0),
+        (None, 1e-12, 0.1, {}, 0.0),
+        (None, 0.3, 0.4, {"right": 1e-3}, 0.0),
+        (None, 0.3, 1.555e-5, {}, 1e-5),
+    ],
 )
-def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(made, before, at, speed):
+def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(
+    made, before, at, speed, near, turn
+):
     """From rows 0.1 s apart to the event 0.1 s after the last, 0.1 m/s more a row; an event between
     the rows has changed the speed, so the last one stands, as does the first row's where there is
-    no other. The wall is on the left."""
-    events = [Event(t=t, kind=kind) for t, kind in ((before, "slip"), (at, "wall impact")) if t]
+    no other. The wall is on the left. One on the right may be nearer in the last row, but it is not
+    struck; a block that turns upright until the event strikes with its top."""
     history = made(
-        [0.0] * 4, t=0.1 * np.arange(4), x_dot=np.array([-0.1, -0.2, -0.3, 0.2]), events=events
+        turn * (0.1 * np.arange(4) - 0.25),
+        t=0.1 * np.arange(4),
+        x_dot=np.array([-0.1, -0.2, -0.3, 0.2]) * (turn == 0.0),
+        theta_dot=np.full(4, turn),
+        events=[Event(t=t, kind=kind) for t, kind in ((before, "slip"), (at, "wall impact")) if t],
     )
-    assert [*wall_speeds(history, load_scene("fig5a"))] == pytest.approx([speed])
+    scene = load_scene("fig5a").replace(
+        walls=[Wall(side=side, gap=gap) for side, gap in {"left": 0.03, **near}.items()]
+    )
+    assert [*wall_speeds(history, scene)] == pytest.approx([speed])
 
 
 def test_hand_methods_stand_beside_the_simulation(assess, loop):
