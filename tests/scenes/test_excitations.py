@@ -91,13 +91,16 @@ def test_intensities_of_a_sine_are_its_closed_forms():
     assert intensity.spectral_acceleration(record, 0.01) == pytest.approx(amplitude / G, rel=0.01)
 
 
-def test_spectral_accelerations_are_those_of_the_straight_lines_between_samples():
+def test_intensities_are_those_of_the_straight_lines_between_samples():
     """Samples four periods apart, or all motion in the last one: as of the same lines with samples
     4000 times as dense."""
     samples = np.array([0.0, 1.0, -0.5, 0.0])
     lines = np.interp(np.arange(12_001) / 4000, np.arange(4), samples)
     coarse, dense = (
-        [intensity.spectral_acceleration(record, period) for period in (0.2, 1.0, 2.5)]
+        [
+            intensity.peak_velocity(record),
+            *(intensity.spectral_acceleration(record, period) for period in (0.2, 1.0, 2.5)),
+        ]
         for record in (
             Recording(samples=samples, time_step=4.0, unit="m/s2", form="CSV"),
             Recording(samples=lines, time_step=1e-3, unit="m/s2", form="CSV"),
