@@ -390,12 +390,12 @@ def _sliding_distance(motion: figures.WindowedHistory) -> float:
 
 def _wall_rebound(motion: figures.WindowedHistory) -> float:
     scene, braking = _flat_start(motion, "a block that slides flat into a wall", walls=1)
-    wall = scene.walls[0]
+    wall, away = scene.walls[0], kinematics.OUTWARD[scene.walls[0].side]
     speed2 = scene.initial_velocity**2 - braking * wall.gap
-    _need(speed2 > 0.0, "a block that reaches the wall")
+    _need(speed2 > 0.0 > away * scene.initial_velocity, "a block that reaches the wall")
     lost = (1.0 - wall.restitution) * math.sqrt(speed2)
     _stopped(motion, scene, abs(scene.initial_velocity) - lost)
-    from_wall = wall.gap - abs(float(motion.channel("x")[-1]))
+    from_wall = wall.gap + away * float(motion.channel("x")[-1])
     return from_wall - wall.restitution**2 * speed2 / braking
 
 
