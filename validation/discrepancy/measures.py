@@ -402,7 +402,8 @@ def _wall_rebound(motion: figures.WindowedHistory) -> float:
 def _bounce_height(motion: figures.WindowedHistory) -> float:
     scene = _scene(motion)
     height, e = scene.initial_height, scene.floor.restitution
-    _need(height > 0.0 and scene.initial_rotation == 0.0, "a block that drops flat")
+    turned = scene.initial_rotation or scene.initial_angular_velocity
+    _need(height > 0.0 and not turned, "a block that drops flat")
     t = motion.channel("t")
     strikes = math.sqrt(2.0 * height / scene.gravity)
     lands = strikes * (1.0 + 2.0 * e)
@@ -447,7 +448,8 @@ def _flat_start(motion: figures.WindowedHistory, what: str, *, walls: int) -> tu
     Raises `Unavailable` unless its block starts sliding flat with `walls` walls.
     """
     scene = _scene(motion)
-    slides = scene.initial_velocity != 0.0 and scene.initial_rotation == 0.0
+    moving = scene.initial_rotation, scene.initial_angular_velocity, scene.initial_height
+    slides = scene.initial_velocity != 0.0 and not any(moving)
     _need(slides and len(scene.walls) == walls, what)
     return scene, 2.0 * scene.floor.friction * scene.gravity
 

@@ -317,6 +317,8 @@ def described(scene, measures, **change):
         # back past its start; and away from the wall
         ("rebound", {"floor": Floor(friction=0.02), "duration": 30.0}, FORMS["rebound"]),
         ("rebound", {"initial_velocity": -1.0}, ()),
+        # not flat
+        *((name, {"initial_angular_velocity": 0.1}, ()) for name in FORMS),
     ],
 )
 def test_the_event_based_model_meets_the_closed_forms_of_its_kind_of_scene(name, change, has):
