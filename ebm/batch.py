@@ -14,7 +14,6 @@ from rockcheck.ebm.core.state import FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.natural import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
-from rockcheck.scenes.history import LYING
 
 __all__ = ["Outcomes", "pack", "pack_pulses", "run_batch", "run_decided"]
 #: Runs of a batch that a thread takes at once.
@@ -26,7 +25,7 @@ class Outcomes:
     """What a batch found, one value a run.
 
     `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta|
-    in rad (pi/2 when it is down; rotations after the outcome is certain are counted too), `t` the
+    in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t` the
     time in sqrt(R/g) at which the run was decided, and `motion`, a MOTION, where it then was;
     `steps` the number of Taylor expansions.
     """
@@ -91,9 +90,9 @@ def run_batch(
         for n, out in enumerate(pool.map(chunk, range(0, count, _CHUNK)), 1):
             kept.append(out)
             on_progress(min(_CHUNK * n, count), count)
-    theta = found["motion"]["theta"]
+    overturned = found["ending"] == Ending.OVERTURNED
     outcomes = Outcomes(
-        side=np.where(np.abs(theta) >= LYING, -np.sign(theta), 0.0).astype(np.int8),
+        side=np.where(overturned, -np.sign(found["motion"]["theta"]), 0.0).astype(np.int8),
         out=np.concatenate(kept),
         **{name: found[name].copy() for name in FOUND.names or ()},
     )

@@ -45,7 +45,6 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
-from rockcheck.scenes.history import LYING
 
 Mask = NDArray[np.bool_]
 #: A contact is closed, R, and a pivot slips, sqrt(g R), beyond these.
@@ -469,10 +468,7 @@ def _contradicts(scene: Scene, history: History) -> bool:
     times = [event.t for event in history.event_list] + [scene.duration * (1.0 + 1e-12)]
     backward = bool(np.any(np.diff(times) < 0.0))
     if history.outcome.startswith("overturned"):
-        # A run may end just before it is down.
-        lies = not falls and abs(history.channels["theta"][-1]) >= LYING
-        ends = falls == [history.outcome] == [one.kind for one in history.event_list[-1:]]
-        return backward or not (lies or ends)
+        return backward or not falls == [history.outcome] == [history.event_list[-1].kind]
     whole = len(history.channels["t"]) == len(scene.output_times)
     upright = np.all(np.abs(history.channels["theta"]) < math.pi / 2)
     return backward or bool(falls) or not (whole and upright)
