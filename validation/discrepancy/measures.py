@@ -42,18 +42,27 @@ def _hausdorff(pair: figures.Pair) -> float:
 def _farthest(points: Floats, line: Floats) -> float:
     """Largest distance from `points` to the broken line through `line`, both of shape (n, 2).
 
-    The nearest vertex is looked up in a tree, then the two segments that meet there are measured.
+    The two segments at the vertex nearest to a point, looked up in a tree, bound its distance from
+    above. The point with the largest bound is measured to the whole line, until that is its bound.
     """
     if len(line) == 1:
         return float(np.max(np.linalg.norm(points - line[0], axis=1)))
     nearest = scipy.spatial.cKDTree(line).query(points)[1]
-    best = np.full(len(points), math.inf)
-    for shift in (-1, 0):
-        start = np.clip(nearest + shift, 0, len(line) - 2)
-        a, along = line[start], line[start + 1] - line[start]
-        share = np.clip(np.sum((points - a) * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * along, axis=1))
-    return float(np.max(best))
+    starts = (np.clip(nearest + shift, 0, len(line) - 2) for shift in (-1, 0))
+    most = np.min([_apart(points, line[k], line[k + 1]) for k in starts], axis=0)
+    while True:
+        farthest = np.argmax(most)
+        exact = np.min(_apart(points[farthest], line[:-1], line[1:]))
+        if exact >= most[farthest]:
+            return float(exact)
+        most[farthest] = exact
+
+
+def _apart(points: Floats, start: Floats, end: Floats) -> Floats:
+    """Distances of points from segments."""
+    along, away = end - start, points - start
+    share = np.clip(np.sum(away * along, axis=1) / np.sum(along**2, axis=1), 0.0, 1.0)
+    return np.asarray(np.linalg.norm(away - share[:, None] * along, axis=1))
 
 
 def _agree_until(pair: figures.Pair) -> tuple[float, str]:

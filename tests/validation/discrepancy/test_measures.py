@@ -89,6 +89,12 @@ WORKED_OUT = {
         {"theta": np.where(T < 5.01, 0.0, 1.0)},
         {"theta_peak": pytest.approx(1.0), "theta_hausdorff": pytest.approx(0.01 * 2.14, rel=0.02)},
     ),
+    # Half way up, no sample of the jump is near, but the jump is.
+    "a jump in two": (
+        {"theta": 0.5 * (T >= 4.9) + 0.5 * (T >= 5.1)},
+        {"theta": np.where(T < 5.0, 0.0, 1.0)},
+        {"theta_hausdorff": pytest.approx(0.1 * 2.14, rel=0.02)},
+    ),
 }
 
 
