@@ -58,16 +58,14 @@ def run(
     reading = recordings.Reading(**settings_of(read or (), "--read"))
     asked = sets.files_of(files)
     known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
-    found = [(path, one) for path, components in known.items() for _, one in components]
-    told = [_finding(path, record) for path, record in found]
+    found = [(path, *one) for path, components in known.items() for one in components]
+    told = [_finding(path, record) for path, _, record in found]
     for one in told:
         document.show(one, console())
     if plot is not None and found:
         from rockcheck.reports.show.drawing import recordings_figure
 
-        figure = recordings_figure(
-            [(f"{path.name} {one.component}".strip(), one) for path, one in found[:12]]
-        )
+        figure = recordings_figure([(name, one) for _, name, one in found[:12]])
         console().print(f"figure: {save_as(figure, plot)}", soft_wrap=True)
     if found:
         values = [one.data for one in told]

@@ -1,6 +1,7 @@
 """Sets of recorded motions: their files, and their horizontal and vertical components."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -54,7 +55,7 @@ def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, b
         inside = sorted(one for one in listed if one.is_file() and not one.name.startswith("."))
         if not inside:
             raise InputError(f"{printable(path)}: {none}")
-        found = dict.fromkeys(inside, False) | found
+        found |= {one: found.get(one, False) for one in inside}
     return found
 
 
@@ -107,22 +108,25 @@ def _parted(
 def read_files(paths: Iterable[Path], reading: Reading) -> tuple[Components, list[InputError]]:
     """The components of each file that can be read, by name, and the faults of the others.
 
-    A component's name is that of its file, with its own name added where the file has several.
-    Raises `InputError` for a file that was named itself.
+    A component's name is that of its file, with its own name added where the file has several, and
+    the folder's where files of two folders have one name. Raises `InputError` for a file that was
+    named itself.
     """
     read: Components = {}
+    paths = paths if isinstance(paths, Mapping) else dict.fromkeys(paths, True)
+    alike = Counter(path.name for path in paths)
     faults: list[InputError] = []
     for path in paths:
         try:
             found = read_components(path, reading)
         except InputError as error:
-            if not isinstance(paths, Mapping) or paths[path]:
+            if paths[path]:
                 raise
             faults.append(error)
         else:
+            name = path.name if alike[path.name] == 1 else "/".join(path.parts[-2:])
             read[path] = [
-                (f"{path.name} {one.component}" if len(found) > 1 else path.name, one)
-                for one in found
+                (f"{name} {one.component}" if len(found) > 1 else name, one) for one in found
             ]
     return read, faults
 
