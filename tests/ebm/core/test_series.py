@@ -157,6 +157,7 @@ def test_noise_is_no_sign(noise):
         ([-0.5 * noise, 1.0], 1),
         ([0.0, -0.5 * noise / series.AHEAD, 1.0], 1),
         ([0.7 * noise, 0.7 * noise / series.AHEAD], 0),
+        ([-noise, 2.0 * noise / series.AHEAD], 0),
     ):
         assert [leading(side * np.array(terms), noise) for side in (1, -1)] == [sign, -sign], terms
     for terms, root in (([0.5, 0.0, -1.0 / noise], 0.0), ([-0.5, 0.0, 1.0 / noise], None)):
@@ -174,6 +175,8 @@ def test_noise_is_no_sign(noise):
         # that they bring is not that of a slope. The third one's is.
         ([0.0, -1e-7, 0.0, 1e12], -1),
         ([0.0, -1e-7, 1e12], 1),
+        # Rounding of the slope, in the time that is looked ahead.
+        ([1e-12, -1e3], -1),
     ],
     ids=str,
 )
