@@ -121,6 +121,7 @@ def overturning_spectrum(
     evaluations = 0
     if play is None:
         model = model or EventBasedModel(tolerance=TOLERANCE)
+        errors.check_kind(model, EventBasedModel, "EventBasedModel()", "model")
         model.check(scene)
 
         play = partial(

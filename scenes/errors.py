@@ -43,8 +43,10 @@ def refuse(*faults: tuple[object, str, str]) -> None:
 def check_kind(value: object, kind: type, how: str, key: str) -> None:
     """Raise `InputError` unless `value` is a `kind`; `how` names a source of one."""
     if not isinstance(value, kind):
+        n = "n" * kind.__name__.startswith(("A", "E", "I", "O", "U"))
         raise InputError(
-            f"{printable(repr(value))} is not allowed: give a {kind.__name__}, as from {how}", key
+            f"{printable(repr(value))} is not allowed: give a{n} {kind.__name__}, as from {how}",
+            key,
         )
 
 

@@ -184,10 +184,17 @@ def test_the_facade_has_every_public_name():
         (lambda: rockcheck.MuJoCo().simulate("fig5a"), "scene", "Scene"),
         (lambda: rockcheck.overturning_spectrum("fig5a", [1.0, 2.0], [1.0, 2.0]), "scene", "Scene"),
         (lambda: rockcheck.predictability_horizon("fig5a"), "scene", "Scene"),
+        (
+            lambda: rockcheck.overturning_spectrum(
+                rockcheck.load_scene("fig4a"), [1.0], [1.0], model=rockcheck.MuJoCo()
+            ),
+            "model",
+            "EventBasedModel",
+        ),
     ],
 )
 def test_what_is_no_scene_or_history_is_named(call, key, wanted):
-    with pytest.raises(rockcheck.InputError, match=f"{key}: .* is not allowed: give a {wanted}"):
+    with pytest.raises(rockcheck.InputError, match=f"{key}: .* is not allowed: give an? {wanted}"):
         call()
 
 
