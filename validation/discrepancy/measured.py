@@ -4,6 +4,7 @@
 """
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -147,7 +148,9 @@ def mean_history(tests: Sequence[History]) -> History:
     channels = {"t": t, **{name: rows.mean(axis=0) for name, rows in stacked.items()}}
     theta = stacked["theta"]
     scatter = {
-        "theta_rms": float(np.sqrt(np.mean(np.var(theta, axis=0, ddof=1)))),
+        "theta_rms": math.sqrt(
+            scipy.integrate.trapezoid(np.var(theta, axis=0, ddof=1), t) / (t[-1] - t[0])
+        ),
         "peak_rotation": float(np.std(np.max(np.abs(theta), axis=1), ddof=1)),
     }
     if "slip" in stacked:
