@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core import lanes
+from rockcheck.ebm.core.names import Kind
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 #: Order of the series. From 14 to 20 the same error costs about the same, at all tolerances; 16
@@ -70,15 +71,19 @@ def value(a, row, n, tau):
 
 
 @inner_kernel
+def _rates(a, row, n):
+    """The halves of the slope of c."""
+    return (
+        lanes.upto(lanes.load(a, row, 1), n - 1) * (lanes.ramp() + 1.0),
+        lanes.upto(lanes.load(a, row, lanes.LANES + 1), n - 1 - lanes.LANES) * (lanes.ramp() + 9.0),
+    )
+
+
+@inner_kernel
 def slope(a, row, n, tau):
     """dc/dtau at tau for a polynomial of degree n >= 1."""
-    low, high = (
-        lanes.upto(lanes.load(a, row, 1), n - 1),
-        lanes.upto(lanes.load(a, row, lanes.LANES + 1), n - 1 - lanes.LANES),
-    )
-    return lanes.total(
-        (low * (lanes.ramp() + 1.0) + high * (lanes.ramp() + 9.0) * eighth(tau)) * lanes.powers(tau)
-    )
+    low, high = _rates(a, row, n)
+    return lanes.total((low + high * eighth(tau)) * lanes.powers(tau))
 
 
 @inner_kernel
@@ -95,6 +100,13 @@ def least_change(low, high, h):
     for term in (lanes.first(lanes.shifted(once)), lanes.first(once)):
         least = min(least + term, 0.0)
     return least
+
+
+@inner_kernel
+def only_falls(a, row, n, tau):
+    """Whether c is known to fall from 0 to tau."""
+    low, high = _rates(a, row, n)
+    return lanes.first(low) < least_change(low * -1.0, high * -1.0, tau)
 
 
 @inner_kernel
@@ -246,6 +258,33 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
     return NO_ROOT if z < 0.0 else z * h
 
 
+@called_kernel
+def largest(a, row, rate, scratch, n, tau, stack):
+    """The largest value of c at its start and at its tops up to tau.
+
+    `rate` is the row of its slope, `scratch` a free one. The slope is followed from one of its
+    roots to the next: where it turns negative, c is at a top.
+    """
+    top, t, once = a[row, 0], 0.0, only_falls(a, rate, n - 1, tau)
+    for k in range(n):
+        a[scratch, k] = a[rate, k]
+    for turn in range(n):
+        noise = NOISE[Kind.POSITION]
+        root = first_root(a, scratch, n - 1, tau - t, tau - t, noise, AHEAD, stack)
+        if not root >= 0.0:  # none, or not finite
+            break
+        t += root
+        if turn % 2 == 0:
+            top = max(top, value(a, row, n, t))
+        if once:
+            break
+        for i in range(n):  # seen from there, and with the other sign
+            for k in range(n - 2, i - 1, -1):
+                a[scratch, k] += root * a[scratch, k + 1]
+            a[scratch, i] *= -1.0
+    return top
+
+
 @inner_kernel
 def _isolate(stack, n):
     """First root on [0, 1] of the polynomial in stack[0], positive at 0; NaN if not finite.
@@ -316,10 +355,7 @@ def _falling_root(stack, row, n, end):
     after the next one, if they go on shrinking quadratically, would be below rounding.
     """
     low, high = halves(stack, row, n)
-    low_slope = lanes.upto(lanes.load(stack, row, 1), n - 1) * (lanes.ramp() + 1.0)
-    high_slope = lanes.upto(lanes.load(stack, row, lanes.LANES + 1), n - 1 - lanes.LANES) * (
-        lanes.ramp() + 9.0
-    )
+    low_slope, high_slope = _rates(stack, row, n)
     a, b = 0.0, 1.0
     begin, fall = stack[row, 0], -stack[row, 1]
     z = min(

@@ -13,7 +13,16 @@ from rockcheck.ebm.core.ground import next_exceedance
 from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Rule, Shape
-from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, first_root, slope, stays_below, value
+from rockcheck.ebm.core.series import (
+    AHEAD,
+    INSTANT,
+    NOISE,
+    largest,
+    only_falls,
+    slope,
+    stays_below,
+    value,
+)
 from rockcheck.ebm.core.state import mode_code, note, on_wall, rests
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -60,15 +69,17 @@ def advance(block, base, run):
     """Moves the state to the end of the step; keeps the largest rotation on the way."""
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     order, tau, t = state.order, state.tau, state.t
-    rises = mode.family == Family.TILT and a[Row.OMEGA, 0] > 0.0
     motion_at(block, state, run.a, tau, motion)
-    turns = rises and mode.sense * motion.w < 0.0
-    if turns and not stays_below(a, Row.PHI, order, tau, state.peak):
-        noise = NOISE[Kind.POSITION]
-        top = first_root(a, Row.OMEGA, order - 1, tau, tau, noise, AHEAD, run.stack)
-        if top > 0.0:
-            state.peak = max(state.peak, value(a, Row.PHI, order, top))
-    if turns and run.state.control.until_decided:
+    falls = mode.family == Family.TILT and mode.sense * motion.w < 0.0
+    rises = a[Row.OMEGA, 0] >= 0.0
+    if (
+        falls
+        and (rises or not only_falls(a, Row.OMEGA, order - 1, tau))
+        and not stays_below(a, Row.PHI, order, tau, state.peak)
+    ):
+        top = largest(a, Row.PHI, Row.OMEGA, Row.GUARD, order, tau, run.stack)
+        state.peak = max(state.peak, top)
+    if falls and rises and run.state.control.until_decided:
         state.repeats = swings_again(state, energy_of(block, motion))
     state.peak = max(state.peak, abs(motion.theta))
     state.swing = max(state.swing, abs(motion.w))

@@ -145,14 +145,16 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
 
 def decided_early(scenes, tolerance, **near):
     """Runs of scenes, decided as soon as all is certain: sides and peaks are those of the whole
-    runs, on however many threads."""
+    runs, on however many threads. No row of them is above its peak."""
     model = EventBasedModel(tolerance=tolerance)
     early, whole = (
-        batch.run_batch(batch.pack(scenes, model), model, until_decided=decided, jobs=jobs)
-        for decided, jobs in ((True, 1), (False, 3))
+        batch.run_batch(batch.pack(scenes, model), model, until_decided=not rows, rows=rows, jobs=n)
+        for rows, n in ((0, 1), (8000, 3))
     )
     np.testing.assert_array_equal(early.side, whole.side)
-    np.testing.assert_allclose(early.peak, whole.peak, **near)
+    np.testing.assert_allclose(
+        early.peak, np.maximum(whole.peak, np.abs(whole.out[..., 2]).max(axis=1)), **near
+    )
     assert np.sum(early.steps) < np.sum(whole.steps)
     return early
 
@@ -160,7 +162,11 @@ def decided_early(scenes, tolerance, **near):
 def grid(most, *walls, **about):
     return [
         node_scene(scene(*walls, **about), *node, settle=60.0)
-        for node in itertools.product(np.linspace(1.0, most, 9), np.linspace(0.5, 6.0, 9))
+        for node in itertools.product(
+            # Where the pulse is weak a swing is one step, or turns twice in one.
+            [1.01, 1.0625, *np.linspace(1.5, most, 7)],
+            np.linspace(0.5, 6.0, 9),
+        )
     ]
 
 

@@ -6,7 +6,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
-from numpy.polynomial.polynomial import polyder, polyfromroots, polyroots, polyval
+from numpy.polynomial.polynomial import polyder, polyfromroots, polyint, polyroots, polyval
 from stepping import row_of, run_at
 
 from rockcheck.ebm.core import (
@@ -198,14 +198,17 @@ def test_what_is_noise_at_first_may_grow(noise):
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_what_stays_below_a_level_is_below_it(seed):
+def test_the_largest_value_is_that_of_the_highest_top(seed):
+    """However often the slope changes its sign on the way, and with whichever it begins."""
     r = np.random.default_rng(seed)
-    n, tau = 8, r.uniform(0.1, 2.0)
-    a = row_of(r.normal(size=n + 1) / np.cumprod(np.arange(1.0, n + 2.0)))
-    highest = max(series.value(a, 0, n, t) for t in np.linspace(0.0, tau, 2001))
-    for level in highest + np.array([-0.5, -1e-3, -1e-9, 0.1, 2.0]):
-        assert highest < level or not series.stays_below(a, 0, n, tau, level)
-    assert series.stays_below(a, 0, n, tau, abs(highest) + 1e3)
+    tau, n = r.uniform(0.1, 2.0), seed % 6
+    turns = np.array([0.0, *tau * np.sort(r.uniform(0.05, 0.95, n))])
+    rate = r.choice([-1.0, 1.0]) * polyfromroots([*turns[seed % 2 :], tau + 1.0])
+    c = polyint(rate, k=r.normal())
+    a, stack = np.stack([row_of(some)[0] for some in (c, rate, c)]), np.ones((48, series.WIDTH))
+    assert series.largest(a, 0, 1, 2, len(rate), tau, stack) == pytest.approx(
+        max(polyval(turns, c)), abs=1e-13
+    )
 
 
 @pytest.mark.parametrize("degree", [2, 3, 6])
