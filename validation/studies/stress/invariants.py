@@ -263,8 +263,8 @@ INVARIANTS = {
         ),
         (
             "decided",
-            "peak of a run that ends once it is certain, against the whole run's, rad (pi: another"
-            " side)",
+            "peak of a run that ends once it is certain, against the whole run's and its rows', rad"
+            " (pi: another side)",
             1e-6,
         ),
         # of models that approximate contact
@@ -413,23 +413,25 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
 def _decided_apart(model: EventBasedModel, scene: Scene) -> float:
     """How far the peak of a run that ends once it is certain is from the whole run's, rad.
 
-    Pi where they overturn to other sides. 0 where no run ends so (Bouc-Wen), or the whole one has
-    not ended `SETTLED` after the base.
+    Or, if more, how far a row of the whole run is above its peak. Pi where they overturn to other
+    sides. 0 where no run ends so (Bouc-Wen), or the whole one has not ended `SETTLED` after the
+    base.
     """
     if not model.decides:
         return 0.0
     rows, capped = batch.pack([scene], model), model.model_copy(update={"most_steps": MOST_STEPS})
     quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
     ends = rows.durations / scene.duration * quiet + SETTLED
+    rows = rows._replace(durations=ends, output_steps=ends / MOST_ROWS)
     early, whole = (
-        batch.run_batch(
-            rows._replace(durations=ends), capped, until_decided=decided, strict=False, jobs=1
-        )
-        for decided in (True, False)
+        batch.run_batch(rows, capped, until_decided=not count, rows=count, strict=False, jobs=1)
+        for count in (0, MOST_ROWS)
     )
     if early.failed[0] or not (whole.side[0] or whole.at_rest[0]):
         return 0.0
-    return float(abs(early.peak - whole.peak)[0]) if early.side == whole.side else math.pi
+    seen = np.max(np.abs(whole.out[0, : whole.rows[0], 2])) - whole.peak[0]
+    apart = max(abs(early.peak - whole.peak)[0], seen)
+    return float(apart) if early.side == whole.side else math.pi
 
 
 def _energy(model: EventBasedModel, scene: Scene) -> float | None:
