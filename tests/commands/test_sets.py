@@ -42,11 +42,10 @@ def at2(name: str, gain: float, component: str) -> None:
 @pytest.fixture(autouse=True)
 def files(in_an_empty_folder):
     Path("rack.toml").write_text(SCENE, "utf-8")
-    for folder in ("records", "more"):
-        Path(folder).mkdir()
+    Path("records/more").mkdir(parents=True)
     for name, gain, component in (
         *(("records/RSN1_H1", 0.1, "180"), ("records/RSN1_H2", 0.2, "270")),
-        *(("records/RSN1_V", 0.3, "UP"), ("more/RSN1_H1", 0.1, "180"), ("Ä", 0.1, "180")),
+        *(("records/RSN1_V", 0.3, "UP"), ("records/more/RSN1_H1", 0.1, "180"), ("Ä", 0.1, "180")),
         ("Ö", 0.2, "180"),
     ):
         at2(f"{name}.AT2", gain, component)
@@ -69,7 +68,7 @@ def names(left_out: list[str]) -> list[str]:
         (["records/RSN1_H1.AT2", "records/RSN1_H2.AT2"], HORIZONTAL, []),  # as a shell gives it
         (["records"], HORIZONTAL, [VERTICAL, ODD]),
         (["records/RSN1_*.AT2"], HORIZONTAL, [VERTICAL]),
-        (["records/RSN1_H1.AT2", "more"], ["records-RSN1_H1", "more-RSN1_H1"], []),
+        (["records/RSN1_H1.AT2", "records/more"], ["records-RSN1_H1", "more-RSN1_H1"], []),
         (["?.AT2"], ["- 1", "- 2"], []),  # which no name of a scene can tell apart
         (["elcentro_1940_ns.csv"], ["elcentro_1940_ns"], []),  # one that comes with the package
     ],
