@@ -84,9 +84,9 @@ SWEPT, MOST_SWEEPS = 1e-5, 50
 SHALLOW, GENTLE = 0.1, 0.01
 #: A run whose energy exceeds the work done on it by this share has blown up.
 ENERGY = 0.02
-#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff that friction follows the
-#: normal force without lag.
-FRICTION_DAMPING = 1000.0
+#: Damping of the floor's friction spring in units of sqrt(k/m): so stiff, also beside the damper of
+#: an impact without restitution, that friction follows the normal force without lag.
+FRICTION_DAMPING = 1e5
 #: A surface within this distance (m) of the block at the start is touched already.
 TOUCHING = 1e-9
 #: How a stretch of motion ended.

@@ -6,7 +6,7 @@ import pytest
 from cases import UNAMBIGUOUS, free_rocking, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
-from rockcheck import ContinuousModel, EventBasedModel, Floor, Sine, load_scene
+from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, Sine, load_scene
 from rockcheck.scenes import PAPER_BLOCK
 
 
@@ -43,8 +43,24 @@ def rigid(scene):
             0.35,
             2e-4,
         ),
+        (
+            free_rocking(
+                0.5,
+                block=Block(half_width=0.5, half_height=1.0),
+                floor=Floor(friction=0.4),
+                duration=1.5,
+            ),
+            rigid,
+            (1e-6, 1e-8, 1e-10),
+            0.8,
+            1e-8,
+        ),
     ],
-    ids=["with the penetration in rocking", "with the duration of a wall contact"],
+    ids=[
+        "with the penetration in rocking",
+        "with the duration of a wall contact",
+        "with the penetration where friction decides an impact",
+    ],
 )
 def test_error_falls(scene, play, depths, order, least):
     exact = play(scene)
