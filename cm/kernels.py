@@ -784,27 +784,27 @@ def run_to(
 def advance(
     contacts: Contacts,
     base: tuple[Samples, Samples],
-    output_step: float,
     state: Floats,
     events: Floats,
-    first_row: int,
+    times: Floats,
     output: Floats,
 ) -> tuple[int, int, int, int, int, float]:
     """Fills the rows of `output` with the motion that follows `state`, which is moved along.
 
-    A row is x, y, theta and their rates. `state` (12) continues with the time until which a contact
-    is young, the step that it needs, the time until an open contact closes, when the first strike
-    began that is not written yet, the energy allowed by the work done on the block, and that work
-    with every part of it counted as positive. `events`
-    gets rows (onset time, contact, impulse). Returns the ending (DONE, OVERTURNED or BLOWN_UP), the
-    rows and events written, the steps taken, the sweeps over the surfaces, and the time reached.
+    The first of the `times` is that of `state`, the others are those of the rows. A row is x, y,
+    theta and their rates. `state` (12) continues with the time until which a contact is young, the
+    step that it needs, the time until an open contact closes, when the first strike began that is
+    not written yet, the energy allowed by the work done on the block, and that work with every part
+    of it counted as positive. `events` gets rows (onset time, contact, impulse). Returns the ending
+    (DONE, OVERTURNED or BLOWN_UP), the rows and events written, the steps taken, the sweeps over
+    the surfaces, and the time reached.
     """
     parameters = contacts.parameters
     n_events = steps = sweeps = 0
-    t = (first_row - 1) * output_step
     for row in range(len(output)):
-        end = (first_row + row) * output_step
-        falls, n_events, taken, swept, t = run_to(contacts, base, (t, end), state, events, n_events)
+        falls, n_events, taken, swept, t = run_to(
+            contacts, base, (times[row], times[row + 1]), state, events, n_events
+        )
         steps += taken
         sweeps += swept
         if falls:
@@ -816,4 +816,4 @@ def advance(
         if not (energy <= allowed + ENERGY * gross and energy < 1e300):
             return BLOWN_UP, row, n_events, steps, sweeps, t
         output[row, :] = state[:6]
-    return DONE, len(output), n_events, steps, sweeps, t
+    return DONE, len(output), n_events, steps, sweeps, times[-1]

@@ -115,7 +115,7 @@ class ContinuousModel(Frozen):
         began = time.perf_counter()
         from rockcheck.cm import kernels
 
-        times = scene.output_times
+        times = scene.run_times
         stiffness, dt = self.stiffness_in(scene), self.time_step_in(scene)
         if times[-1] / dt > MOST_STEPS:
             raise errors.ModelFailure(
@@ -130,13 +130,15 @@ class ContinuousModel(Frozen):
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
         strikes_a_slab = math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2
         events = np.empty((len(contacts.memory) * strikes_a_slab, 3))
-        advance = partial(kernels.advance, contacts, base, scene.output_step, state, events)
-        advance(1, output[:0])  # compiles, or reads the compiled loop from its cache
+        advance = partial(kernels.advance, contacts, base, state, events)
+        advance(times[:1], output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
         strikes: list[Floats] = []
         row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
         while row < len(times) and ending == kernels.DONE:
-            slab = partial(advance, row, output[row : row + rows_a_slab])
+            slab = partial(
+                advance, times[row - 1 : row + rows_a_slab], output[row : row + rows_a_slab]
+            )
             ending, rows, found, more_steps, more_sweeps, reached = progress.interruptible(slab)
             row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
             strikes.append(events[:found].copy())

@@ -37,13 +37,13 @@ def events_of(scene: Scene, t: Floats, states: Floats, felt: Floats) -> list[Eve
     motion = _Motion(scene, t, states, felt)
     found = [event for i in range(len(motion.contacts)) for event in motion.at_contact(i)]
     found += motion.at_floor()
+    end = scene.run_times[-1] * (1.0 + 1e-12)  # a step of fixed length may go beyond
     if abs(states[-1, 2]) >= steps.LYING:
         part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
-        side = "left" if states[-1, 2] > 0 else "right"
-        end = t[-2] + min(part, 1.0) * (t[-1] - t[-2])
-        found = [event for event in found if event[0] < end]
-        found.append((end, f"overturned {side}", len(t) - 1, 0.0))
-    found.sort(key=lambda event: event[0])
+        end = min(end, t[-2] + min(part, 1.0) * (t[-1] - t[-2]))
+        fall = "overturned left" if states[-1, 2] > 0 else "overturned right"
+        found = [*(event for event in found if event[0] < end), (end, fall, len(t) - 1, 0.0)]
+    found = sorted((event for event in found if event[0] <= end), key=lambda event: event[0])
     before = motion.modes([max(event[2] - 1, 0) for event in found])
     after = motion.modes([motion.later(event[2]) for event in found])
     return [

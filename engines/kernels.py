@@ -106,7 +106,7 @@ def begun(scene: Scene, longest: float, short: float) -> tuple[Course, March]:
         starts=np.array([*base_motion.starts_of_motion(scene, *base), math.inf]),
         across=across,
         up=up,
-        end=float(scene.output_times[-1]),
+        end=float(scene.run_times[-1]),
         gravity=scene.gravity,
         standing=scene.block.weaker_pivot.height,
         longest=longest,

@@ -138,17 +138,16 @@ def march_fixed(world: World, scene: Scene, times: Floats, felt: Floats) -> Marc
 
 
 def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
-    """States on the output grid: positions by cubic Hermite interpolation, velocities linear.
+    """States at the run's times: positions by cubic Hermite interpolation, velocities linear.
 
     Velocities jump at impacts, where a cubic would overshoot.
     """
     from scipy.interpolate import CubicHermiteSpline
 
-    wanted = scene.output_times
-    wanted = wanted[wanted <= times[-1] * (1.0 + 1e-12) + 1e-12]
+    inside = scene.run_times
+    inside = np.minimum(inside[inside <= times[-1] * (1.0 + 1e-12) + 1e-12], times[-1])
     if len(times) == 1:
-        return states[: len(wanted)]
-    inside = np.minimum(wanted, times[-1])
+        return states[: len(inside)]
     positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
     velocities = np.column_stack(
         [np.interp(inside, times, states[:, column]) for column in (3, 4, 5)]
@@ -166,7 +165,7 @@ class FixedStep:
 
     def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
         """The march of a world through a scene, which is still to be called."""
-        count = math.ceil(scene.output_times[-1] / self.largest - 1e-9)
+        count = math.ceil(scene.run_times[-1] / self.largest - 1e-9)
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
         base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
@@ -192,7 +191,7 @@ class AdaptiveStep:
 
         Its compiled step is loaded. The scene is one of a block with R = 1, see `in_units_of`. The
         march raises `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end /
-        `largest` steps, `end` the scene's last output time.
+        `largest` steps, `end` the last of the scene's `run_times`.
         """
         from rockcheck.engines import kernels
         from rockcheck.scenes.compiled import for_types_of

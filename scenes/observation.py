@@ -32,20 +32,20 @@ def observe(
 ) -> History:
     """The History of a run, from its `state` at the output times.
 
-    `state` has one row per output time: x, y, theta, x_dot, y_dot, theta_dot (SI). Fewer rows than
-    `scene.output_times` mean that the run ended early; rows from the first |theta| >= pi/2 on are
-    left out. `mode` and `outcome` are derived from the motion where the model does not know them;
-    `about` are further fields of `History`, such as its cost and settings. Adds a note where the
-    record is shorter than the scene.
+    `state` has one row per output time, and may have one at the duration (`Scene.run_times`): x, y,
+    theta, x_dot, y_dot, theta_dot (SI). Fewer rows mean that the run ended early; rows from the
+    first |theta| >= pi/2 on are left out. `mode` and `outcome` are derived from the motion where
+    the model does not know them; `about` are further fields of `History`, such as its cost and
+    settings. Adds a note where the record is shorter than the scene.
     Raises `ValueError` where the block overturned and the model neither reported the event nor
     knows the outcome.
     """
     tipped = np.flatnonzero(np.abs(state[:, 2]) >= math.pi / 2)
     rows = max(int(tipped[0]) if tipped.size else len(state), 1)
-    state = state[:rows]
+    state, on_grid = state[:rows], len(scene.output_times) if rows == len(scene.run_times) else rows
     channels: dict[str, NDArray[Any]] = {
         "t": scene.output_times[:rows],
-        **dict(zip(STATE, state.T, strict=True)),
+        **dict(zip(STATE, state[:on_grid].T, strict=True)),
     }
     channels["slip"] = kinematics.slip(scene.block, channels["x"], channels["theta"])
     channels["slip_rate"] = kinematics.slip_rate(
@@ -56,7 +56,7 @@ def observe(
     if outcome is None and not (outcome := next(told, None)):
         if tipped.size:
             raise ValueError("a model that lets the block overturn must report the event")
-        outcome = outcome_of(channels)
+        outcome = outcome_of(dict(zip(STATE, state.T, strict=True)))
     return History(
         name=scene.name,
         model=model,

@@ -154,8 +154,15 @@ class Scene(Shown, Frozen):
     @property
     def output_times(self) -> Floats:
         """The output grid: multiples of `output_step` from 0 up to `duration`, s."""
-        steps = math.floor(self.duration / self.output_step * (1.0 + 1e-12))
-        return self.output_step * np.arange(steps + 1, dtype=np.float64)
+        return self.output_step * np.arange(
+            math.floor(self.duration / self.output_step * (1.0 + 1e-12)) + 1, dtype=np.float64
+        )
+
+    @property
+    def run_times(self) -> Floats:
+        """The output grid and, where it ends earlier, the duration: a run goes to the last, s."""
+        grid = self.output_times
+        return np.append(grid, self.duration) if grid[-1] < self.duration * (1.0 - 1e-12) else grid
 
     @property
     def initial_state(self) -> tuple[float, float, float, float, float, float]:
