@@ -87,7 +87,7 @@ ENERGY = 0.02
 #: Damping of the floor's friction spring in units of sqrt(k/m): so stiff, also beside the damper of
 #: an impact without restitution, that friction follows the normal force without lag.
 FRICTION_DAMPING = 1e5
-#: A surface within this distance (m) of the block at the start is touched already.
+#: A surface within this distance (m) of the block at the start is touched, unless it is struck.
 TOUCHING = 1e-9
 #: How a stretch of motion ended.
 DONE, OVERTURNED, BLOWN_UP = 0, 1, 2
@@ -242,9 +242,11 @@ def begun(
         2.0 * math.sqrt(stiffness) * np.array(parameters.damping_ratio), 2
     )
     for wall in scene.walls:
-        if kinematics.clearance(scene.block, wall.side, wall.gap, x, tilt) < TOUCHING:
-            surface = LEFT_WALL if wall.side == "left" else RIGHT_WALL
-            memory[2 * surface : 2 * surface + 2, LAST_CLOSED] = 0.0
+        one = 2 * LEFT_WALL if wall.side == "left" else 2 * RIGHT_WALL
+        away, toward = kinematics.side_corners(
+            scene.block, wall.side, wall.gap, x, tilt, rates[0], rates[2]
+        ).T
+        memory[one : one + 2, LAST_CLOSED][(away < TOUCHING) & (toward <= 0.0)] = 0.0
     placed = np.array(kinematics.of_mass(scene.block, scene.initial_state))
     if scene.initial_height < TOUCHING:
         standing = [2 * FLOOR] * (tilt >= 0.0) + [2 * FLOOR + 1] * (tilt <= 0.0)

@@ -79,8 +79,8 @@ class _Motion:
         # arrives.
         arrives = self.gap[:, :-1] + 2.0 * np.diff(t) * rate[:, :-1] < self.near
         struck = (rate[:, :-1] < -HOLD * scene.gravity) & (rate[:, 1:] > 0.5 * rate[:, :-1])
-        self.touching: Flags = self.gap < self.near
-        self.touching[:, 1:] |= arrives & struck
+        self.touching: Flags = (self.gap < self.near) | np.pad(arrives & struck, ((0, 0), (1, 0)))
+        self.touching[:, 0] &= rate[:, 0] >= -HOLD * scene.gravity  # else it strikes at the start
         self.closed = [_held(touching, t) for touching in self.touching]
         #: The states of the box's centre.
         self.box = kinematics.of_box(scene.block, states)
@@ -89,7 +89,9 @@ class _Motion:
     def onset(self, contact: int, index: int) -> float:
         """When the gap that is closed at `index` and was open before passed zero, s."""
         before, after = self.gap[contact, index - 1 : index + 1]
-        part = min(max(before / (before - after), 0.0), 1.0) if before > after else 1.0
+        part = (
+            min(max(before / (before - after), 0.0), 1.0) if before > after else float(before > 0.0)
+        )
         return float(self.t[index - 1] + part * (self.t[index] - self.t[index - 1]))
 
     def at_contact(self, contact: int) -> list[Found]:
