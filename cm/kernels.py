@@ -80,8 +80,9 @@ SHORTEST = 1e-3
 #: MOST_SWEEPS.
 SWEPT, MOST_SWEEPS = 1e-5, 50
 #: No step is cut for a contact that would close by less than this share of the depth under the
-#: block's weight; a contact that closes more slowly than this share of g/sqrt(k/m) is no impact.
-SHALLOW, GENTLE = 0.1, 0.01
+#: block's weight; a contact that closes more slowly than this share of g/sqrt(k/m) is no impact; a
+#: corner that strikes does not slip if it arrives with less than this share of its normal speed.
+SHALLOW, GENTLE, STUCK = 0.1, 0.01, 1e-3
 #: A run whose energy exceeds the work done on it by this share has blown up.
 ENERGY = 0.02
 #: Damping of the floor's friction spring in units of sqrt(k/m): so stiff, also beside the damper of
@@ -333,7 +334,8 @@ def effective_mass(
     k_c: float,
     normal: float,
     tangential: float,
-    friction: float,
+    mu_s: float,
+    mu_k: float,
     restitution: float,
 ) -> float:
     """Share of the block's mass that a corner brings to an impact with friction.
@@ -344,15 +346,16 @@ def effective_mass(
     normal and by k_c = -3 r_n r_t/R^2 along the surface, a tangential one by k_c and k_t = 1 + 3
     r_n^2/R^2 (r_n, r_t: offset of the corner from the centroid). Friction that holds the corner
     makes it heavier, 1/m = k_n - k_c^2/k_t; friction mu N that it slips against gives 1/m = k_n +
-    mu k_c, signed as it acts. The rigid impact decides which of the two holds. Slip that stops or
-    reverses within the impact is left out.
+    mu k_c, signed as it acts. The rigid impact decides which of the two holds, with static friction
+    where the corner does not slip as it arrives. Slip that stops or reverses within the impact is
+    left out.
     """
     held = k_n - k_c * k_c / k_t
     push = (-(1.0 + restitution) * normal + k_c * tangential / k_t) / held
-    shear = -(tangential + k_c * push) / k_t
-    if push > 0.0 and abs(shear) <= friction * push:
+    shear, sticks = -(tangential + k_c * push) / k_t, abs(tangential) <= STUCK * abs(normal)
+    if push > 0.0 and abs(shear) <= (mu_s if sticks else mu_k) * push:
         return 1.0 / held
-    return 1.0 / (k_n + math.copysign(friction, shear) * k_c)
+    return 1.0 / (k_n + math.copysign(mu_k, shear) * k_c)
 
 
 @inner_kernel
@@ -468,6 +471,7 @@ def closes(
                 comes.rate,
                 comes.slip,
                 parameters.mu_s,
+                parameters.mu_k,
                 parameters.restitution[surface],
             )
         else:

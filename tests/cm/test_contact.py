@@ -121,6 +121,6 @@ def push_of_impact(k_n, k_t, k_c, normal, tangential, mu, e):
 def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c, sliding):
     k_n, k_t, e = 1.2, 3.8, 0.5
     impact = (k_n, k_t, k_c, -1.0, sliding, mu, e)
-    mass = effective_mass(*impact)
+    mass = effective_mass(*impact[:6], mu, e)
     assert mass == pytest.approx(push_of_impact(*impact) / (1.0 + e), rel=1e-9)
     assert not sliding or mass == pytest.approx(1.0 / (k_n - math.copysign(mu, sliding) * k_c))

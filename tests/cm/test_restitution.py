@@ -20,12 +20,12 @@ from rockcheck.scenes import PAPER_BLOCK
 RESTITUTIONS = [0.0, 0.25, 0.5, 0.75, 1.0]
 
 
-def scene(*, friction=0.3, floor=0.0, wall=None, gap=0.03, side="left", **change):
+def scene(*, friction=0.3, static=None, floor=0.0, wall=None, gap=0.03, side="left", **change):
     return Scene(
         **{
             "name": "strike",
             "block": PAPER_BLOCK,
-            "floor": Floor(friction=friction, restitution=floor),
+            "floor": Floor(friction=friction, static_friction=static, restitution=floor),
             "walls": [] if wall is None else [Wall(side=side, gap=gap, restitution=wall)],
             "duration": 0.7,
             "output_step": 0.001,
@@ -72,6 +72,13 @@ FLOOR = {
     },
     "sliding corner": {
         "friction": 0.3,
+        "initial_height": 0.02,
+        "initial_rotation": 0.1,
+        "initial_velocity": -1.0,
+    },
+    "sliding corner, static friction": {
+        "friction": 0.2,
+        "static": 0.4,
         "initial_height": 0.02,
         "initial_rotation": 0.1,
         "initial_velocity": -1.0,
