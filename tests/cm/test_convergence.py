@@ -6,7 +6,7 @@ import pytest
 from cases import UNAMBIGUOUS, free_rocking, peak_errors, pulse_scene, ricker
 from paper_model import PaperModel
 
-from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, Sine, load_scene
+from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, Record, Sine, load_scene
 from rockcheck.scenes import PAPER_BLOCK
 
 
@@ -55,11 +55,23 @@ def rigid(scene):
             0.8,
             1e-8,
         ),
+        (
+            free_rocking(
+                0.0,
+                excitation=Record.from_samples([60.0, 60.0], time_step=0.012345),
+                duration=0.8,
+            ),
+            rigid,
+            (1e-6, 1e-8, 1e-10),
+            0.5,
+            1e-8,
+        ),
     ],
     ids=[
         "with the penetration in rocking",
         "with the duration of a wall contact",
         "with the penetration where friction decides an impact",
+        "with the penetration where a record ends with a jump",
     ],
 )
 def test_error_falls(scene, play, depths, order, least):
