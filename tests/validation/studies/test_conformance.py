@@ -186,13 +186,18 @@ def test_what_changed_between_versions(planted, histories, written, tmp_path):
     path = written("run.json", writing.json_text(run))
     assert changes(tmp_path, path).table("changes").rows == []
     rows = run["tables"]["rows"]
-    rows[0] |= {"version": "2", "value": 2.0, "verdict": "fail"}
-    rows[8] |= {"value": rows[8]["value"] + 0.5 * rows[8]["limit"]}
+    for number, change in (
+        (0, {"version": "2", "value": 2.0, "verdict": "fail"}),
+        (5, {"value": None, "verdict": "lacks"}),
+        (8, {"value": rows[8]["value"] + 0.5 * rows[8]["limit"]}),
+    ):
+        rows[number] |= change
     newer = written("newer.json", writing.json_text(run))
     found = changes(tmp_path, newer)
     wanted = ("id", "verdict_before", "verdict_after", "version_before", "version_after", "worse")
     assert [tuple(row[name] for name in wanted) for row in found.table("changes").records()] == [
         ("RC-01", "pass", "fail", "1", "2", True),
+        ("RC-06", "pass", "lacks", "1", "1", True),
         ("RC-09", "pass", "pass", "1", "1", False),
     ]
     assert main(["compare", str(tmp_path), str(newer), "--quiet"]) == found.exit_code == 1

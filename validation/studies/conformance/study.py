@@ -419,7 +419,7 @@ def changes(before: Path, after: Path) -> Finding:
             *key,
             was["name"],
             *(one[name] for name in ("version", "verdict", "value") for one in (was, now)),
-            was["verdict"] == "pass" and now["verdict"] in ("fail", "error", "absent"),
+            was["verdict"] == "pass" != now["verdict"],
         ]
         for key, (was, now) in pairs.items()
         if was["verdict"] != now["verdict"]
