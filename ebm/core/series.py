@@ -110,21 +110,10 @@ def only_falls(a, row, n, tau):
 
 
 @inner_kernel
-def stays_below(a, row, n, tau, level):
-    """Whether c is known to stay below a positive level between 0 and tau, both ends included.
-
-    Between values at a distance d, c rises above the larger one by at most d^2/8 of its largest
-    curvature.
-    """
-    d = 0.25 * tau
-    curvature = 0.0
-    for k in range(n - 2, -1, -1):
-        curvature = curvature * tau + (k + 2.0) * (k + 1.0) * abs(a[row, k + 2])
-    room = 0.999999 * level - 0.125 * d * d * curvature
-    highest = a[row, 0]
-    for quarter in range(1, 5):
-        highest = max(highest, value(a, row, n, quarter * d))
-    return highest < room
+def may_exceed(a, row, n, tau, level):
+    """Whether c may be above a level between 0 and tau."""
+    low, high = halves(a, row, n)
+    return a[row, 0] - least_change(low * -1.0, high * -1.0, tau) > level
 
 
 @inner_kernel
