@@ -116,16 +116,14 @@ def fill_guards(block, state, a):
 def _fill_friction(block, state, mu, constant, a):
     """The floor's push, and the two sides of the friction cone |Q| <= mu P + constant.
 
-    The friction of a wedged block that winds (Bouc-Wen's) has no cone to leave. Where the pivot
-    unloads, z comes to the sense of slip.
+    Where a pivot that winds (Bouc-Wen's) unloads, z comes to the sense of slip.
     """
     mode, flat = state.mode, state.mode.family == Family.FLAT
-    wedged = state.winds and not flat and mode.pivot == Pivot.STICK
     # The paper's floor holds a flat block that no wall holds.
-    pushes = on_wall(mode) or mode.pull < 0 if flat else mode.pivot == Pivot.SLIPPING or wedged
+    pushes = on_wall(mode) or mode.pull < 0 if flat else mode.pivot == Pivot.SLIPPING
     if block.unilateral or pushes:
         _enter(a, Guard.FLOOR_PUSH, 0.0, float(mode.pull))
-    if mode.pivot == Pivot.STICK and not block.no_slip and not wedged:
+    if mode.pivot == Pivot.STICK and not block.no_slip:
         _enter(a, Guard.CONE_PLUS, constant, mu, -1.0)
         _enter(a, Guard.CONE_MINUS, constant, mu, 1.0)
     if state.winds and mode.slip * a[Row.Z, 0] <= -series.NOISE[Kind.POSITION]:
