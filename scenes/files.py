@@ -301,8 +301,11 @@ def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:
         if not name:
             parts[table] = value
             continue
+        whole, (name, _, at) = parts.get(table) or getattr(scene, table), name.partition(".")
+        listed = enumerate(getattr(whole, name)) if at else ()
+        new = [value if str(k) == at else one for k, one in listed] or value
         try:
-            parts[table] = (parts.get(table) or getattr(scene, table)).replace(**{name: value})
+            parts[table] = whole.replace(**{name: new})
         except InputError as error:
             raise InputError(error.reason, place.removesuffix(name) + error.key) from None
     return scene.replace(walls=tuple(parts.pop(wall.side) for wall in scene.walls), **parts)

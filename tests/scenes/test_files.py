@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rockcheck.scenes import PAPER_BLOCK, Ricker, errors, files, load_scene
+from rockcheck.scenes import PAPER_BLOCK, Block, Ricker, errors, files, load_scene
 
 TEXT = """
 duration = 8.0
@@ -174,7 +174,11 @@ def test_what_is_no_spread(given, key, fault_of):
 TABLES = {
     "floor": {"friction": 0.3},
     "duration": {"value": 2.0, "sd": 0.1},
-    "block": {"half_width": {"low": 0.3, "high": 0.5}, "half_height": 1.0},
+    "block": {
+        "half_width": {"low": 0.3, "high": 0.5},
+        "half_height": 1.0,
+        "centre_of_mass": [0.05, 0.2],
+    },
     "walls": [{"side": "right", "gap": {"value": 0.05, "sd": 0.01}}, {"side": "left", "gap": 0.06}],
 }
 
@@ -194,10 +198,14 @@ def test_numbers_stand_where_they_were_written():
             "duration": 3.0,
             "block.half_width": 0.35,
             "block.half_height": 1.5,
+            "block.centre_of_mass.0": 0.1,
             "walls.right.gap": 0.02,
         },
     )
-    assert (other.duration, other.block.half_width, other.block.half_height) == (3.0, 0.35, 1.5)
+    assert (other.duration, other.block) == (
+        3.0,
+        Block(half_width=0.35, half_height=1.5, centre_of_mass=(0.1, 0.2)),
+    )
     assert (other.wall("left").gap, other.wall("right").gap) == (0.06, 0.02)
 
 
