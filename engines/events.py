@@ -165,12 +165,16 @@ class _Motion:
         return float(impulses.reshape(-1, 2)[np.sum(acts[:contact])].sum())
 
     def modes(self, indices: Sequence[int]) -> list[str]:
-        chosen = self.box[list(indices)]
+        chosen, lies = self.box[list(indices)], (self.closed[0] | self.closed[1])[list(indices)]
         channels = {name: chosen[:, column] for column, name in enumerate(observation.STATE)}
         return [
-            str(mode)
-            for mode in observation.modes_of(
-                self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]}
+            str(mode) if on else "flight"  # also below the 0.01 mm from which the kinematics tell
+            for on, mode in zip(
+                lies,
+                observation.modes_of(
+                    self.scene, channels | {"slip_rate": self.slip_rate[list(indices)]}
+                ),
+                strict=True,
             )
         ]
 
