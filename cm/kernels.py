@@ -515,12 +515,16 @@ def pushed(
 
     The loss is for a unit of velocity gained. Third is the step that the contact needs, infinite
     unless it has just closed. A settled contact stays closed while it would close again within the
-    step (`ahead`, s). `memory` holds whether it is closed, and of an open one when it was last.
+    step (`ahead`, s). `memory` holds whether it is closed, and of an open one when it was last, or
+    as near as the block's weight sinks it, and too slow for an impact.
     """
-    memory, before = contacts.memory, touches.before
-    closed, fine = memory[one, CLOSED] != 0.0, math.inf
+    memory, parameters, before = contacts.memory, contacts.parameters, touches.before
+    closed, fine, gravity = memory[one, CLOSED] != 0.0, math.inf, parameters.gravity
     if not (touches.gap < 0.0 or (closed and touches.gap + ahead * touches.rate < 0.0)):
-        if closed:
+        if closed or (
+            touches.gap * parameters.stiffness < gravity
+            and abs(touches.rate) * math.sqrt(parameters.stiffness) < GENTLE * gravity
+        ):
             memory[one, CLOSED], memory[one, LAST_CLOSED] = 0.0, now.t
         return 0.0, 0.0, fine
     if not closed:

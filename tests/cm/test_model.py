@@ -86,11 +86,15 @@ def test_block_left_alone_stays(walls):
     assert sunk[-1] == pytest.approx(5e-6, rel=1e-6)  # two corners share the weight
 
 
-def test_block_shaken_below_slip_and_uplift_does_not_creep():
-    penetration = 1e-5
+@pytest.mark.parametrize(
+    ("penetration", "walls"), [(1e-5, []), (1e-7, [Wall(side="left", gap=0.0)])]
+)
+def test_block_shaken_below_slip_and_uplift_does_not_creep(penetration, walls):
+    """Nor strike a wall at which it stands."""
     history = ContinuousModel(penetration=penetration).simulate(
         scene(
             floor=Floor(friction=0.2),
+            walls=walls,
             excitation=Record.from_samples(
                 0.9 * 0.2 * G * np.sin(np.arange(3000) * 0.1) + 0.05 * 0.2 * G, 0.02
             ),
