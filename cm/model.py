@@ -137,7 +137,9 @@ class ContinuousModel(Frozen):
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
-        strikes_a_slab = math.ceil(rows_a_slab * scene.output_step / kernels.STRIKE) + 2
+        strikes_a_slab = (
+            math.ceil(min(rows_a_slab * scene.output_step, times[-1]) / kernels.STRIKE) + 2
+        )
         events = np.empty((len(contacts.memory) * strikes_a_slab, 3))
         advance = partial(kernels.advance, contacts, base, state, events)
         advance(times[:1], output[:0])  # compiles, or reads the compiled loop from its cache
