@@ -52,8 +52,9 @@ Integers = NDArray[np.int64]
 Velocity = tuple[float, float, float]
 #: Across the plane, right and up.
 Vector = tuple[float, float]
-#: Samples of the base acceleration along one axis, and how many there are a second.
-Samples = tuple[Floats, float]
+#: Samples of the base acceleration along one axis, the sums of their means (of two neighbours each)
+#: up to every one, and how many there are a second.
+Samples = tuple[Floats, Floats, float]
 #: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top
 #: right.
 Corners = tuple[float, float, float, float, float, float, float, float]
@@ -359,13 +360,15 @@ def effective_mass(
 
 
 @inner_kernel
-def sampled(samples: Floats, rate: float, t: float) -> float:
-    """Linear interpolation in `samples`, `rate` a second from t = 0; zero after the last."""
-    place = t * rate
-    left = int(place)
+def gained(samples: Floats, sums: Floats, rate: float, t: float) -> float:
+    """Velocity of the base at `t`, m/s: its acceleration is linear between samples, zero after."""
+    left = int(t * rate)
     if left + 1 >= len(samples):
-        return 0.0
-    return samples[left] + (place - left) * (samples[left + 1] - samples[left])
+        return sums[len(samples) - 1] / rate
+    part = t * rate - left
+    return (
+        sums[left] + part * (samples[left] + 0.5 * part * (samples[left + 1] - samples[left]))
+    ) / rate
 
 
 @inner_kernel
@@ -762,6 +765,9 @@ def run_to(
             step = end - t
         half = 0.5 * step
         middle = t + half
+        # Means over the step.
+        u = (gained(*base[0], t + step) - gained(*base[0], t)) / step
+        vg = (gained(*base[1], t + step) - gained(*base[1], t)) / step
         t = end if step == end - t else t + step
         steps += 1
         # Half a step of motion, then the kick.
@@ -769,7 +775,6 @@ def run_to(
         y += half * v[1]
         theta += half * v[2]
         v0 = v
-        u, vg = sampled(*base[0], middle), sampled(*base[1], middle)
         v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
         now = Step(x, y, corners_at(parameters, theta), v0, step, middle)
         v, closing, young, swept = kick(contacts, now, v, settled)

@@ -115,24 +115,19 @@ class ContinuousModel(Frozen):
         began = time.perf_counter()
         from rockcheck.cm import kernels
 
-        grid = scene.run_times
-        # A step also ends where a record does: there the base's acceleration may jump.
-        times = np.union1d(
-            grid,
-            [
-                one.quiet_after
-                for one in (scene.excitation, scene.vertical)
-                if one.kind == "record" and one.quiet_after < grid[-1]
-                if np.abs(grid - one.quiet_after).min() > 1e-9
-            ],
-        )
+        times = scene.run_times
         stiffness, dt = self.stiffness_in(scene), self.time_step_in(scene)
         if times[-1] / dt > MOST_STEPS:
             raise errors.ModelFailure(
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
-        base = _samples(scene.excitation, scene.duration), _samples(scene.vertical, scene.duration)
+        base = tuple(
+            (samples, np.cumsum(samples) - 0.5 * (samples + samples[0]), rate)
+            for samples, rate in (
+                _samples(one, scene.duration) for one in (scene.excitation, scene.vertical)
+            )
+        )
         state, contacts = kernels.begun(scene, stiffness, dt, self.damping_rule == "calibrated")
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
@@ -185,7 +180,7 @@ class ContinuousModel(Frozen):
         return observation.observe(
             scene,
             self.name,
-            kinematics.of_box(scene.block, output[:row][np.isin(times[:row], grid)]),
+            kinematics.of_box(scene.block, output[:row]),
             events=happened,
             cost=cost,
             settings={

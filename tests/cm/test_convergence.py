@@ -63,7 +63,20 @@ def rigid(scene):
             ),
             rigid,
             (1e-6, 1e-8, 1e-10),
-            0.5,
+            0.4,
+            1e-8,
+        ),
+        (
+            free_rocking(
+                0.2,
+                excitation=Record.from_samples(
+                    6.0 * np.random.default_rng(3).normal(size=2000), time_step=0.0007
+                ),
+                duration=1.5,
+            ),
+            rigid,
+            (1e-6, 1e-8, 1e-10),
+            0.8,
             1e-8,
         ),
     ],
@@ -72,6 +85,7 @@ def rigid(scene):
         "with the duration of a wall contact",
         "with the penetration where friction decides an impact",
         "with the penetration where a record ends with a jump",
+        "with the penetration where a record has many samples",
     ],
 )
 def test_error_falls(scene, play, depths, order, least):
