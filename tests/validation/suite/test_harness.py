@@ -70,15 +70,15 @@ FAULTS = [
     (
         "output shifted by one sample",
         "scenes/observation.py",
-        r"zip\(STATE, state\.T,",
-        "zip(STATE, np.roll(state, 1, axis=0).T,",
+        r"zip\(STATE, state\[:on_grid\]\.T,",
+        "zip(STATE, np.roll(state, 1, axis=0)[:on_grid].T,",
         0,
     ),
     (
         "NaN at the end",
         "scenes/observation.py",
-        r"    state = state\[:rows\]\n",
-        "    state = state[:rows]\n    state[rows - 1] = np.nan\n",
+        r"    channels: dict",
+        "    state[rows - 1] = np.nan\n    channels: dict",
         0,
     ),
     (
