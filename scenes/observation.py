@@ -14,8 +14,9 @@ from rockcheck.scenes.scene import Scene
 
 #: Size from which a note warns of lengths in mm, m.
 LARGE = 100.0
-#: Time between rows, times p, from which a note says that they miss peaks (by 0.01 alpha).
-COARSE = 0.3
+#: Time between rows, times p, from which a note says that they miss peaks (by 0.01 alpha);
+#: |theta| times its rate (rad^2/s) from which a block turns further.
+COARSE, FALLING = 0.3, 0.01
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 
 
@@ -56,7 +57,12 @@ def observe(
     if outcome is None and not (outcome := next(told, None)):
         if tipped.size:
             raise ValueError("a model that lets the block overturn must report the event")
-        outcome = outcome_of(dict(zip(STATE, state.T, strict=True)))
+        # What falls to the scene's end is not down, however far it has turned.
+        outcome = (
+            "moving"
+            if rows >= len(scene.output_times) and state[-1, 2] * state[-1, 5] > FALLING
+            else outcome_of(dict(zip(STATE, state.T, strict=True)))
+        )
     return History(
         name=scene.name,
         model=model,
