@@ -322,11 +322,12 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
         sorted(events, key=lambda e: (e.t, kinds.index(e.kind)))
         for events in (reference, candidate)
     )
-    times = np.array([e.t for e in candidate])
+    # exactly so far apart: a pair, whichever of the two comes first
+    times, within = np.array([e.t for e in candidate]), SAME_IMPACT + 1e-9
     near = [
         (abs(times[j] - first.t), i, j)
         for i, first in enumerate(reference)
-        for j in range(*np.searchsorted(times, [first.t - SAME_IMPACT, first.t + SAME_IMPACT]))
+        for j in range(*np.searchsorted(times, [first.t - within, first.t + within]))
         if candidate[j].kind == first.kind
     ]
     partners: dict[int, int] = {}
