@@ -356,10 +356,16 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     if worse and not reason:
         return f"{check.reason}; moving what is expected needs --reason"
     why = (reason or "first accepted figure") if new else (reason if worse else check.why)
-    expected = value if check.verdict != "pass" or check.expected is None else check.expected
-    limit, drift = _bounds(check, value)
+    expected = (
+        check.expected
+        if check.verdict == "pass" and check.expected is not None
+        else value  # no room, no rounding
+        if 0.0 in (check.limit, check.drift)
+        else float(f"{value:.8g}")
+    )
+    limit, drift = _bounds(check, value, abs(value - expected))
     line: dict[str, Any] = {
-        "expected": float(f"{expected:.8g}"),
+        "expected": expected,
         "limit": limit,
         "drift": drift,
         "why": why,
@@ -374,10 +380,11 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     return line if again.verdict == "pass" else again.reason
 
 
-def _bounds(check: results.Check, value: float) -> tuple[float, float]:
+def _bounds(check: results.Check, value: float, moved: float) -> tuple[float, float]:
     """Limit and drift band of the new line: the old ones, of a better error tighter if need be.
 
-    The room of a first line where there is none, or where the limit is exceeded.
+    The room of a first line where there is none, or where the limit is exceeded. A value that has
+    `moved` within a line without a band stays within its new one.
     """
     measure = MEASURES[check.figure.measure]
     size, at_least = abs(value - (measure.ideal or 0.0)), measure.sense == "at least"
@@ -387,9 +394,11 @@ def _bounds(check: results.Check, value: float) -> tuple[float, float]:
         if at_least
         else _round(max(room * size, LEAST_LIMIT * measure.resolution))
     )
-    drift = _round(max(band * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution))
+    drift = _round(
+        max(band * size, LEAST_SHARE * limit, LEAST_DRIFT * measure.resolution, 1.1 * moved)
+    )
     if measure.yes_no:
-        limit, drift = size, 0.0  # 0: must be yes; 1: need not be
+        limit, drift = size, moved  # 0: must be yes; 1: need not be
     tighter = check.verdict == "better" and measure.role == "error"
     if check.limit is not None and check.verdict != "fail":
         stricter = max if at_least else min
