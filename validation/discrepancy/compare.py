@@ -98,11 +98,16 @@ def compare(
         raise InputError(
             f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
         )
-    if until is not None and not until > 0.0:
-        raise InputError(f"{until:g} is not allowed: give a positive time in s", "until")
-    pair = Pair(reference, candidate, scene, math.inf if until is None else until)
-    if len(pair.time) == 0:
-        raise InputError(f"{reference.model} and {candidate.model} have no time in common")
+    end = math.inf if until is None else until
+    errors.refuse((not end > 0.0, f"{end:g} is not allowed: give a positive time in s", "until"))
+    pair = Pair(reference, candidate, scene, end)
+    errors.refuse(
+        (
+            len(pair.time) == 0,
+            f"{reference.model} and {candidate.model} have no time in common",
+            "",
+        )
+    )
     return Discrepancy(
         reference.model,
         candidate.model,
@@ -137,8 +142,14 @@ def describe(
     scene: Scene | None = None,
     measures: Collection[str] | None = None,
 ) -> tuple[Figure, ...]:
-    """The figures of one history, up to `until` (s): peak rotation, impacts, hop and so on."""
+    """The figures of one history, up to `until` (s): peak rotation, impacts, hop and so on.
+
+    Raises `InputError` if a measure is unknown, or the history begins only after `until`.
+    """
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
+    errors.refuse(
+        (len(motion.channel("t")) == 0, f"{history.model} has no row up to {motion.until:g} s", "")
+    )
     return _figures(FIGURES, measures, motion, "alpha", until)
 
 
@@ -153,8 +164,12 @@ def _figures(
     """The figures of the measures of these names; None: of all but those that are `on_request`."""
     if names is None:
         names = [name for name, measure in known.items() if not measure.on_request]
-    if unknown := [name for name in names if name not in known]:
-        raise InputError(f"{unknown[0]!r} is not allowed: {', '.join(known)}", "measures")
+    errors.refuse(
+        *(
+            (one not in known, f"{one!r} is not allowed: {', '.join(known)}", "measures")
+            for one in names
+        )
+    )
     return tuple(evaluate(known[name], what, angle, against=against, until=until) for name in names)
 
 

@@ -634,7 +634,8 @@ class SuiteStudy(Study):
             for window, names in windows.items():
                 until = ends.get(window)
                 rivals = others if until is None or until > parted else {}
-                figures += by_any(candidate, yardstick, rivals, scene, names, window, until)
+                with suppress(InputError):  # no row within the window, or none in common
+                    figures += by_any(candidate, yardstick, rivals, scene, names, window, until)
         return ComparisonRecord(
             figures=tuple(figures),
             impact_law=landing.followed_by(candidate, scene) if landing else None,
@@ -750,7 +751,7 @@ def _checks(
             value=None,
             against="" if itself else place.against,
             window=place.what.partition("@")[2],
-            note="not computed" if itself else f"{place.against} has no result here",
+            note="not computed" if itself else f"nothing of {place.against} to compare with here",
         )
         found = known.get((place.against, place.what), Compared(nothing))
         gap = "" if found.fall and kind == "model form" else found.gap

@@ -33,6 +33,8 @@ floor = { friction = 0.9 }
 [tolerances.tilt.table.ebm]
 "theta_rms@1.5s" = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "a test" }
 theta_rms = { expected = 0.0, limit = 1e-3, drift = 1e-3, why = "a test" }
+[tolerances.tilt.table.figures]
+"last_rotation@1.5s" = { expected = 0.0, limit = 1.0, drift = 1.0, why = "it rocks" }
 [tolerances.other.ebm.figures]
 last_x = { expected = 0.0, limit = 0.0, drift = 0.0, why = "it stands" }
 """
@@ -99,17 +101,20 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
             "table ends at 1.6 s, before 2 s; `offset` of the measured model shifts its times, "
             "a window such as theta_rms@8s ends sooner",
         ),
+        ("1.5s", "absolute", "pass", ""),
     ]
-    write(tmp_path / "table.csv", "time_s,theta_deg", [0.3, 0.9], [0.0, 0.0])
-    assert (
-        not run_suite(suites.load_suite(path), tmp_path / "out", jobs=1)
-        .by_scene["tilt"]["table"]
-        .read_back
-    )
+    # what begins only after a window fails that check, and no more
+    write(tmp_path / "table.csv", "time_s,theta_deg", [1.95, 2.3], [0.0, 0.0])
+    assert [
+        (cell.read_back, *(one.figure.value is None for one in cell.checks))
+        for cell in [
+            run_suite(suites.load_suite(path), tmp_path / "out", jobs=1).by_scene["tilt"]["table"]
+        ]
+    ] == [(False, True, False, True)]
     truth.save(tmp_path / "truth.csv")
     typed(
         *("compare", str(tmp_path / "truth.csv"), str(tmp_path / "table.csv"), "--align", "-0.4"),
-        holds=["measured against ebm, 0 to 0.5 s", "the candidate is shifted by -0.4 s"],
+        holds=["measured against ebm, 1.55 to 1.9 s", "the candidate is shifted by -0.4 s"],
     )
 
 
