@@ -147,7 +147,13 @@ def fit_lognormal(
         unlikelihood,
         [0.0, 1.0],
         method="Nelder-Mead",
-        options={"xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},
+        options={
+            # as wide as high: in the usual one, a sliver, the search may stand still
+            "initial_simplex": [[0.0, 1.0], [1.0, 1.0], [0.0, 2.0]],
+            "xatol": 1e-9,
+            "fatol": 1e-9,
+            "maxiter": 2000,
+        },
     ).x
     return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
 

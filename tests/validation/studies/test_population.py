@@ -235,12 +235,20 @@ def test_a_set_that_is_none_is_refused(asked, said):
 # Curves
 
 
-def test_the_lognormal_curve_is_found_again():
-    intensities, motions = np.linspace(0.5, 8.0, 60), 10**7
-    counts = np.round(motions * norm.cdf(np.log(intensities / 2.5) / 0.4)).astype(np.int64)
-    assert population.fit_lognormal(intensities, counts, np.full(60, motions)) == pytest.approx(
-        (2.5, 0.4), rel=1e-3
-    )
+MANY, OVER = 10**7, np.linspace(0.5, 8.0, 60)
+
+
+@pytest.mark.parametrize(
+    ("intensities", "counts", "runs", "curve"),
+    [
+        (OVER, np.round(MANY * norm.cdf(np.log(OVER / 2.5) / 0.4)).astype(int), MANY, (2.5, 0.4)),
+        # its likelihood by another search
+        (np.arange(1, 7) / 4, np.array([2, 5, 8, 7, 9, 8]), 10, (0.494703, 0.956567)),
+    ],
+)
+def test_the_lognormal_curve_is_found_again(intensities, counts, runs, curve):
+    found = population.fit_lognormal(intensities, counts, np.full(len(counts), runs))
+    assert found == pytest.approx(curve, rel=1e-3)
 
 
 def test_a_curve_is_found_where_few_overturn_and_none_where_shares_do_not_rise():
