@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import geometric_mean
-from typing import Any
+from typing import Any, Literal
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
@@ -382,16 +382,18 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
     done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
-    differs = len({_side(outcome_of(one)) for one in done}) > 1
+    sides = {
+        ("left" in said) - ("right" in said) for one in done for said in (outcome_of(run, one),)
+    }
     return {
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
         "whole": whole,
         "ratio": results.value_of(figures, "peak_ratio", against),
         "u_num": cell.numerical.u_num("theta_rms") if cell.numerical and whole else None,
-        "outcome": outcome_of(cell),
-        "apart": differs,
-        "why_apart": why_apart(cell) if differs else "",
+        "outcome": outcome_of(run, cell),
+        "apart": len(sides) > 1,
+        "why_apart": why_apart(cell) if len(sides) > 1 else "",
         "nearest": max(cell.checks, key=used, default=None),
         "used": max(map(used, cell.checks), default=0.0) if cell.status == "done" else math.inf,
     }
@@ -404,19 +406,21 @@ def why_apart(cell: results.Cell) -> str:
     return said if cell.checks and cell.verdict == "pass" else ""
 
 
-def outcome_of(cell: results.Cell) -> str:
-    """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall."""
-    last = results.value_of((f for f in all_figures(cell) if f.unit == "alpha"), "last_rotation")
+def outcome_of(run: results.Run, cell: results.Cell) -> str:
+    """The outcome of a cell; "falling left" or "falling right" if the run ends during the fall.
+
+    A block that may lean on a wall on that side is not falling.
+    """
+    turns = (f for f in all_figures(cell) if f.unit == "alpha")
+    last = results.value_of(turns, "last_rotation") or 0.0
+    side: Literal["left", "right"] = "left" if last > 0.0 else "right"
     return (
-        f"falling {'left' if last > 0.0 else 'right'}"
-        if cell.outcome == "moving" and last is not None and abs(last) > FALL
+        f"falling {side}"
+        if cell.outcome == "moving"
+        and abs(last) > FALL
+        and not run.load_scene(cell.scene).wall(side)
         else cell.fate
     )
-
-
-def _side(outcome: str) -> str:
-    """'left', 'right', or '' if the block does not overturn."""
-    return outcome.split()[1] if outcome.startswith(("overturned ", "falling ")) else ""
 
 
 def accuracy(run: results.Run) -> list[Block]:

@@ -179,12 +179,27 @@ class SceneView(View):
 
     @cached_property
     def falls(self) -> dict[str, float]:
-        """By model: when the rotation passes `FALL`, s; only those that fall."""
+        """By model: when the rotation passes `FALL` for good, s; only those that fall.
+
+        One that is beyond it at the end, and may lean on a wall there, does not.
+        """
         beyond = {
-            model: np.flatnonzero(np.abs(columns["theta"]) > FALL)
+            model: rows[rows > np.max(np.flatnonzero(turned <= FALL), initial=-1)]
             for model, columns in self.values.items()
+            for turned in (np.abs(columns["theta"]),)
+            for rows in (np.flatnonzero(turned > FALL),)
         }
-        return {model: float(self.t[rows[0]]) for model, rows in beyond.items() if len(rows)}
+        return {
+            model: float(self.t[rows[0]])
+            for model, rows in beyond.items()
+            if len(rows)
+            and (
+                self.histories[model].overturned_at is not None
+                or not self.scene.wall(
+                    "left" if self.values[model]["theta"][rows[-1]] > 0.0 else "right"
+                )
+            )
+        }
 
     @property
     def measured(self) -> dict[str, list[int]]:
