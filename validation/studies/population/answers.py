@@ -767,7 +767,7 @@ def _histories(found: Found) -> list[Block]:
                 times,
                 one["t"],
                 one["theta"] / found.study.own.scene.block.alpha,
-                right=math.nan if found.nominal[case].fell else None,
+                right=None if found.nominal[case].outcome == "at rest" else math.nan,
             )
             for case, one in rows.items()
         ]
