@@ -13,7 +13,7 @@ import numpy as np
 import scipy  # it loads its parts as they are used
 
 from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, printable
-from rockcheck.scenes.history import outcome_of
+from rockcheck.scenes.history import OUTCOMES, outcome_of
 
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.
@@ -121,16 +121,19 @@ def mean_history(tests: Sequence[History]) -> History:
 
     Over their common time. `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by
     Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
-    `InputError` where the tests have no time in common, or only some of them overturn.
+    `InputError` where the tests have no time in common, or do not all overturn to one side or stay.
     """
     first, *others = tests
     if not others:
         return first
-    outcomes = [outcome_of(test.channels).startswith("overturned") for test in tests]
-    if len(set(outcomes)) > 1:
+    fell = [  # a history may stop before its block lies
+        next(filter(OUTCOMES[2:].__contains__, (test.outcome, outcome_of(test.channels))), "")
+        for test in tests
+    ]
+    if len({*fell}) > 1:
         raise InputError(
-            f"{sum(outcomes)} of {len(tests)} tests overturn: they have no mean; give each as a"
-            " model of its own",
+            f"{len(tests) - fell.count('')} of {len(tests)} tests overturn, not all to one side:"
+            " they have no mean; give each as a model of its own",
             "files",
         )
     start, end = (
@@ -160,7 +163,7 @@ def mean_history(tests: Sequence[History]) -> History:
         first,
         channels=channels,
         event_list=(),
-        outcome=outcome_of(channels),
+        outcome=fell[0] or outcome_of(channels),
         uncertainty={name: factor * value for name, value in scatter.items()},
         notes=(*first.notes, f"the mean of {len(tests)} tests"),
     )

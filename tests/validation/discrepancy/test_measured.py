@@ -119,28 +119,31 @@ def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
 
 
 @pytest.mark.parametrize(
-    ("duration", "outcome", "fell", "events"),
+    ("repeats", "duration", "outcome", "fell", "events"),
     [
         # One before the scene's beginning is none of the scene's.
-        (3.0, "overturned left", 2.495, [2.495]),
-        (1.0, "moving", None, []),
+        (1, 3.0, "overturned left", 2.495, [2.495]),
+        (1, 1.0, "moving", None, []),
+        # a mean has no events, but falls as all do
+        (2, 3.0, "overturned left", 2.5, []),
+        (2, 1.0, "moving", None, []),
     ],
 )
 def test_events_move_with_the_offset_and_end_with_the_scene(
-    tmp_path, duration, outcome, fell, events
+    tmp_path, repeats, duration, outcome, fell, events
 ):
     scene = load_scene("bookcase").replace(duration=3.0, output_step=0.01)
     state = np.zeros((301, 6))
     state[:, 2] = np.linspace(0.0, 1.5, 301)
-    given = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
-    observation.observe(scene, "measured", state, events=given, cost=Cost(steps=9)).save(
+    told = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
+    observation.observe(scene, "measured", state, events=told, cost=Cost(steps=9)).save(
         tmp_path / "a.csv"
     )
     later = measured.shifted(History.load(tmp_path / "a.csv"), -0.5)
     assert [e.t for e in later.event_list] == [-0.3, 2.495]
-    history = measured.Measured(files={scene.name: str(tmp_path / "a.csv")}, offset=-0.5).simulate(
-        scene.replace(duration=duration)
-    )
+    history = measured.Measured(
+        files={scene.name: (str(tmp_path / "a.csv"),) * repeats}, offset=-0.5
+    ).simulate(scene.replace(duration=duration))
     assert (
         history.outcome,
         history.overturned_at,
@@ -173,7 +176,10 @@ def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     assert 0.92 <= np.mean(inside) <= 0.98
 
 
-FALLS = replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, 1.57, 401)})
+LEFT, RIGHT = (
+    replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, end, 401)})
+    for end in (1.57, -1.57)
+)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +190,8 @@ FALLS = replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, 
             "no measured history of scene 'bookcase'",
         ),
         (lambda: measured.time_shift(swing(), swing(scale=0.0)), "no rotation"),
-        (lambda: measured.mean_history([swing(), FALLS]), "1 of 2 tests overturn"),
+        (lambda: measured.mean_history([swing(), LEFT]), "1 of 2 tests overturn"),
+        (lambda: measured.mean_history([RIGHT, LEFT]), "2 of 2 tests overturn"),
     ],
 )
 def test_what_cannot_be_is_named(fault_of, call, fault):
