@@ -226,12 +226,24 @@ def test_a_gap_on_a_side_without_a_wall_tries_one_there_and_leaves_the_scene_as_
     }
 
 
-def test_a_gap_that_was_not_played_is_not_called_safe(folder):
-    """As where Ctrl-C ended the runs, or all of them failed; nor is such a run called unsure."""
+@pytest.mark.parametrize("later", [(), (0.1,)])
+def test_a_gap_that_was_not_played_is_not_called_safe(folder, later):
+    """As where Ctrl-C ended the runs, or all of them failed, also where a wider one was; nor is
+    such a run called unsure."""
     own = files.load_uncertain_scene(folder / "cabinet.toml")
     study = Assessment(own=own, cases={"cabinet": own}, gaps=(0.05, 0.1), sides=("right",))
-    found = study.gather({task: task.play() for task in study.parts["shown"]["cabinet"]})
-    assert (found.data["gaps"], found.exit_code) == ([], 0)
+    found = study.gather(
+        {
+            task: task.play()
+            for part in (study.parts["shown"], *(study.at_gaps[gap] for gap in later))
+            for task in part["cabinet"]
+        }
+    )
+    assert (
+        [(row["gap"], row["overturned"]) for row in found.data["gaps"]],
+        found.data["none_overturns_up_to"],
+        found.exit_code,
+    ) == ([(gap, 0) for gap in later], None, 0)
     assert "overturn" not in found.answer.partition(".")[2]
 
 

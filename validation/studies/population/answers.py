@@ -353,8 +353,8 @@ def gaps_of(found: Found) -> dict[str, Any]:
 
     `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
     It has the reach of blocks that fall, `free_overturned` of the runs without the wall.
-    `none_overturns_up_to` (m) is the largest gap up to which no run overturns. `monotonic` tells
-    whether a wider gap never lets fewer runs overturn.
+    `none_overturns_up_to` (m) is the largest gap up to which no run overturns, and none failed.
+    `monotonic` tells whether a wider gap never lets fewer runs overturn.
     """
     rows: list[dict[str, Any]] = []
     for gap, runs in found.at_gaps.items():
@@ -370,14 +370,20 @@ def gaps_of(found: Found) -> dict[str, Any]:
             }
         )
     fallen = [row["overturned"] for row in rows]
-    safe = itertools.takewhile(lambda row: not row["overturned"], rows)
+    safe = itertools.takewhile(
+        lambda at: (
+            (at[1]["gap"], at[1]["runs"], at[1]["overturned"])
+            == (at[0], len(found.study.cases) * max(len(found.study.draws), 1), 0)
+        ),
+        zip(found.study.gaps, rows, strict=False),
+    )
     return {
         "gaps": rows,
         "clearance": max(
             (run.reach[side] for run in found.free for side in found.study.sides), default=None
         ),
         "free_overturned": sum(run.fell for run in found.free),
-        "none_overturns_up_to": max((row["gap"] for row in safe), default=None),
+        "none_overturns_up_to": max((gap for gap, _ in safe), default=None),
         "monotonic": fallen == sorted(fallen),
     }
 
@@ -389,7 +395,11 @@ def _gaps(found: Found) -> Answer:
         said.append(
             f"None overturns up to a gap of {safe:g} m."
             if safe is not None
-            else f"Some overturn already at the smallest gap, {rows[0]['gap']:g} m."
+            else "Some "
+            + {(found.study.gaps[0], True): "overturn"}.get(
+                (rows[0]["gap"], rows[0]["overturned"] > 0), "have no result"
+            )
+            + f" already at the smallest gap, {found.study.gaps[0]:g} m."
         )
     if not data["monotonic"]:
         said.append("A larger gap is not always worse: see each.")
