@@ -325,7 +325,7 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
     # exactly so far apart: a pair, whichever of the two comes first
     times, within = np.array([e.t for e in candidate]), SAME_IMPACT + 1e-9
     near = [
-        (abs(times[j] - first.t), i, j)
+        (round(abs(times[j] - first.t), 9), i, j)  # of two equally near the first
         for i, first in enumerate(reference)
         for j in range(*np.searchsorted(times, [first.t - within, first.t + within]))
         if candidate[j].kind == first.kind
