@@ -15,7 +15,7 @@ from rockcheck.validation.uncertainty import numerical
 
 def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
     figures = {"peak_rotation": peak, "slip": slip, "top_displacement": top, "wall_speed": speed}
-    return Ran(outcome=outcome, motion=figures, slid=slip or 0.0, **more)
+    return Ran(outcome=outcome, motion=figures, **{"slid": slip or 0.0} | more)
 
 
 def sure(u_num, **more):
@@ -32,7 +32,7 @@ def sure(u_num, **more):
 RUNS = {
     "a": ran("at rest", 0.2, 0.01, 0.3, 0.4),
     "b": ran("moving", 0.4, 0.03, 0.5),
-    "c": ran("overturned right", speed=0.9),
+    "c": ran("overturned right", speed=0.9, slid=1e-7),  # that of a contact which yields
 }
 #: By case, whether the event of each hand method happens, and how far it goes.
 SAID = {

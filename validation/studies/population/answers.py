@@ -48,8 +48,8 @@ UNITS = {"alpha": "α"}
 #: Of a probability; and what identifies a hand method.
 INTERVAL = ("probability", "low", "high")
 METHOD = ("name", "formula", "event", "source", "holds")
-#: A slip (m) or rotation (alpha) below this is none.
-MOVED = 1e-9
+#: A slip (m) or rotation (alpha) below this is none: models with contacts yield a little.
+MOVED = 1e-6
 #: Points of a history on the page.
 POINTS = 400
 #: Sources of uncertainty: what each is, what asks for it, and what of it changes the answer.
