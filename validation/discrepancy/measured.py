@@ -13,7 +13,8 @@ import numpy as np
 import scipy  # it loads its parts as they are used
 
 from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, printable
-from rockcheck.scenes.history import OUTCOMES, outcome_of
+from rockcheck.scenes.history import outcome_of
+from rockcheck.validation.discrepancy.figures import TURNS
 
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.
@@ -127,8 +128,7 @@ def mean_history(tests: Sequence[History]) -> History:
     if not others:
         return first
     fell = [  # a history may stop before its block lies
-        next(filter(OUTCOMES[2:].__contains__, (test.outcome, outcome_of(test.channels))), "")
-        for test in tests
+        max({*TURNS} & {test.outcome, outcome_of(test.channels)}, default="") for test in tests
     ]
     if len({*fell}) > 1:
         raise InputError(

@@ -370,20 +370,16 @@ def gaps_of(found: Found) -> dict[str, Any]:
             }
         )
     fallen = [row["overturned"] for row in rows]
-    safe = itertools.takewhile(
-        lambda at: (
-            (at[1]["gap"], at[1]["runs"], at[1]["overturned"])
-            == (at[0], len(found.study.cases) * max(len(found.study.draws), 1), 0)
-        ),
-        zip(found.study.gaps, rows, strict=False),
-    )
+    every = len(found.study.cases) * max(len(found.study.draws), 1)
+    stand = {row["gap"] for row in rows if row["runs"] == every and not row["overturned"]}
+    safe = itertools.takewhile(stand.__contains__, found.study.gaps)
     return {
         "gaps": rows,
         "clearance": max(
             (run.reach[side] for run in found.free for side in found.study.sides), default=None
         ),
         "free_overturned": sum(run.fell for run in found.free),
-        "none_overturns_up_to": max((gap for gap, _ in safe), default=None),
+        "none_overturns_up_to": max(safe, default=None),
         "monotonic": fallen == sorted(fallen),
     }
 
@@ -395,11 +391,8 @@ def _gaps(found: Found) -> Answer:
         said.append(
             f"None overturns up to a gap of {safe:g} m."
             if safe is not None
-            else "Some "
-            + {(found.study.gaps[0], True): "overturn"}.get(
-                (rows[0]["gap"], rows[0]["overturned"] > 0), "have no result"
-            )
-            + f" already at the smallest gap, {found.study.gaps[0]:g} m."
+            else "Some fall, or have no result, already at the smallest gap,"
+            f" {found.study.gaps[0]:g} m."
         )
     if not data["monotonic"]:
         said.append("A larger gap is not always worse: see each.")
