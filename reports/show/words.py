@@ -216,4 +216,10 @@ def window(figure: figures.Figure) -> str:
         return "to the horizon" + (
             f" ({number(figure.until)} s)" if figure.until is not None else ""
         )
-    return f"first {number(figure.until)} s" if figure.until is not None else "whole run"
+    return (
+        f"first {number(figure.until)} s"
+        if figure.until is not None
+        else f"first {figure.window}"  # of a figure that was not computed
+        if figure.window
+        else "whole run"
+    )

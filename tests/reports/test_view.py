@@ -12,7 +12,7 @@ from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
 from rockcheck.reports.figures import histories_figure
-from rockcheck.reports.show.words import number, ratio, readable
+from rockcheck.reports.show.words import number, ratio, readable, window
 from rockcheck.reports.site import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks, save
 from rockcheck.reports.tables import (
@@ -276,7 +276,13 @@ def test_numbers_for_people_do_not_break_in_sentences():
         "1.23·10⁻⁷",
         "5.3·10³",
     ]
-    assert [ratio(v) for v in (None, 1.0, 0.054, 5876.0)] == ["–", "1×", "0.054×", "5\u202f876×"]
+    assert [
+        *(ratio(v) for v in (None, 1.0, 0.054, 5876.0)),
+        *(
+            window(figures.Figure(measure="m", label="m", unit="1", value=None, window=of))
+            for of in ("3s", "")
+        ),
+    ] == ["–", "1×", "0.054×", "5\u202f876×", "first 3s", "whole run"]
     said = readable("-1.2e-3 is more than 1e+05; x-2 of run-7 on 2026-01-02 (-0.5)")
     assert said == "−1.2·10⁻³ is more than 1·10⁵; x-2 of run-7 on 2026-01-02 (−0.5)"
 

@@ -68,7 +68,7 @@ class Figure(Stored):
     @property
     def of_a_fall(self) -> bool:
         """Whether it is the peak rotation of a fallen block, which is no peak; its note says so."""
-        return self.measure == "peak_rotation" and bool(self.note)
+        return self.measure == "peak_rotation" and self.value is not None and bool(self.note)
 
 
 Value = float | tuple[float, str]

@@ -36,7 +36,11 @@ def check(value, line=LINE, measure="theta_rms", note="", **more):
     ],
 )
 def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails_and_says_why(one, reason):
-    assert (one.verdict, one.reason) == ("fail", reason)
+    assert (
+        one.verdict,
+        one.reason,
+        one.figure.value is None and one.figure.of_a_fall,
+    ) == ("fail", reason, False)
 
 
 @pytest.mark.parametrize(
