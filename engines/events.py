@@ -39,10 +39,13 @@ def events_of(scene: Scene, t: Floats, states: Floats, felt: Floats) -> list[Eve
     found += motion.at_floor()
     end = scene.run_times[-1] * (1.0 + 1e-12)  # a step of fixed length may go beyond
     if abs(states[-1, 2]) >= steps.LYING:
-        part = (math.pi / 2 - abs(states[-2, 2])) / (abs(states[-1, 2]) - abs(states[-2, 2]))
-        end = min(end, t[-2] + min(part, 1.0) * (t[-1] - t[-2]))
-        fall = "overturned left" if states[-1, 2] > 0 else "overturned right"
-        found = [*(event for event in found if event[0] < end), (end, fall, len(t) - 1, 0.0)]
+        before, after = np.abs(states[-2:, 2]).tolist()  # it may begin as good as down
+        part = min((math.pi / 2 - before) / (after - before), 1.0) if after > before else 0.0
+        end = min(end, t[-2] + part * (t[-1] - t[-2]))
+        found = [
+            *(event for event in found if event[0] < end),
+            (end, f"overturned {'left' if states[-1, 2] > 0 else 'right'}", len(t) - 1, 0.0),
+        ]
     found = sorted((event for event in found if event[0] <= end), key=lambda event: event[0])
     before = motion.modes([max(event[2] - 1, 0) for event in found])
     after = motion.modes([motion.later(event[2]) for event in found])
@@ -64,8 +67,10 @@ class _Motion:
     def __init__(self, scene: Scene, t: Floats, states: Floats, felt: Floats) -> None:
         self.scene, self.t, self.states, self.felt = scene, t, states, felt
         self.contacts = contacts.contacts_of(scene)
-        step = float(np.min(np.diff(t), initial=1e-3))
-        self.near = CLOSED * scene.block.radius + 2.0 * scene.gravity * step**2
+        self.near = (
+            CLOSED * scene.block.radius
+            + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
+        )
         x, y, theta, x_dot, y_dot, theta_dot = states.T
         #: Of each contact: its corner, normal and distance.
         self.places = np.array([(*one.corner, *one.normal, one.distance) for one in self.contacts])

@@ -149,10 +149,12 @@ def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
     if len(times) == 1:
         return states[: len(inside)]
     positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
-    velocities = np.column_stack(
-        [np.interp(inside, times, states[:, column]) for column in (3, 4, 5)]
+    # A cubic over a long step may show a fall that is none.
+    upright = inside < (times[-2] if abs(states[-1, 2]) >= LYING else math.inf)
+    positions[upright, 2] = np.clip(positions[upright, 2], -LYING, LYING)
+    return np.column_stack(
+        [positions, *(np.interp(inside, times, states[:, column]) for column in (3, 4, 5))]
     )
-    return np.hstack([positions, velocities])
 
 
 @dataclass(frozen=True)

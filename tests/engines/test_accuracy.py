@@ -138,8 +138,10 @@ def test_what_lies_on_its_side_ends_the_run(single_engine, settings):
     history = single_engine(time_step=1e-3, settings=settings).simulate(
         free_rocking(0.5, initial_angular_velocity=2.0, duration=9.0)
     )
-    assert history.event_list[-1].kind == history.outcome == "overturned left"
-    assert history.channels["t"][-1] < 5.0
+    assert (history.event_list[-1].kind, history.outcome, history.channels["t"][-1] < 5.0) == (
+        *["overturned left"] * 2,
+        True,
+    )
 
 
 @pytest.mark.parametrize("settings", ["best", "default"])
@@ -172,8 +174,7 @@ def test_box2d_sleeps_through_a_pulse_as_it_comes():
         engines.Box2D(time_step=1e-3, settings=settings).simulate(scene)
         for settings in ("default", "best")
     )
-    assert asleep.peak_rotation < 1e-4 * scene.block.alpha
-    assert reference.peak_rotation > 0.2 * scene.block.alpha
+    assert 1e4 * asleep.peak_rotation < scene.block.alpha < 5.0 * reference.peak_rotation
     assert theta_rms(awake, reference) < 2e-2 * scene.block.alpha
 
 

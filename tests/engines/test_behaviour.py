@@ -330,6 +330,17 @@ def test_a_motion_that_cannot_be_is_a_failure(step, answers, words):
         Scripted(time_step=step, answers=answers).simulate(free_rocking(0.0))
 
 
+# Of which a cubic makes 1.6 rad.
+@pytest.mark.parametrize("answers", [{"state": lambda: (0.0, 1.0, 1.5, 0.0, 0.0, 100.0)}])
+def test_between_long_steps_no_block_falls(answers):
+    assert (
+        Scripted(time_step=1e-2, answers=answers)
+        .simulate(free_rocking(0.0, output_step=1e-3))
+        .outcome
+        == "moving"
+    )
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 @pytest.mark.parametrize("above", [3e-9, -3e-9])
 def test_mujocos_floor_is_where_it_is_said_to_be(friction, above):
