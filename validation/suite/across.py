@@ -277,7 +277,7 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     """
     import pandas as pd
 
-    last = moments[-1]
+    last, number = moments[-1], f"{len(moments)} run{'s' * (len(moments) > 1)}"
     every = {name: [one.figures.get(name) for one in moments] for name in last.figures}
     values = pd.DataFrame(every, dtype=float)
     least, most = values.min(), values.max()
@@ -301,7 +301,7 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
         for one in reversed(moments)
     ]
     blocks: list[Block] = [
-        Text(f"{len(moments)} runs, {len(moved)} figures moved{before}", items=told),
+        Text(f"{number}, {len(moved)} figures moved{before}", items=told),
         *([Plot("trend", panels=panels, x=Axis("run"), shared=False)] if panels else []),
         Table("figures", columns, rows, "What varied", on="page" if rows else "file"),
         Table(
@@ -314,7 +314,7 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     ]
     return Finding(
         "trend",
-        f"{last.suite} over {len(moments)} runs",
+        f"{last.suite} over {number}",
         f"{len(found)} figures varied, {len(every) - len(found)} stayed the same. The last run:"
         f" {last.verdict}.",
         blocks,

@@ -251,7 +251,8 @@ def _falls(found: Found) -> Answer:
         outcome = found.each[0][1].outcome
         said = f"{name} {FATES.get(outcome, outcome.replace('overturned ', 'overturns to the '))}."
     else:
-        under = f"{len(found.runs)} records" if study.recorded else "its own base motion"
+        records = f"{len(found.runs)} record{'s' * (len(found.runs) > 1)}"
+        under = records if study.recorded else "its own base motion"
         draws = f", {count} runs," if count > len(found.runs) else ""
         share, low, high = (f"{100.0 * overturning[key]:.3g} %" for key in INTERVAL)
         said = (
