@@ -55,19 +55,15 @@ class Landing(figures.Stored):
     def followed_by(self, history: History, scene: Scene) -> LawFollowed | None:
         """The law that a history of the scene followed.
 
-        None where the history ends before the laws part, or had already left their common motion.
+        None where the history does not reach over the landing, or had already left their common
+        motion. Its rows may have times of their own.
         """
-        first = self.parts - self.start
-        rows = min(
-            len(history.channels["theta"]) - self.start,
-            *(len(motion) for motion in self.branches.values()),
-        )
-        if rows < first + 2:
+        first, t = self.parts - self.start, history.channels["t"]
+        times = scene.output_times[self.start :][: min(map(len, self.branches.values()))]
+        rows = int(np.searchsorted(times, t[-1] + 1e-9))
+        if rows < first + 2 or t[0] > times[0] + 1e-9:
             return None
-        own = (
-            np.asarray(history.channels["theta"][self.start : self.start + rows], dtype=float)
-            / scene.block.alpha
-        )
+        own = np.interp(times[:rows], t, history.channels["theta"]) / scene.block.alpha
         motions = {law: np.array(motion[:rows]) for law, motion in self.branches.items()}
         errors = {law: _rms((own - motion)[first:]) for law, motion in motions.items()}
         nearest: ImpactLaw = min(errors, key=lambda law: errors[law])
