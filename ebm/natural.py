@@ -9,7 +9,7 @@ is known here by its settings only.
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import FORM, ground_of
 from rockcheck.ebm.core.names import LAWS, Shape
 from rockcheck.ebm.core.state import MOTION, STATE, Base, Rows
-from rockcheck.scenes import Floats, Scene, kinematics, progress
+from rockcheck.scenes import Floats, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
 #: The event loops that are compiled, by a model's friction.
@@ -52,7 +52,7 @@ def setting_of(scene: Scene, model: Any) -> np.record:
     )
 
 
-def side_of(scene: Scene, side: Literal["left", "right"]) -> np.record:
+def side_of(scene: Scene, side: Side) -> np.record:
     """One side of a block and the wall there, lengths in R of its weaker pivot."""
     block, unit, wall = scene.block, scene.block.radius, scene.wall(side)
     alpha = block.alpha

@@ -8,12 +8,12 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from statistics import geometric_mean
-from typing import Any, Literal
+from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
 from rockcheck.reports.view import FALL, SceneView, all_figures
-from rockcheck.scenes import experience
+from rockcheck.scenes import Side, experience
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import (
@@ -413,7 +413,7 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
     """
     turns = (f for f in all_figures(cell) if f.unit == "alpha")
     last = results.value_of(turns, "last_rotation") or 0.0
-    side: Literal["left", "right"] = "left" if last > 0.0 else "right"
+    side: Side = "left" if last > 0.0 else "right"
     return (
         f"falling {side}"
         if cell.outcome == "moving"

@@ -8,7 +8,7 @@ from rockcheck.scenes.base import (
     Positive as Positive,
     Shown as Shown,
 )
-from rockcheck.scenes.block import Block, Pivot as Pivot
+from rockcheck.scenes.block import Block, Pivot as Pivot, Side as Side
 from rockcheck.scenes.errors import InputError, ModelFailure, printable as printable
 from rockcheck.scenes.excitations import Excitation as Excitation, Record, Rest, Ricker, Sine
 from rockcheck.scenes.files import load_scene, named_scenes

@@ -17,6 +17,8 @@ from pydantic import (
 from rockcheck.scenes.base import Finite, Frozen, Positive
 from rockcheck.scenes.errors import refuse
 
+Side = Literal["left", "right"]
+
 #: Relative excess of the moment of inertia over its bound that is put down to rounding.
 ROUNDING = 1e-12
 
@@ -142,7 +144,7 @@ class Block(Frozen):
         moment = self.moment_of_inertia
         return self.half_diagonal**2 / 3.0 if moment is None else moment / (self.mass or 1.0)
 
-    def pivot(self, side: Literal["left", "right"]) -> Pivot:
+    def pivot(self, side: Side) -> Pivot:
         """The lower corner on that side.
 
         A block that tilts to the left (theta > 0) rocks on the left one.

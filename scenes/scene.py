@@ -4,14 +4,14 @@ It knows nothing of the models that play it.
 """
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
-from rockcheck.scenes.block import PAPER_BLOCK, Block
+from rockcheck.scenes.block import PAPER_BLOCK, Block, Side
 from rockcheck.scenes.errors import refuse
 from rockcheck.scenes.excitations import Excitation, Rest
 
@@ -67,7 +67,7 @@ class Wall(Frozen):
     `gap` is the clear distance in m to the side of the upright block, `restitution` is e.
     """
 
-    side: Literal["left", "right"]
+    side: Side
     gap: NonNegative
     restitution: Restitution = 0.0
 
@@ -139,7 +139,7 @@ class Scene(Shown, Frozen):
         )
         return self
 
-    def wall(self, side: Literal["left", "right"]) -> Wall | None:
+    def wall(self, side: Side) -> Wall | None:
         """The wall on that side, or None."""
         return next((wall for wall in self.walls if wall.side == side), None)
 
@@ -187,7 +187,7 @@ class Scene(Shown, Frozen):
 
     def mirrored(self) -> Self:
         """The same scene with left and right exchanged."""
-        swap: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
+        swap: dict[str, Side] = {"left": "right", "right": "left"}
         return self.replace(
             block=self.block.mirrored(),
             walls=tuple(wall.replace(side=swap[wall.side]) for wall in self.walls),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rockcheck.scenes import Block, History, InputError, Scene, Shown, errors, kinematics
+from rockcheck.scenes import Block, History, InputError, Scene, Shown, Side, errors, kinematics
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
     Figure,
@@ -274,7 +274,7 @@ def motion_of(history: History, scene: Scene | None = None) -> dict[str, float |
         "peak_rotation": peak,
         "slip": largest_slip(history) if stands and "slip" in channels else None,
         "top_displacement": top,
-        "wall_speed": max(wall_speeds(history, scene), default=None) if scene else None,
+        "wall_speed": max(wall_speeds(history, scene), default=(None,))[0] if scene else None,
     }
 
 
@@ -290,8 +290,8 @@ def largest_slip(history: History) -> float:
     return largest if largest > ROUNDING * getattr(history.block, "half_height", 0.0) else 0.0
 
 
-def wall_speeds(history: History, scene: Scene) -> Iterator[float]:
-    """Speeds (m/s) with which the block struck walls, one per event "wall impact".
+def wall_speeds(history: History, scene: Scene) -> Iterator[tuple[float, Side]]:
+    """Speeds (m/s) with which the block struck walls, and their sides, one an event "wall impact".
 
     The speed of the corner that strikes, in the last row before the event, extrapolated to the
     event from the last two rows if no other event lies between; of an event at the start in that
@@ -306,21 +306,21 @@ def wall_speeds(history: History, scene: Scene) -> Iterator[float]:
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
         rows, rest = slice(max(row - 1, 0), row + 1), event.t - t[row]
         corners = [
-            corner
+            (*corner, wall.side)
             for wall in scene.walls
             for corner in kinematics.side_corners(
                 scene.block, wall.side, wall.gap, *columns[1:, rows]
             )
         ]
         # the nearest one then, which need not be the nearest in the row
-        _, rates = min(corners, key=lambda c: (c[0, -1] - c[1, -1] * rest, -c[1, -1]))
+        _, rates, side = min(corners, key=lambda c: (c[0][-1] - c[1][-1] * rest, -c[1][-1]))
         speed = rates[-1]
         if len(rates) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
             speed += (rates[1] - rates[0]) * rest / (t[row] - t[row - 1])
-        yield max(0.0, float(speed))
+        yield max(0.0, float(speed)), side
 
 
-def largest_reach(history: History, scene: Scene, side: str) -> float:
+def largest_reach(history: History, scene: Scene, side: Side) -> float:
     """Farthest reach (m) of the block beyond its first place on `side`.
 
     A wall at a smaller clear gap there would be struck.

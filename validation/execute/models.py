@@ -267,14 +267,13 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     """
     began = time.perf_counter()
     history = _simulate(work, scene)
-    found = None
-    if uncertainty:
-        try:
-            found = numerical.numerical_uncertainty(
-                build(work.family, work.settings, work.search_path), scene, history
-            )
-        except (ModelFailure, InputError) as error:
-            found = numerical.failed(history, f"a coarser run failed: {printable(error)}")
+    found = (
+        numerical.numerical_uncertainty(
+            build(work.family, work.settings, work.search_path), scene, history
+        )
+        if uncertainty
+        else None
+    )
     return Played(
         {
             "outcome": history.outcome,

@@ -3,11 +3,10 @@
 import itertools
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
-from rockcheck.scenes import PAPER_BLOCK, Floor, Ricker, Scene, Wall
+from rockcheck.scenes import PAPER_BLOCK, Floor, Ricker, Scene, Side, Wall
 
-FIGURES: dict[int, tuple[Literal["left", "right"], float]] = {
+FIGURES: dict[int, tuple[Side, float]] = {
     6: ("left", 0.3),
     7: ("left", 0.6),
     8: ("right", 0.3),

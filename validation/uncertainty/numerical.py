@@ -30,7 +30,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rockcheck.scenes import History, Scene
+from rockcheck.scenes import History, InputError, ModelFailure, Scene, printable
 from rockcheck.validation.discrepancy.figures import Stored
 
 #: Steps of the runs, in units of the finest.
@@ -98,17 +98,21 @@ def numerical_uncertainty(
 
     `history` is the run at the model's own step, played here where it is not given. Three coarser
     runs (together 13/12 of its cost), or one of an event-based model at a hundredth of its
-    tolerance. Raises what `simulate` raises.
+    tolerance. One that fails leaves nothing converged. Raises what `simulate` raises of the run
+    itself.
     """
     if not (hasattr(model, "coarser") or hasattr(model, "finer")):
         return None
     given = history or model.simulate(scene)
-    if hasattr(model, "coarser"):
-        runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
-        return Numerical(
-            method="steps h, 2h, 3h and 4h", quantities=tuple(_from_steps(scene, runs))
-        )
-    method, finer = "a hundredth of the tolerance", model.finer().simulate(scene)
+    method = "a hundredth of the tolerance"
+    try:
+        if hasattr(model, "coarser"):
+            method = "steps h, 2h, 3h and 4h"
+            runs = [given, *(model.coarser(factor).simulate(scene) for factor in FACTORS[1:])]
+            return Numerical(method=method, quantities=tuple(_from_steps(scene, runs)))
+        finer = model.finer().simulate(scene)
+    except (ModelFailure, InputError) as error:
+        return failed(given, f"a coarser or finer run failed: {printable(error)}", method)
     if _side(given) != _side(finer):
         return failed(given, "the outcome changes with the tolerance", method)
     # `SAFETY` times the change: the finer run errs by a few hundredths of it.

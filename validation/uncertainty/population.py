@@ -89,7 +89,8 @@ def curve_of(
     """
     hits, decided = (hit & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
     median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
-    fitted = scipy.special.ndtr(np.log(intensities / median) / dispersion)
+    with np.errstate(divide="ignore"):  # of a dispersion of 0 it is a step
+        fitted = scipy.special.ndtr(np.log(intensities / median) / dispersion)
     points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
     sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     medians = [
@@ -128,10 +129,15 @@ def fit_lognormal(
     """Median and dispersion of the lognormal curve of the greatest likelihood (Baker 2015).
 
     `hits` counts the decided runs (`runs`) in which the event happened at each intensity. `NO_FIT`
-    where that is all or none of them, or where the curve does not rise with the intensity.
+    where that is all or none of them, or where the curve does not rise with the intensity. Where
+    all happen above and none below a level, any median between is as likely and a dispersion of 0
+    the likeliest: the middle one, in ln x, is taken.
     """
     if not 0 < hits.sum() < runs.sum():
         return NO_FIT
+    least, most = intensities[hits > 0].min(), intensities[hits < runs].max()
+    if most < least:
+        return math.sqrt(least * most), 0.0
     logarithm = np.log(intensities)
     centre = float(np.mean(logarithm))
 

@@ -15,7 +15,11 @@ from rockcheck.validation.uncertainty import numerical
 
 def ran(outcome, peak=None, slip=None, top=None, speed=None, **more):
     figures = {"peak_rotation": peak, "slip": slip, "top_displacement": top, "wall_speed": speed}
-    return Ran(outcome=outcome, motion=figures, **{"slid": slip or 0.0} | more)
+    return Ran(
+        outcome=outcome,
+        motion=figures,
+        **{"slid": slip or 0.0, "speeds": {"right": speed} if speed else {}} | more,
+    )
 
 
 def sure(u_num, **more):
@@ -31,7 +35,7 @@ def sure(u_num, **more):
 
 RUNS = {
     "a": ran("at rest", 0.2, 0.01, 0.3, 0.4),
-    "b": ran("moving", 0.4, 0.03, 0.5),
+    "b": ran("moving", 0.4, 0.03, 0.5, speeds={"left": 0.7}),  # its gap is not varied
     "c": ran("overturned right", speed=0.9, slid=1e-7),  # that of a contact which yields
 }
 #: By case, whether the event of each hand method happens, and how far it goes.
@@ -127,7 +131,7 @@ def test_tables_of_three_records():
         ],
         "gaps": [
             [0.0, 3, Mark(1, "fail"), 2, 0.65, 0.9],
-            [0.1, 2, Mark(0, "pass"), 1, 0.4, 0.4],
+            [0.1, 2, Mark(0, "incomplete"), 1, 0.4, 0.4],
         ],
         "contributions": [
             ["records", 0.914, 0.4163, "scatter between the records"],

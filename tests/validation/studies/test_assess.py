@@ -186,7 +186,7 @@ def test_the_speed_at_the_wall_is_carried_on_over_no_other_event(
     scene = load_scene("fig5a").replace(
         walls=[Wall(side=side, gap=gap) for side, gap in {"left": 0.03, **near}.items()]
     )
-    assert [*wall_speeds(history, scene)] == pytest.approx([speed])
+    assert [*wall_speeds(history, scene)] == [(pytest.approx(speed), "left")]
 
 
 def test_hand_methods_stand_beside_the_simulation(assess, loop):

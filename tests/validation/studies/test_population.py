@@ -242,6 +242,7 @@ MANY, OVER = 10**7, np.linspace(0.5, 8.0, 60)
     ("intensities", "counts", "runs", "curve"),
     [
         (OVER, np.round(MANY * norm.cdf(np.log(OVER / 2.5) / 0.4)).astype(int), MANY, (2.5, 0.4)),
+        (np.array([1.0, 2.0, 3.0, 8.0]), np.array([0, 0, 0, 5]), 5, (math.sqrt(24.0), 0.0)),
         # its likelihood by another search
         (np.arange(1, 7) / 4, np.array([2, 5, 8, 7, 9, 8]), 10, (0.494703, 0.956567)),
     ],

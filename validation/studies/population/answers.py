@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import experience, history, writing
+from rockcheck.scenes import Side, experience, history, writing
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.discrepancy.compare import QUANTITIES, spread
 from rockcheck.validation.execute import pool
@@ -349,39 +349,41 @@ def _moves(found: Found) -> Answer:
     )
 
 
+def _at_gap(gap: float, runs: Sequence[Ran], every: int, sides: Sequence[Side]) -> dict[str, Any]:
+    struck = [[run.speeds[side] for side in sides if side in run.speeds] for run in runs]
+    speeds = spread([max(some) for some in struck if some])
+    fallen = sum(run.fell for run in runs)
+    return {
+        "gap": gap,
+        "runs": len(runs),
+        "overturned": fallen,
+        "struck": sum(map(bool, struck)),
+        "wall_speed": {key: speeds[key] for key in ("median", "largest")},
+        "verdict": "fail" if fallen else "pass" if len(runs) == every else "incomplete",
+    }
+
+
 def gaps_of(found: Found) -> dict[str, Any]:
     """Outcomes at each gap with runs, the clearance that is needed, and the largest safe gap.
 
+    `struck` counts the runs that strike a wall whose gap is varied; `verdict` is "incomplete" where
+    none falls and some have no result.
     `clearance` (m) is the largest reach without the wall: nearer than that a block would strike.
     It has the reach of blocks that fall, `free_overturned` of the runs without the wall.
     `none_overturns_up_to` (m) is the largest gap up to which no run overturns, and none failed.
     `monotonic` tells whether a wider gap never lets fewer runs overturn.
     """
-    rows: list[dict[str, Any]] = []
-    for gap, runs in found.at_gaps.items():
-        speeds = [v for run in runs if (v := run.motion.get("wall_speed")) is not None]
-        speed = spread(speeds)
-        rows.append(
-            {
-                "gap": gap,
-                "runs": len(runs),
-                "overturned": sum(run.fell for run in runs),
-                "struck": len(speeds),
-                "wall_speed": {key: speed[key] for key in ("median", "largest")},
-            }
-        )
-    fallen = [row["overturned"] for row in rows]
-    every = len(found.study.cases) * max(len(found.study.draws), 1)
-    stand = {row["gap"] for row in rows if row["runs"] == every and not row["overturned"]}
+    every, sides = len(found.study.cases) * max(len(found.study.draws), 1), found.study.sides
+    rows = [_at_gap(gap, runs, every, sides) for gap, runs in found.at_gaps.items()]
+    falls = [row["overturned"] for row in rows]
+    stand = {row["gap"] for row in rows if row["verdict"] == "pass"}
     safe = itertools.takewhile(stand.__contains__, found.study.gaps)
     return {
         "gaps": rows,
-        "clearance": max(
-            (run.reach[side] for run in found.free for side in found.study.sides), default=None
-        ),
+        "clearance": max((run.reach[side] for run in found.free for side in sides), default=None),
         "free_overturned": sum(run.fell for run in found.free),
         "none_overturns_up_to": max(safe, default=None),
-        "monotonic": fallen == sorted(fallen),
+        "monotonic": falls == sorted(falls),
     }
 
 
@@ -438,13 +440,13 @@ def _gaps(found: Found) -> Answer:
                 [
                     row["gap"],
                     row["runs"],
-                    Mark(row["overturned"], "fail" if row["overturned"] else "pass"),
+                    Mark(row["overturned"], row["verdict"]),
                     row["struck"],
                     *row["wall_speed"].values(),
                 ]
                 for row in rows
             ],
-            note="Runs that strike the wall, also those that then overturn.",
+            note="Struck: also by runs that then overturn. Yellow: some runs have no result.",
         ),
     ]
     return said, data, blocks if rows else []

@@ -23,6 +23,7 @@ from rockcheck.scenes import (
     ModelFailure,
     Record,
     Scene,
+    Side,
     Wall,
     errors,
     files,
@@ -456,7 +457,6 @@ def fragility(
     )
 
 
-Side = Literal["left", "right"]
 Numbers = tuple[tuple[str, float], ...]
 #: Rows of a history that is kept, at the most.
 MOST_ROWS = 2000
@@ -470,13 +470,14 @@ class Ran(figures.Stored):
     """One run: its motion, or the reason why it has none.
 
     How far the block slid and how far it reached to the left and to the right are in m, also of a
-    block that falls.
+    block that falls. `speeds` (m/s) are the largest at the walls that it struck, by side.
     """
 
     outcome: str
     motion: Mapping[str, float | None] = Field(default_factory=dict)
     slid: float = 0.0
     reach: Mapping[Side, float] = Field(default_factory=dict)
+    speeds: Mapping[Side, float] = Field(default_factory=dict)
     reason: str = ""
 
     @property
@@ -564,6 +565,7 @@ def _ran(scene: Scene, numbers: Numbers, model: Any) -> tuple[Ran, History | Non
         motion=compare.motion_of(history, scene),
         slid=compare.largest_slip(history),
         reach={side: compare.largest_reach(history, scene, side) for side in get_args(Side)},
+        speeds={side: speed for speed, side in sorted(compare.wall_speeds(history, scene))},
     ), history
 
 

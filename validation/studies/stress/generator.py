@@ -19,6 +19,7 @@ from rockcheck.scenes import (
     Rest,
     Ricker,
     Scene,
+    Side,
     Sine,
     Wall,
 )
@@ -41,7 +42,7 @@ LONGEST, MOST_SAMPLES = 15.0, 300
 #: Rows of a history.
 ROWS = 100
 
-WALLED: tuple[tuple[Literal["left", "right"], ...], ...] = (
+WALLED: tuple[tuple[Side, ...], ...] = (
     (),
     ("left",),
     ("right",),

@@ -25,7 +25,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,7 @@ from rockcheck.scenes import (
     Record,
     Ricker,
     Scene,
+    Side,
     Sine,
     Wall,
     kinematics,
@@ -384,7 +385,7 @@ def _wrong_clearance(model: EventBasedModel, scene: Scene, seed: int) -> bool:
     model does not resolve. False for a block that falls, or hardly moves. A strike may be part of
     a landing (the choice "lands along a wall").
     """
-    side: Literal["left", "right"] = "left" if seed % 2 else "right"
+    side: Side = "left" if seed % 2 else "right"
     rows = scene.output_times
     if len(rows) < 2:
         return False
