@@ -135,6 +135,7 @@ def _cells_of(lines: list[str], reading: Reading) -> _Cells:
     names, rows = _names_of(rows, layout, reading)
     width = len(names) or len(layout.words(*rows[0]))
     refuse(
+        (not rows, "no line of numbers below the names of columns", ""),
         (len(rows) > MOST_SAMPLES, f"more than {MOST_SAMPLES} lines", ""),
         (
             width > MOST_COLUMNS,

@@ -117,6 +117,7 @@ FAULTS = {
     "motion.csv": [
         ("", "empty"),
         ("# only a remark\n", "empty"),
+        (HEAD, "no line of numbers"),
         (
             "x,acceleration_g\n0,0\n1,0\n",
             "line 1: columns 'x, acceleration_g'; name them time_s and exactly one of",
