@@ -52,9 +52,10 @@ def _settings_of(model: str, runs: Iterable[results.Run]) -> dict[str, tuple[Any
     """
     default: Any = models.build(model)
     names = default.model_dump(exclude=LIMITS, exclude_none=True)
-    had = [cell.settings for run in runs for cell in run.cells if cell.model == model]
-    given = [settings for settings in had if settings]
-    return {name: tuple(dict.fromkeys(one[name] for one in given)) for name in names}
+    had = [  # the cell of an ensemble says only what is not as by default
+        names | cell.settings for run in runs for cell in run.cells if cell.model == model
+    ]
+    return {name: tuple(dict.fromkeys(one[name] for one in had)) for name in names}
 
 
 def tables(found: experience.Experience) -> str:

@@ -215,14 +215,17 @@ def test_experience_is_learnt_from_a_run(tmp_path):
     )
     (tmp_path / "five.toml").write_text(
         f'reference = "ebm-unilateral"\nscene = [{scenes}]\n'
-        "[models.ebm-unilateral]\n[models.ebm]\n[models.cm]\n"
+        "[models.ebm-unilateral]\n[models.ebm]\ntolerance = 1e-9\n[models.cm]\n"
+        '[[ensemble]]\nname = "two"\ncount = 2\nfriction = { uniform = [0.8, 0.9] }\n'
+        f"scene = {{ duration = 1.0, initial_rotation = 0.1, block = {block} }}\n"
     )
     found = experience.experience_of(
         [run_suite(suites.load_suite(tmp_path / "five.toml"), tmp_path / "run")]
     )
     counts = {model: one["peak_rotation"].count for model, one in found.trust.items()}
-    assert counts == {"cm": 5, "ebm": 5}
-    assert (found.settings["cm"], found.settings["ebm"]["pivot"]) == (
+    assert counts == {"cm": 7, "ebm": 7}
+    assert (found.settings["cm"], *map(found.settings["ebm"].get, ("pivot", "tolerance"))) == (
         {"penetration": (1e-8,), "damping_rule": ("calibrated",)},
         ("bilateral",),
+        (1e-9,),
     )
