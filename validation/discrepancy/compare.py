@@ -233,6 +233,8 @@ def _step(history: History) -> float:
 
 #: A slip below this share of the block's half height is rounding.
 ROUNDING = 1e-14
+#: Events at which a wall is struck that is nearer than this to the upright block, m.
+STRIKES = {"wall impact": math.inf, "floor impact": 1e-9}
 #: The four figures: name, what readers call it, unit and meaning.
 QUANTITIES = (
     Column(
@@ -262,13 +264,12 @@ def motion_of(history: History, scene: Scene | None = None) -> dict[str, float |
     block struck no wall. `scene` gives the walls, and the block where the file has none.
     """
     block, channels = scene.block if scene else history.block, history.channels
-    theta = np.asarray(channels["theta"], dtype=float)
     stands = not history.outcome.startswith("overturned")
     peak = top = None
     if stands and block is not None:
         peak = history.peak_rotation / block.alpha
         if "x" in channels:
-            places = kinematics.top_corners(block, np.asarray(channels["x"], dtype=float), theta)
+            places = kinematics.top_corners(block, channels["x"], channels["theta"])
             top = float(np.max(np.abs(places - places[:, :1])))
     return {
         "peak_rotation": peak,
@@ -280,8 +281,11 @@ def motion_of(history: History, scene: Scene | None = None) -> dict[str, float |
 
 def motion_words(motion: Mapping[str, float | None]) -> list[str]:
     """The known figures of how far a block moves, with their units."""
-    values = ((q, motion[q.name]) for q in QUANTITIES)
-    return [f"{q.label} {value:.4g} {q.unit}" for q, value in values if value is not None]
+    return [
+        f"{q.label} {value:.4g} {q.unit}"
+        for q in QUANTITIES
+        if (value := motion[q.name]) is not None
+    ]
 
 
 def largest_slip(history: History) -> float:
@@ -291,33 +295,41 @@ def largest_slip(history: History) -> float:
 
 
 def wall_speeds(history: History, scene: Scene) -> Iterator[tuple[float, Side]]:
-    """Speeds (m/s) with which the block struck walls, and their sides, one an event "wall impact".
+    """Speeds (m/s) with which the block struck walls, and the walls' sides.
 
-    The speed of the corner that strikes, in the last row before the event, extrapolated to the
-    event from the last two rows if no other event lies between; of an event at the start in that
-    row. It is the corner that is nearest to its wall at the event, at its speed in that row.
+    One per event "wall impact", and one per "floor impact" of a block that lands flush with a wall,
+    whose corners strike at that instant. The speed of the corner that strikes, in the last row
+    before the event, extrapolated to the event from the last two rows if no other event lies
+    between; of an event at the start in that row. It is the fastest of the corners that are nearest
+    to a wall at the event, as far as that row tells.
     """
-    names = ("t", "x", "theta", "x_dot", "theta_dot")
-    if not scene.walls or any(name not in history.channels for name in names):
+    if not scene.walls or not {"x", "x_dot", "theta_dot"} <= history.channels.keys():
         return
-    columns = np.array([history.channels[name] for name in names], dtype=float)
+    columns = np.array(
+        [history.channels[name] for name in ("t", "x", "theta", "x_dot", "theta_dot")], dtype=float
+    )
     t, times = columns[0], np.array([event.t for event in history.event_list])
-    for event in (one for one in history.event_list if one.kind == "wall impact"):
+    for event in history.event_list:
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
         rows, rest = slice(max(row - 1, 0), row + 1), event.t - t[row]
+        upright = kinematics.slip(scene.block, *columns[1:3, row]), 0.0
         corners = [
             (*corner, wall.side)
             for wall in scene.walls
+            if abs(kinematics.clearance(scene.block, wall.side, wall.gap, *upright))
+            < STRIKES.get(event.kind, 0.0)
             for corner in kinematics.side_corners(
                 scene.block, wall.side, wall.gap, *columns[1:, rows]
             )
         ]
-        # the nearest one then, which need not be the nearest in the row
-        _, rates, side = min(corners, key=lambda c: (c[0][-1] - c[1][-1] * rest, -c[1][-1]))
-        speed = rates[-1]
-        if len(rates) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
-            speed += (rates[1] - rates[0]) * rest / (t[row] - t[row - 1])
-        yield max(0.0, float(speed)), side
+        if corners:
+            gaps, rates = (np.array(some) for some in zip(*(c[:2] for c in corners), strict=True))
+            places, speeds = gaps[:, -1] - rates[:, -1] * rest, rates[:, -1]
+            if len(t[rows]) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
+                speeds = speeds + (rates[:, 1] - rates[:, 0]) * rest / (t[row] - t[row - 1])
+            far = places > np.min(places) + scene.gravity * rest * rest
+            fastest = int(np.argmax(np.where(far, -np.inf, speeds)))
+            yield max(0.0, float(speeds[fastest])), corners[fastest][2]
 
 
 def largest_reach(history: History, scene: Scene, side: Side) -> float:
@@ -325,8 +337,13 @@ def largest_reach(history: History, scene: Scene, side: Side) -> float:
 
     A wall at a smaller clear gap there would be struck.
     """
-    x, theta = history.channels["x"], history.channels["theta"]
-    return float(np.max(-kinematics.clearance(scene.block, side, 0.0, x, theta)))
+    return float(
+        np.max(
+            -kinematics.clearance(
+                scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
+            )
+        )
+    )
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:
