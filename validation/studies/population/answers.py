@@ -842,6 +842,8 @@ def _runs(found: Found) -> Iterator[Block]:
         f"left out, since not all of its draws were played: {without}": without,
         f"gaps and draws are played by {study.swift}": study.model != study.swift
         and (found.at_gaps or drawn),
+        f"intensities are played by {study.scales[0]}": study.model != study.scales[0]
+        and study.levels,
         f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them": names
         and not drawn
         and study.recorded,
@@ -895,7 +897,7 @@ class Assessment(Asked):
                 },
                 sure=first["sure"],
                 own=first["sure"].get("", Sure()),
-                levels=self.levels.gather(ended) if self.levels else ("", ()),
+                levels=self.levels.gather(ended, *self.scales) if self.levels else ("", ()),
                 failed=len(ended) < len(done),
             )
         )

@@ -49,7 +49,7 @@ from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
 
 Motions = Sequence[tuple[str, recordings.Recording]]
-#: The event-based model that plays populations, draws and gaps.
+#: The event-based model that plays populations, draws and gaps where the first one cannot.
 SWIFT = "ebm-unilateral"
 #: Usual time of a run, s, of compiled models and of others; total time up to which separate
 #: processes are not worth while.
@@ -145,20 +145,23 @@ class Population:
     other: dict[str, Any] | None = None
     upward: Mapping[str, Excitation] = field(default_factory=dict)
 
-    @cached_property
-    def batches(self) -> list[Batch]:
-        """One a case and motion. Raises `InputError` where the model cannot play a scene."""
-        player: Any = models.build(SWIFT, self.settings)
+    def batches(self, model: str = SWIFT, settings: Mapping[str, Any] = {}) -> list[Batch]:
+        """One a case and motion, by a model with these settings and, unless they differ, its own.
+
+        Raises `InputError` where the model cannot play a scene.
+        """
+        settings = {**self.settings, **settings}
+        player: Any = models.build(model, settings)
         for scene in self.cases.values():
             player.check(scene)
-        how = effort(SWIFT, self.settings, 2 * len(self.levels))
+        how = effort(model, settings, 2 * len(self.levels))
         soon = how["expected"] * len(self.motions) * len(self.cases) < SOON
         return [
             Batch(
                 (case, name),
                 scene.replace(excitation=motion, vertical=self.upward.get(name, scene.vertical)),
-                SWIFT,
-                tuple(self.settings.items()),
+                model,
+                tuple(settings.items()),
                 (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
                 name in self.upward,
                 where="here" if soon else "worker",
@@ -168,9 +171,12 @@ class Population:
             for name, motion, own in self.motions
         ]
 
-    def gather(self, done: Mapping[Any, Any]) -> tuple[str, list[Block]]:
-        """The answer, and the blocks: a curve a case and event; the lines of all motions."""
-        played = [batch for batch in self.batches if isinstance(done.get(batch), population.Runs)]
+    def gather(self, done: Mapping[Any, Any], *by: Any) -> tuple[str, list[Block]]:
+        """The answer, and the blocks: a curve a case and event; the lines of all motions.
+
+        `by`: the model of the batches, and its settings.
+        """
+        played = [one for one in self.batches(*by) if isinstance(done.get(one), population.Runs)]
         peaks = {
             case: np.array([done[one].peaks for one in played if one.of[0] == case]).reshape(
                 -1, 2, len(self.levels)
@@ -629,6 +635,13 @@ class Asked(Study):
         """The event-based model that plays draws and gaps."""
         return self.model if isinstance(models.build(self.model, {}), EventBasedModel) else SWIFT
 
+    @property
+    def scales(self) -> tuple[str, Mapping[str, Any]]:
+        """The event-based model that plays `levels`, and its settings."""
+        decides = getattr(models.build(self.model, {}), "decides", False)
+        model = self.model if decides else SWIFT
+        return model, self.settings.get(model, {})
+
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
         """The numbers of each draw, the same for every case.
@@ -745,7 +758,7 @@ class Asked(Study):
         """All of them at once."""
         return [
             *(task for part in self.parts.values() for some in part.values() for task in some),
-            *(self.levels.batches if self.levels else ()),
+            *(self.levels.batches(*self.scales) if self.levels else ()),
         ]
 
 
