@@ -25,6 +25,8 @@ TOLERANCE = 4e-8
 #: they may leave, and how far (in nodes) around a boundary nothing is inferred: hairs thinner than
 #: the nodes' distance break into dots, which are found so.
 COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
+#: A node's scene goes on after the motion of the base for at least this time, s, and so many 1/p.
+SETTLE, FALLS = 6.0, 12.8
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
 _UNKNOWN = 9
@@ -245,24 +247,24 @@ def play_motions(
 
 
 def node_scene(
-    scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = 6.0
+    scene: Scene, amplitude_ratio: float, frequency_ratio: float, settle: float = SETTLE
 ) -> Scene:
     """The scene of one node of a spectrum, for any model to play.
 
-    It lasts until `settle` s after the motion of the base.
+    It lasts until `settle` s after the motion of the base; longer where the block is so large that
+    it falls more slowly, see `FALLS`.
     """
-    if isinstance(scene.excitation, Record):
-        return scene.replace(
-            excitation=scene.excitation.scaled(float(amplitude_ratio)),
-            block=scene.block.scaled(float(frequency_ratio)),
-            duration=max(scene.excitation.quiet_after, scene.vertical.quiet_after) + settle,
-        )
-    amplitude, period = node_pulse(scene, float(amplitude_ratio), float(frequency_ratio))
-    pulse = type(scene.excitation)(
-        **scene.excitation.model_dump() | {"amplitude": amplitude, "period": period}
-    )
+    block, excitation, ratio = scene.block, scene.excitation, float(frequency_ratio)
+    if isinstance(excitation, Record):
+        block, excitation = block.scaled(ratio), excitation.scaled(float(amplitude_ratio))
+    else:
+        amplitude, period = node_pulse(scene, float(amplitude_ratio), ratio)
+        excitation = excitation.replace(amplitude=amplitude, period=period)
     return scene.replace(
-        excitation=pulse, duration=max(pulse.quiet_after, scene.vertical.quiet_after) + settle
+        block=block,
+        excitation=excitation,
+        duration=max(excitation.quiet_after, scene.vertical.quiet_after)
+        + max(settle, FALLS / block.weaker_pivot.frequency_parameter(scene.gravity)),
     )
 
 

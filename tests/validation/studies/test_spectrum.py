@@ -17,6 +17,7 @@ from rockcheck import (
     ModelFailure,
     Ricker,
     Scene,
+    Sine,
     Spectrum,
     Wall,
     overturning_spectrum,
@@ -124,20 +125,35 @@ def test_another_model_plays_in_processes(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "frequency", "amplitudes", "letters"),
+    ("name", "pulse", "size", "frequency", "amplitudes", "letters"),
     [
         # As the pulses end the block turns away from rest, at 0.25, 0.99 and 1.73 alpha.
-        ("figure-6-unobstructed", 4.5, [6.4, 6.54, 6.68], "SLL"),
+        ("figure-6-unobstructed", Ricker, 1.0, 4.5, [6.4, 6.54, 6.68], "SLL"),
         # It overturns 0.2 s after the pulse, past its balance as that ends, and has lost much of
         # its energy by sliding.
-        ("figure-6-gap-103-e-0", 0.5 + 32 * 7.5 / 99.0, [1.0 + 19 * 11.0 / 99.0], "R"),
+        (
+            *("figure-6-gap-103-e-0", Ricker, 1.0),
+            *(0.5 + 32 * 7.5 / 99.0, [1.0 + 19 * 11.0 / 99.0], "R"),
+        ),
+        # The pulse of a small block is over between two rows; a large one falls for minutes.
+        *(
+            ("figure-6-unobstructed", Sine, 10.0**k, 3.5, [1.5, 3.0, 8.0], "SRR")
+            for k in (-3, 0, 3)
+        ),
     ],
 )
 def test_a_model_that_is_simulated_plays_until_the_outcome_is_certain(
-    monkeypatch, name, frequency, amplitudes, letters
+    monkeypatch, name, pulse, size, frequency, amplitudes, letters
 ):
     a = np.array(amplitudes)
-    (nodes,) = Request(model="cm").nodes(PANELS[name].scene, a, np.full(len(a), frequency))
+    (nodes,) = Request(model="cm", settings={"penetration": 1e-6 * size}).nodes(
+        PANELS[name].scene.replace(
+            block=PANELS[name].scene.block.scaled(size),
+            excitation=pulse(amplitude=1.0, period=1.0),
+        ),
+        a,
+        np.full(len(a), frequency),
+    )
     assert nodes.play().letters == letters
     monkeypatch.setattr(ContinuousModel, "simulate", Mock(side_effect=ModelFailure("too much")))
     assert nodes.play().letters == "U" * len(a)

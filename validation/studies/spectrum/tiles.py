@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
 from rockcheck.ebm.spectrum import (
+    FALLS,
     LEFT,
     RIGHT,
     SAFE,
+    SETTLE,
     TOLERANCE,
     Motion,
     Nodes as Outcomes,
@@ -33,9 +35,9 @@ TILE, SLOW_TILE = 10_000, 20
 A_NODE, A_SLOW_NODE, A_MOTION = 4e-5, 0.1, 2e-4
 #: Outcomes in text, by their code from `LEFT` on; and where the run failed.
 LETTERS, UNDECIDED = "LSR", "U"
-#: Time (s) added after the base's motion while the outcome is open; and the share of the energy of
-#: tipping over below which the outcome is decided: a hundredth is left for the model's own error.
-SETTLE, ENOUGH = 6.0, 0.99
+#: The share of the energy of tipping over below which the outcome is decided: a hundredth is left
+#: for the model's own error. Step of the rows of a run, s.
+ENOUGH, STEP = 0.99, 0.02
 #: Number of equal parts of a history; bound on its distance from straight lines between the rows
 #: that are kept: of alpha in rotation, of the half width in position.
 PARTS, COARSE = 400, 0.01
@@ -107,17 +109,19 @@ def compiled(player: object) -> bool:
 
 
 def _letter(scene: Scene, player: Any) -> str:
-    """The outcome of a node by a model that is simulated, whatever the scene's duration.
+    """The outcome of the scene of a node by a model that is simulated.
 
-    A block that has not tipped past its balance when the base comes to rest, and has too little
-    energy left to do so, is safe. Any other run is made again, `SETTLE` s longer; a block that then
-    stands is safe.
+    A block that has not tipped past its balance when the base has come to rest, and has too little
+    energy left to do so, is safe. Any other run is made again, up to the scene's duration; a block
+    that then stands is safe.
     """
     block, quiet = scene.block, max(scene.excitation.quiet_after, scene.vertical.quiet_after)
     needed = scene.gravity * (block.radius - block.weaker_pivot.height)
-    for settle in (0.0, SETTLE):  # few rows: only the outcome is needed
-        try:
-            history = player.simulate(scene.replace(duration=quiet + settle, output_step=0.02))
+    for last in (quiet, scene.duration):  # few rows: only the outcome is needed
+        try:  # the last row at `last` or after it: what the base does until then counts
+            history = player.simulate(
+                scene.replace(duration=STEP * max(1, math.ceil(last / STEP)), output_step=STEP)
+            )
         except ModelFailure:
             return UNDECIDED
         if history.outcome.startswith("overturned"):
@@ -236,8 +240,8 @@ class Request:
     ) -> list[Nodes]:
         """The tasks that play nodes (1-D arrays of one length) of a scene's spectrum, in order."""
         fast = compiled(models.build(self.model, self.settings))
-        neutral = scene.replace(name="tile", description="", duration=1.0, output_step=0.02)
-        how = provenance.code_digest(__name__) if fast else f"{SETTLE} {ENOUGH}"
+        neutral = scene.replace(name="tile", description="", duration=1.0, output_step=STEP)
+        how = provenance.code_digest(__name__) if fast else f"{SETTLE} {FALLS} {ENOUGH} {STEP}"
         base = provenance.cell_key(neutral, self.model, self.settings) + what + how
         size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
         one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE

@@ -513,9 +513,8 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     rows = []
     for (label,), mine in grouped(found[found.family == next(iter(KINDS))], "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
-            best = good.loc[good.rms.idxmin()]
-            at_equal = error_at(mine, EQUAL_COST)
-            rows.append((label, cost_at(mine)[0], at_equal, float(best.rms), float(best.cpu)))
+            best = good.loc[good.rms.idxmin(), ["rms", "cpu"]].tolist()
+            rows.append((label, cost_at(mine)[0], error_at(mine, EQUAL_COST), *best))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 
