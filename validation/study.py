@@ -58,15 +58,20 @@ class Task:
         """The fields that identify the task."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.compare}
 
+    #: What else the result depends on: the code of a model that its module does not import, say.
+    besides = property(lambda self: None)
+
     def depends(self) -> Any:
         """All that the result depends on, as JSON.
 
-        By default the fields, the code that its module can reach, and all libraries.
+        By default the fields, the code that its module can reach, all libraries, and what is
+        `besides`.
         """
         return {
             "task": self.fields(),
             "code": provenance.code_digest(type(self).__module__),
             "versions": provenance.versions(),
+            "besides": self.besides,
         }
 
     @cached_property

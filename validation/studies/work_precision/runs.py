@@ -21,7 +21,7 @@ from rockcheck.ebm import EventBasedModel, predictability_horizon, spectrum
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute import models
+from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.study import Task
 
 MEMBERS = 10
@@ -353,6 +353,13 @@ class Play(Task):
     line: str
     value: float
     repeats: int = REPEATS
+    #: The code of the model, and where its time counts the machine.
+    besides = property(
+        lambda self: (
+            provenance.code_digest(models.home(LINES[self.line].model)),
+            self.family in FAMILIES and provenance.hardware(),
+        )
+    )
 
     def record(self, **found: Any) -> BenchmarkRun:
         """The row of the run, with what was found."""
