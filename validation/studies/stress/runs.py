@@ -351,7 +351,6 @@ class Broken:
     def text(self, scene: Scene, remark: str) -> str:
         """Its scene file with a scene that shows it."""
         settings = PLAYERS[self.model].settings(scene, self.number)
-        model = "ebm:EventBasedModel" if "friction" in settings else self.model.split()[0]
         options = [
             f"--set {key}={value if isinstance(value, str) else repr(value).lower()}"
             for key, value in settings.items()
@@ -360,7 +359,14 @@ class Broken:
             f"{self.invariant}: {INVARIANTS[self.invariant].words}",
             printable(self.words, 200),
             remark,
-            " ".join([f"rockcheck simulate {self.name} --model {model}", *options]),
+            # No model's name has Housner's block, which never slips.
+            'python -c "import rockcheck as rc;'
+            f" rc.EventBasedModel(friction='no-slip').simulate(rc.load_scene('{self.name}'))"
+            ".save('history.csv')\""
+            if "friction" in settings
+            else " ".join(
+                [f"rockcheck simulate {self.name} --model {self.model.split()[0]}", *options]
+            ),
         )
         # the name is the file's own
         tables = {key: part for key, part in files.tables_of(scene).items() if key != "name"}
