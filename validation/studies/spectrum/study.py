@@ -344,8 +344,8 @@ class Spectra(Study):
         """A spectrum as CSV and as NPZ, with its settings.
 
         The CSV has one row an amplitude ratio, one column a frequency ratio: -1 overturned left, 0
-        safe, 1 overturned right. A record's samples are left out of the settings: its name
-        identifies it.
+        safe, 1 overturned right, an empty cell undecided. A record's samples are left out of the
+        settings: its name identifies it.
         """
         about = json.dumps(
             {
@@ -365,9 +365,13 @@ class Spectra(Study):
         table = writing.table_text(
             ["amplitude_ratio\\frequency_ratio", *map(repr, one.frequency_ratios.tolist())],
             (
-                [amplitude, *row]
-                for amplitude, row in zip(
-                    one.amplitude_ratios.tolist(), one.outcomes.tolist(), strict=True
+                [
+                    amplitude,
+                    *(side if side or safe else None for side, safe in zip(*row, strict=True)),
+                ]
+                for amplitude, *row in zip(
+                    *(one.amplitude_ratios.tolist(), one.outcomes.tolist(), one.safe.tolist()),
+                    strict=True,
                 )
             ),
         )
