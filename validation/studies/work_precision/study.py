@@ -338,7 +338,7 @@ def _spread(label: str, trends: pd.DataFrame) -> list[Any]:
     )
     return [
         label,
-        orders[len(orders) // 2] if orders else None,
+        median(orders) if orders else None,
         f"{ratios[0]:.3g} to {ratios[-1]:.3g}" if ratios else "-",
         f"{len(ratios)} of {len(trends)} scenes",
     ]
