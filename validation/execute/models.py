@@ -26,7 +26,7 @@ class Model(Protocol):
 class Family:
     """A named kind of model: its class, the settings that the name fixes, and its libraries.
 
-    Its results depend on the versions of `libraries`.
+    Its results depend on the versions of `libraries`, and of `NUMBERS`.
     """
 
     module: str
@@ -43,9 +43,9 @@ class Family:
 #: The fair reference for engines, and the model that forbids flight.
 REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
 ENGINES = "rockcheck.engines"
-COMPILED = ("numba", "llvmlite", "numpy", "scipy")
-#: Further libraries of the engines that step adaptively.
-STEPPED = ("numba", "llvmlite", "numpy")
+#: What every model calculates with; and the libraries of those whose loops are compiled.
+NUMBERS = ("numpy", "scipy")
+COMPILED = ("numba", "llvmlite", *NUMBERS)
 #: Value of `time_step` for adaptive steps, whose compiled code the engines share.
 ADAPTIVE = "adaptive"
 FAMILIES: dict[str, Family] = {
@@ -83,31 +83,31 @@ FAMILIES: dict[str, Family] = {
         COMPILED,
         compiled="continuous model",
     ),
-    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *STEPPED)),
+    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *COMPILED)),
     "pybullet": Family(
-        ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *STEPPED)
+        ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *COMPILED)
     ),
     "pymunk": Family(
         ENGINES,
         "Pymunk",
         "the physics engine pymunk (Chipmunk, in two dimensions)",
         {},
-        ("pymunk", *STEPPED),
+        ("pymunk", *COMPILED),
     ),
-    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *STEPPED)),
-    "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake", "numpy")),
+    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *COMPILED)),
+    "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake",)),
     "box2d": Family(
         ENGINES,
         "Box2D",
         "the physics engine Box2D 3 (in two dimensions, single precision)",
         {},
-        ("pyb2d3", "numpy"),
+        ("pyb2d3",),
     ),
     "physx": Family(
-        ENGINES, "PhysX", "the physics engine PhysX 5 (single precision)", {}, ("sapien", "numpy")
+        ENGINES, "PhysX", "the physics engine PhysX 5 (single precision)", {}, ("sapien",)
     ),
     "jolt": Family(
-        ENGINES, "Jolt", "the physics engine Jolt (single precision)", {}, ("culverin", "numpy")
+        ENGINES, "Jolt", "the physics engine Jolt (single precision)", {}, ("culverin",)
     ),
     "measured": Family(
         "rockcheck.validation.discrepancy.measured",

@@ -53,7 +53,8 @@ def cell_key(
                 "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
                 "code": code_digest(models.home(name), search_path),
                 "libraries": {
-                    library: version_of(library) for library in models.family(name).libraries
+                    library: version_of(library)
+                    for library in (*models.NUMBERS, *models.family(name).libraries)
                 },
                 "python": platform.python_version(),
                 "machine": platform.machine(),
