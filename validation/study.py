@@ -28,6 +28,8 @@ from rockcheck.validation.finding import Finding, Made
 FAULTS = "faults"
 #: Expected time (s) from which an estimate is announced before the work begins.
 LONG = 10.0
+#: Modules of models: these are imported by their names, which no study's code shows.
+MODELS = ("rockcheck.ebm", "rockcheck.cm", "rockcheck.engines")
 
 
 @dataclass(frozen=True)
@@ -58,20 +60,17 @@ class Task:
         """The fields that identify the task."""
         return {one.name: getattr(self, one.name) for one in fields(self) if one.compare}
 
-    #: What else the result depends on: the code of a model that its module does not import, say.
-    besides = property(lambda self: None)
-
     def depends(self) -> Any:
         """All that the result depends on, as JSON.
 
-        By default the fields, the code that its module can reach, all libraries, and what is
-        `besides`.
+        By default the fields, the code that its module can reach and that of all `MODELS`, all
+        libraries, and, where it is "timed", the machine.
         """
         return {
             "task": self.fields(),
-            "code": provenance.code_digest(type(self).__module__),
+            "code": [provenance.code_digest(one) for one in (type(self).__module__, *MODELS)],
             "versions": provenance.versions(),
-            "besides": self.besides,
+            "machine": provenance.hardware() if self.where == "timed" else None,
         }
 
     @cached_property

@@ -13,7 +13,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from rockcheck.scenes import Block, History, InputError, Scene, Shown, Side, errors, kinematics
+from rockcheck.scenes import (
+    Block,
+    Floats,
+    History,
+    InputError,
+    Scene,
+    Shown,
+    Side,
+    Wall,
+    errors,
+    kinematics,
+)
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
     Figure,
@@ -311,25 +322,37 @@ def wall_speeds(history: History, scene: Scene) -> Iterator[tuple[float, Side]]:
     t, times = columns[0], np.array([event.t for event in history.event_list])
     for event in history.event_list:
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
-        rows, rest = slice(max(row - 1, 0), row + 1), event.t - t[row]
         upright = kinematics.slip(scene.block, *columns[1:3, row]), 0.0
-        corners = [
-            (*corner, wall.side)
+        walls = [
+            wall
             for wall in scene.walls
             if abs(kinematics.clearance(scene.block, wall.side, wall.gap, *upright))
             < STRIKES.get(event.kind, 0.0)
-            for corner in kinematics.side_corners(
-                scene.block, wall.side, wall.gap, *columns[1:, rows]
-            )
         ]
-        if corners:
-            gaps, rates = (np.array(some) for some in zip(*(c[:2] for c in corners), strict=True))
-            places, speeds = gaps[:, -1] - rates[:, -1] * rest, rates[:, -1]
-            if len(t[rows]) == 2 and not np.any((times > t[rows][0]) & (times < event.t - 1e-9)):
-                speeds = speeds + (rates[:, 1] - rates[:, 0]) * rest / (t[row] - t[row - 1])
-            far = places > np.min(places) + scene.gravity * rest * rest
-            fastest = int(np.argmax(np.where(far, -np.inf, speeds)))
-            yield max(0.0, float(speeds[fastest])), corners[fastest][2]
+        first = max(row - 1, 0)
+        between = np.any((times > t[first]) & (times < event.t - 1e-9))
+        if walls:
+            yield _strike(scene, walls, columns[:, [row if between else first, row]], event.t)
+
+
+def _strike(scene: Scene, walls: Sequence[Wall], rows: Floats, at: float) -> tuple[float, Side]:
+    """Speed (m/s) of the corner that strikes one of the walls at a time, and the wall's side.
+
+    `rows` are t, x, theta and the rates of both in two rows from which speeds are carried on; or in
+    one, twice.
+    """
+    corners = [
+        (*corner, wall.side)
+        for wall in walls
+        for corner in kinematics.side_corners(scene.block, wall.side, wall.gap, *rows[1:])
+    ]
+    (_, gaps), (before, rates) = (np.array([c[k] for c in corners]).T for k in (0, 1))
+    rest, step = at - rows[0, 1], rows[0, 1] - rows[0, 0]
+    speeds = rates + (rates - before) * rest / (step or 1.0)
+    places = gaps - rates * rest
+    far = places > np.min(places) + scene.gravity * rest * rest
+    fastest = int(np.argmax(np.where(far, -np.inf, speeds)))
+    return max(0.0, float(speeds[fastest])), corners[fastest][2]
 
 
 def largest_reach(history: History, scene: Scene, side: Side) -> float:

@@ -228,9 +228,9 @@ def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(m
 @pytest.mark.parametrize(
     ("task", "model", "timed"),
     [
-        (Play("free", 0, "mujoco adaptive", 4e-3), "mujoco", True),
+        (Play("free", 0, "mujoco adaptive", 4e-3, where="timed"), "mujoco", True),
         (Play(TWO_WALLS[0], 0, "cm", 1e-6, 1), "cm", False),
-        (Measure("saving", "histories"), "cm", True),
+        (Measure("saving", "histories", where="timed"), "cm", True),
         (runs.Chunk("ebm-unilateral floor-first", 1, 0, 9), "ebm-unilateral", False),
         (runs.Chunk("pybullet", 1, 0, 9), "pybullet", False),
         (runs.Shrinking(runs.Broken("cm", "source", 1, 2, 0.3), 9), "cm", False),
@@ -240,7 +240,7 @@ def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(m
 def test_a_result_depends_on_the_code_of_its_model_and_a_time_on_the_machine(
     monkeypatch, task, model, timed
 ):
-    monkeypatch.setattr(provenance, "code_digest", lambda module: module)
+    monkeypatch.setattr(provenance, "code_digest", lambda module: [*provenance.reachable(module)])
     monkeypatch.setattr(provenance, "hardware", lambda: {"processor": "abacus"})
     said = json.dumps(task.depends(), default=str)
     assert (models.home(model) in said, "abacus" in said) == (True, timed)

@@ -164,18 +164,21 @@ class Trial(Task):
 
     player: Player
     id: str
-    #: The model's own code, and the files of histories.
-    besides = property(
-        lambda self: [
-            provenance.cell_key(scene, self.player.model, self.player.given, self.player.search)
-            for scene in PHENOMENA[self.id].scenes
-        ]
-    )
 
     @property
     def label(self) -> str:
         """Engine, settings, phenomenon."""
         return f"{self.player.engine}, {self.player.settings}: {self.id}"
+
+    def depends(self) -> Any:
+        """Also the model's own code, and the files of histories."""
+        who, scenes = self.player, PHENOMENA[self.id].scenes
+        return {
+            **super().depends(),
+            "cells": [
+                provenance.cell_key(scene, who.model, who.given, who.search) for scene in scenes
+            ],
+        }
 
     def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
@@ -682,7 +685,6 @@ class Tune(Task):
     friction: float = 0.3
     time_step: float = 1e-3
     penetration: float = math.inf
-    besides = property(lambda self: provenance.code_digest(models.home(self.engine)))
 
     def __post_init__(self) -> None:
         for name, (least, most) in WANTED.items():
@@ -692,6 +694,10 @@ class Tune(Task):
                     f"{printable(value)} is not allowed: give {least:g} to {most:g}",
                     "--tune" if name == "restitution" else f"--set {name}",
                 )
+
+    def depends(self) -> Any:
+        """Also the engine's code."""
+        return {**super().depends(), "home": provenance.code_digest(models.home(self.engine))}
 
     def play(self) -> Calibration:
         """Parameters in the engine's own words, and the contact reached with them.

@@ -22,7 +22,7 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import InputError, ModelFailure, Scene, files, printable
-from rockcheck.validation.execute import models, provenance
+from rockcheck.validation.execute import models
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -444,7 +444,6 @@ class Chunk(Task):
     seed: int
     first: int
     count: int
-    besides = property(lambda self: provenance.code_digest(models.home(self.model.split()[0])))
 
     @property
     def label(self) -> str:
@@ -484,9 +483,6 @@ class Shrinking(Task):
     broken: Broken
     trials: int
     label = "smallest scenes"
-    besides = property(
-        lambda self: provenance.code_digest(models.home(self.broken.model.split()[0]))
-    )
 
     def play(self) -> str:
         """The file of the smallest scene that was found."""

@@ -28,8 +28,8 @@ from rockcheck.scenes import (
     kinematics,
     printable,
 )
-from rockcheck.validation.execute import pool, provenance
-from rockcheck.validation.execute.models import build, home, not_installed
+from rockcheck.validation.execute import pool
+from rockcheck.validation.execute.models import build, not_installed
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, text
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -200,11 +200,10 @@ def stand_still(label: str, case: str, duration: float) -> Found:
         output_step=max(step, duration / 4000),
     )
     line = SETUPS[label]
-    try:  # the CM's own step makes an hour cheap
-        history = build(
-            line.family,
-            dict(line.settings) | ({} if line.family == "cm" else {line.knob: step}),
-        ).simulate(scene)
+    # the CM's own step makes an hour cheap
+    steps = {} if line.family == "cm" else {line.knob: step}
+    try:
+        history = build(line.family, dict(line.settings) | steps).simulate(scene)
     except (errors.ModelFailure, errors.InputError) as error:
         return Found(duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius
@@ -241,7 +240,6 @@ class Place(Task):
     at: str
     value: float
     quick: bool = False
-    besides = property(lambda self: provenance.code_digest(home(SETUPS[self.line].family)))
 
     def play(self) -> Found:
         """The largest stable step, from the finest up to the first that breaks; or movements."""

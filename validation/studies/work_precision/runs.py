@@ -21,7 +21,7 @@ from rockcheck.ebm import EventBasedModel, predictability_horizon, spectrum
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.discrepancy.compare import compare
-from rockcheck.validation.execute import models, provenance
+from rockcheck.validation.execute import models
 from rockcheck.validation.study import Task
 
 MEMBERS = 10
@@ -353,13 +353,6 @@ class Play(Task):
     line: str
     value: float
     repeats: int = REPEATS
-    #: The code of the model, and where its time counts the machine.
-    besides = property(
-        lambda self: (
-            provenance.code_digest(models.home(LINES[self.line].model)),
-            self.family in FAMILIES and provenance.hardware(),
-        )
-    )
 
     def record(self, **found: Any) -> BenchmarkRun:
         """The row of the run, with what was found."""
@@ -520,8 +513,9 @@ def league(found: pd.DataFrame) -> list[tuple[str, float, float, float, float]]:
     rows = []
     for (label,), mine in grouped(found[found.family == next(iter(KINDS))], "line"):
         if (good := mine[np.isfinite(mine.rms)]).size:
-            best = good.loc[good.rms.idxmin(), ["rms", "cpu"]].tolist()
-            rows.append((label, cost_at(mine)[0], error_at(mine, EQUAL_COST), *best))
+            best = good.loc[good.rms.idxmin()]
+            at_equal = error_at(mine, EQUAL_COST)
+            rows.append((label, cost_at(mine)[0], at_equal, float(best.rms), float(best.cpu)))
     return sorted(rows, key=lambda row: (math.isnan(row[1]), row[3 if math.isnan(row[1]) else 1]))
 
 

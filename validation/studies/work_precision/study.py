@@ -11,7 +11,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pandas as pd
 
-from rockcheck.validation.execute import models, pool, provenance
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -54,10 +54,6 @@ class Measure(Task):
     kind: Literal["batch", "size", "cold start", "saving"]
     name: str
     size: int = 0
-    #: The machine, and the code of the model that is imported by its name only.
-    besides = property(
-        lambda self: (provenance.code_digest(models.home("cm")), provenance.hardware())
-    )
 
     def play(self) -> Sequence[Any]:
         """The rows of the timing."""
