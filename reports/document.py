@@ -29,7 +29,7 @@ from rockcheck.reports.show.words import (
     window,
 )
 from rockcheck.scenes import InputError, errors, printable, reading, writing
-from rockcheck.validation.execute.pool import Call, Pool
+from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
 
 #: The folder of a page's figures.
@@ -176,8 +176,8 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
     data = known[errors.one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:
-        (ended,) = pool.run([Call(_draw_again, (data, path), DRAWING)])
-    if ended.error is not None:
+        (ended,) = pool.run([Call(guarded, (_draw_again, data, path), DRAWING)])
+    if isinstance(ended.outcome, Failure):
         raise InputError(f"{printable(data)}: no data of a figure: {ended.outcome.reason}")
     return path
 

@@ -36,7 +36,7 @@ SCENES = [
     pulse_scene(1.0, 1.1, 0.3, ("left", 0.003, 0.0), name="leaning on the wall", duration=5.6),
     pulse_scene(4.5, 4.0, 0.3, ("left", 0.053, 0.5), name="left wall, half restitution"),
     pulse_scene(3.0, 2.5, 0.3, ("right", 0.103, 1.0), name="elastic right wall, overturning"),
-    pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), name="grazing the wall", duration=6.0),
+    pulse_scene(3.0, 6.0, 0.3, ("right", 0.003, 1.0), name="grazing the wall", duration=3.0),
     load_scene("fig4a").replace(name="recorded", duration=5.0),
 ]
 MODES = {

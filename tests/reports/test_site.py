@@ -7,7 +7,6 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from rockcheck.commands import OUT, studies
@@ -18,7 +17,7 @@ from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
-from rockcheck.scenes import History
+from rockcheck.scenes import History, reading
 from rockcheck.validation.suite import tables
 
 
@@ -303,7 +302,7 @@ def test_an_ensemble_is_shown_by_its_distributions(site, run):
     page = text_of((site / PAGES / "crowd.html").read_text("utf-8"))
     drawn = ("uniform 0.3 to 0.8", "lognormal, median 6, σ 0.4", "p = ", duration(7.25))
     assert [said for said in (*drawn, number(row["peak_scatter"])) if said not in page] == []
-    rows = pd.read_csv(site / PAGES / "data" / "crowd.csv")
+    rows = reading.read_table(site / PAGES / "data" / "crowd.csv")
     columns = ("peak_rotation_alpha", "outcome")
     assert list(rows) == ["scene", *(f"{what} {m}" for m in record.peaks for what in columns)]
     np.testing.assert_array_equal(
