@@ -242,7 +242,7 @@ def _step(history: History) -> float:
 
 # How far a block moves.
 
-#: A slip below this share of the block's half height is rounding.
+#: A slip or reach below this share of the block's half height is rounding.
 ROUNDING = 1e-14
 #: Events at which a wall is struck that is nearer than this to the upright block, m.
 STRIKES = {"wall impact": math.inf, "floor impact": 1e-9}
@@ -356,17 +356,13 @@ def _strike(scene: Scene, walls: Sequence[Wall], rows: Floats, at: float) -> tup
 
 
 def largest_reach(history: History, scene: Scene, side: Side) -> float:
-    """Farthest reach (m) of the block beyond its first place on `side`.
+    """Farthest reach (m) of the block beyond its first place on `side`; 0 if it is rounding.
 
     A wall at a smaller clear gap there would be struck.
     """
-    return float(
-        np.max(
-            -kinematics.clearance(
-                scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
-            )
-        )
-    )
+    x, theta = history.channels["x"], history.channels["theta"]
+    reach = float(np.max(-kinematics.clearance(scene.block, side, 0.0, x, theta)))
+    return reach if reach > ROUNDING * scene.block.half_height else 0.0
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:
