@@ -494,7 +494,8 @@ def _shares(
         )
         ends = [len(chosen[0][: halves[0]])]
         mine, fine = np.split(outcomes, ends), np.split(~failed, ends)
-        sides.setdefault(one.model, mine)
+        # Nothing is equal to what a reference could not finish.
+        sides.setdefault(one.model, np.split(np.where(failed, np.nan, outcomes), ends))
         for part in (0, 1):
             yield {
                 "spectrum": panel.name,
