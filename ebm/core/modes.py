@@ -103,6 +103,8 @@ def wrong_by(block, base, run, measured):
     order = mode_series(block, base, run, look, 0.0, 0.0)
     guards.fill_guards(block, run.state, run.a)
     smooth = ground.smooth_until(base, t) - t
+    if _stands(block, state, order - 2, guards.seen(Kind.FORCE, smooth), a):
+        return np.inf
     worst = 0.0
     for which in range(len(guards.KIND)):
         if a[Row.THERE, which] != 0.0:
@@ -111,6 +113,21 @@ def wrong_by(block, base, run, measured):
             if worst == np.inf:
                 break
     return worst
+
+
+@inner_kernel
+def _stands(block, state, degree, ahead, a):
+    """Whether static friction holds the flat block at rest that is to slide.
+
+    With less friction it would slide: the kinetic one tells nothing of a block that rests.
+    """
+    mode = state.mode
+    slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
+    if not slides or state.motion.vx != 0.0 or block.mu_s == block.mu_k:
+        return False
+    for k in range(degree + 1):
+        a[Row.GUARD, k] = block.mu_s * a[Row.G, k] + mode.slip * a[Row.U, k]
+    return series.leading(a, Row.GUARD, degree, series.NOISE[Kind.FORCE], ahead) > 0
 
 
 @inner_kernel

@@ -463,7 +463,7 @@ def _runs(totals: Sequence[RunTotals]) -> Iterator[Table]:
         [_worst(name, totals) for name in INVARIANTS],
         "Invariants: worst figures",
         "Two histories of one scene are compared up to its horizon: where a relative disturbance of"
-        " its data by 1e-8 turns the block by 1e-6 rad. Energy is integrated in every tenth run.",
+        " its data by 1e-8 turns the block by 1e-6 rad. Energy is integrated in every ninth run.",
     )
     failures = [failure for one in totals for failure in one.failures]
     yield Table(
