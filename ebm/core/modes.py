@@ -20,6 +20,7 @@ from collections import namedtuple
 import numpy as np
 
 from rockcheck.ebm.core import contacts, ground, guards, series
+from rockcheck.ebm.core.block import LEAST_FRICTION
 from rockcheck.ebm.core.motion import mode_series
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row, Rule
 from rockcheck.ebm.core.state import MODE, code_of, on_wall, rests
@@ -123,7 +124,7 @@ def _stands(block, state, degree, ahead, a):
     """
     mode = state.mode
     slides = mode.family == Family.FLAT and mode.pivot == Pivot.SLIPPING
-    if not slides or state.motion.vx != 0.0 or block.mu_s == block.mu_k:
+    if not slides or state.motion.vx != 0.0 or block.mu_s <= max(block.mu_k, LEAST_FRICTION):
         return False
     for k in range(degree + 1):
         a[Row.GUARD, k] = block.mu_s * a[Row.G, k] + mode.slip * a[Row.U, k]
