@@ -220,11 +220,16 @@ def test_draws_are_the_same_in_any_number_of_processes_and_are_read_back(assess)
     assert there["gaps"] == first["gaps"]
 
 
-def test_one_run_says_how_sure_it_is(assess):
-    said = assess("uncertain.toml --samples 16")
+@pytest.mark.parametrize("model", ["ebm-unilateral", "ebm"])
+def test_one_run_says_how_sure_it_is(assess, model):
+    said = assess(f"uncertain.toml --samples 16 --models {model}")
     assert (said["exit_code"], said["runs"], said["converged"]) == (0, 1, True)
     inputs = said["inputs"]
-    assert (inputs["samples"], inputs["sensitivities"][0]["name"]) == (16, "floor.friction")
+    assert (inputs["samples"], inputs["model"], inputs["sensitivities"][0]["name"]) == (
+        16,
+        model,
+        "floor.friction",
+    )
     assert {q["name"] for q in said["quantities"]} >= {"peak_rotation", "last_slip", "outcome"}
     assert said["numerical"]["quantities"] == said["quantities"]
     assert said["motion"]["top_displacement"]["of"] == 1

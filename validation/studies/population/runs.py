@@ -547,8 +547,9 @@ class Run(OneScene):
         base, rows = base_of(self.scene), ""
         if history is not None:
             every = -(-len(history.channels["t"]) // MOST_ROWS)
-            columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
-            rows = writing.columns_text(columns)
+            rows = writing.columns_text(
+                {n: v[::every].tolist() for n, v in history.channels.items()}
+            )
         return Played(
             runs=runs,
             history=rows,
@@ -591,13 +592,20 @@ class Certainty(OneScene):
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
-        landing = impact_laws.parting_landing(self.scene)
+        landing, own = impact_laws.parting_landing(self.scene), dict(self.settings)
+        model = models.build(self.model, own)
         return Sure(
-            numerical=numerical_uncertainty(
-                models.build(self.model, dict(self.settings)), self.scene
-            ),
+            numerical=numerical_uncertainty(model, self.scene),
             depends_on_law_from_s=None if landing is None else landing.t,
-            inputs=population.propagate(self.given, samples=self.samples) if self.given else None,
+            inputs=population.propagate(
+                self.given,
+                model=model.model_copy(update={"tolerance": own.get("tolerance", 1e-8)})
+                if isinstance(model, EventBasedModel) and model.decides
+                else None,
+                samples=self.samples,
+            )
+            if self.given
+            else None,
         )
 
 
