@@ -149,7 +149,7 @@ def test_tables_of_three_records():
         ],
         "models": [
             ["cm", 2, 0, 0.0791, 0.1, 1.0124, 0.1363],
-            ["floor-first law of impacts", 1, 0, 0.2, 0.2, None, None],
+            ["another law of impacts", 1, 0, 0.2, 0.2, None, None],
         ],
         "runs": [
             [Mark("a", link="histories/a.csv"), "at rest", 0.2, 0.01, 0.3, 0.4],

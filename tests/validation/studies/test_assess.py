@@ -248,9 +248,15 @@ def test_a_gap_on_a_side_without_a_wall_tries_one_there_and_leaves_the_scene_as_
 @pytest.mark.parametrize("later", [(), (0.1,)])
 def test_a_gap_that_was_not_played_is_not_called_safe(folder, later):
     """As where Ctrl-C ended the runs, or all of them failed, also where a wider one was; nor is
-    such a run called unsure."""
+    such a run called unsure. The other law of impacts is another one."""
     own = files.load_uncertain_scene(folder / "cabinet.toml")
-    study = Assessment(own=own, cases={"cabinet": own}, gaps=(0.05, 0.1), sides=("right",))
+    study = Assessment(
+        own=own,
+        cases={"cabinet": own},
+        gaps=(0.05, 0.1),
+        sides=("right",),
+        settings={"ebm-unilateral": {"impacts": "floor-first"}},
+    )
     found = study.gather(
         {
             task: task.play()
@@ -263,7 +269,10 @@ def test_a_gap_that_was_not_played_is_not_called_safe(folder, later):
         found.data["none_overturns_up_to"],
         found.exit_code,
     ) == ([(gap, 0) for gap in later], None, 0)
-    assert "overturn" not in found.answer.partition(".")[2]
+    assert (
+        "overturn" in found.answer.partition(".")[2],
+        dict(study.parts["impact law"]["cabinet"][0].settings),
+    ) == (False, {"impacts": "moreau"})
 
 
 def test_the_history_of_each_run_and_its_tables_are_written(assess, tmp_path, loop):

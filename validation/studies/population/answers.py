@@ -730,7 +730,7 @@ def _models(found: Found) -> Iterator[Block]:
     }
     rows = [
         [
-            "floor-first law of impacts" if model == LAW else model,
+            CONTRIBUTIONS[LAW][-1] if model == LAW else model,
             len(apart),
             sum(run.fell for run in found.others[model].values()),
             float(np.sqrt(np.mean(np.square(apart)))) if apart else None,

@@ -468,8 +468,8 @@ Numbers = tuple[tuple[str, float], ...]
 MOST_ROWS = 2000
 #: Runs of one task, at the most.
 MOST_RUNS = 256
-#: Name of the runs by the other law of impacts, among the models; and the law that is compared.
-LAW, OTHER_LAW = "impact law", {"impacts": "floor-first"}
+#: Name of the runs by the other law of impacts, among the models.
+LAW = "impact law"
 
 
 class Ran(figures.Stored):
@@ -547,9 +547,8 @@ class Run(OneScene):
         base, rows = base_of(self.scene), ""
         if history is not None:
             every = -(-len(history.channels["t"]) // MOST_ROWS)
-            rows = writing.columns_text(
-                {n: v[::every].tolist() for n, v in history.channels.items()}
-            )
+            columns: dict[str, Any] = {n: v[::every] for n, v in history.channels.items()}
+            rows = writing.columns_text(columns)
         return Played(
             runs=runs,
             history=rows,
@@ -732,12 +731,23 @@ class Asked(Study):
         "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
         among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
         """
+        settings = self.settings.get(self.model, {})
         law = (
-            {LAW: self._runs("other law of impacts", SWIFT, settings=OTHER_LAW)}
+            {
+                LAW: self._runs(
+                    "other law of impacts",
+                    SWIFT,
+                    settings={
+                        **settings,
+                        "impacts": "moreau"
+                        if settings.get("impacts") == "floor-first"
+                        else "floor-first",
+                    },
+                )
+            }
             if self.model == SWIFT and self.own.scene.walls
             else {}
         )
-        settings = self.settings.get(self.model, {})
         drawn = bool(self.samples) and not self.recorded
         return {
             "shown": self._runs("", self.model),
