@@ -290,6 +290,7 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
         assert {first, *(one.outcome for one in ended)} == set(range(20))
 
 
+@pytest.mark.needs("pybullet")
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
