@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel, Spectrum, horizon
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, SETTLE, node_pulse, vary
+from rockcheck.ebm.spectrum import CALM, LEFT, RIGHT, SAFE, node_pulse, vary
 from rockcheck.engines.engine import Engine
 from rockcheck.scenes import Ricker, Sine, reading, writing
 from rockcheck.validation.execute import models, pool, provenance
@@ -463,7 +463,7 @@ def agree(
         " others further away. Models are held against the paper's bilateral event-based model and"
         " against the unilateral one, which lets the block hop as the other models do. Runs of the"
         " other models end with the pulse where the block then lacks the energy to tip over,"
-        f" otherwise at least {SETTLE:g} s later. A block that then stands counts as safe."
+        f" otherwise at least {CALM:g} s later. A block that then stands counts as safe."
         + (f" Played at fewer of the nodes: {', '.join(fewer)}." if fewer else ""),
         "date": datetime.now(UTC).date().isoformat(),
         "versions": provenance.versions(),
