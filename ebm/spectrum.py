@@ -25,8 +25,8 @@ TOLERANCE = 4e-8
 #: they may leave, and how far (in nodes) around a boundary nothing is inferred: hairs thinner than
 #: the nodes' distance break into dots, which are found so.
 COARSEST, FEWEST_CELLS, FOLLOWED = 8, 12, 3
-#: A node's scene goes on in calm, after the motion of the base, for at least this time, s, and so many
-#: 1/p.
+#: A node's scene goes on in calm, after the motion of the base: for at least this time, s, and so
+#: many 1/p.
 CALM, FALLS = 6.0, 12.8
 #: The outcome codes of a spectrum.
 LEFT, SAFE, RIGHT = -1, 0, 1
