@@ -140,11 +140,10 @@ def assess(
         ],
     )
     need_installed(chosen, "--models")
-    clear, sides = (
-        ((), tuple(wall.side for wall in given.scene.walls))
-        if tried.gaps is None
-        else runs.gaps_of(tried.gaps, given.scene)
-    )
+    clear: tuple[float, ...] = ()
+    sides = tuple(wall.side for wall in given.scene.walls)
+    if tried.gaps is not None:
+        clear, sides = runs.gaps_of(tried.gaps, given.scene)
     cases, left_out = motions.under_records(
         {given.scene.name: given}, record_sets(records or (), read or ()), Path()
     )
@@ -177,12 +176,12 @@ def check_tried(
     `drawn` is the scene to be drawn.
     """
     scene = given.scene
-    begins = scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity
+    begins = (scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity)
+    rests = scene.excitation.kind == scene.vertical.kind == "rest"
     besides = " besides the excitation that the records replace" if given.spreads else ""
     errors.refuse(
         (
-            scene.excitation.kind == scene.vertical.kind == "rest"
-            and not (recorded or any((*begins, scene.initial_height))),
+            rests and not (recorded or any(begins) or scene.initial_height),
             "are needed: the base of the scene is at rest",
             "records",
         ),

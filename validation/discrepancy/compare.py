@@ -292,11 +292,8 @@ def motion_of(history: History, scene: Scene | None = None) -> dict[str, float |
 
 def motion_words(motion: Mapping[str, float | None]) -> list[str]:
     """The known figures of how far a block moves, with their units."""
-    return [
-        f"{q.label} {value:.4g} {q.unit}"
-        for q in QUANTITIES
-        if (value := motion[q.name]) is not None
-    ]
+    values = ((q, motion[q.name]) for q in QUANTITIES)
+    return [f"{q.label} {value:.4g} {q.unit}" for q, value in values if value is not None]
 
 
 def largest_slip(history: History) -> float:
@@ -314,11 +311,10 @@ def wall_speeds(history: History, scene: Scene) -> Iterator[tuple[float, Side]]:
     between; of an event at the start in that row. It is the fastest of the corners that are nearest
     to a wall at the event, as far as that row tells.
     """
-    if not scene.walls or not {"x", "x_dot", "theta_dot"} <= history.channels.keys():
+    names = ("t", "x", "theta", "x_dot", "theta_dot")
+    if not scene.walls or any(name not in history.channels for name in names):
         return
-    columns = np.array(
-        [history.channels[name] for name in ("t", "x", "theta", "x_dot", "theta_dot")], dtype=float
-    )
+    columns = np.array([history.channels[name] for name in names], dtype=float)
     t, times = columns[0], np.array([event.t for event in history.event_list])
     for event in history.event_list:
         row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
