@@ -34,6 +34,7 @@ from rockcheck.ebm import EventBasedModel, batch
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
     Block,
+    Excitation,
     Floats,
     History,
     InputError,
@@ -776,13 +777,22 @@ def _differences(a: History, b: History) -> Floats:
 
 
 def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
-    """The scene with all its data changed at random, by up to a relative `DISTURBANCE`."""
+    """The scene with all its data changed at random, by up to a relative `DISTURBANCE`.
+
+    Each sample of a record is changed by itself: else nothing would add energy to a block that
+    bounces without loss.
+    """
     r = np.random.default_rng([seed, 2])
 
     def by(value: float) -> float:
         return value * (
             1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0))
         )
+
+    def shaken(base: Excitation) -> Excitation:
+        if isinstance(base, Record):
+            return base.replace(unscaled=tuple(map(by, base.unscaled)))
+        return base if base.kind == "rest" else base.scaled(by(1.0))
 
     block, floor = scene.block, scene.floor
     for _ in range(DISTURBED):
@@ -803,13 +813,8 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
                     wall.replace(gap=by(wall.gap), restitution=min(by(wall.restitution), 1.0))
                     for wall in scene.walls
                 ),
-                **{
-                    name: base if base.kind == "rest" else base.scaled(by(1.0))
-                    for name, base in (
-                        ("excitation", scene.excitation),
-                        ("vertical", scene.vertical),
-                    )
-                },
+                "excitation": shaken(scene.excitation),
+                "vertical": shaken(scene.vertical),
                 **{
                     name: by(getattr(scene, name))
                     for name in ("initial_angular_velocity", "initial_velocity", "initial_height")
