@@ -780,13 +780,13 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
     """The scene with all its data changed at random, by up to a relative `DISTURBANCE`.
 
     Each sample of a record is changed by itself: else nothing would add energy to a block that
-    bounces without loss.
+    bounces without loss. Every other scene is changed to the other side: a scene at a limit is to
+    be seen on both.
     """
-    r = np.random.default_rng([seed, 2])
 
     def by(value: float) -> float:
         return value * (
-            1.0 + DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0))
+            1.0 + side * DISTURBANCE * float(r.choice([-1.0, 1.0])) * float(r.uniform(0.5, 1.0))
         )
 
     def shaken(base: Excitation) -> Excitation:
@@ -795,7 +795,8 @@ def _disturbed(scene: Scene, seed: int) -> Iterable[Scene]:
         return base if base.kind == "rest" else base.scaled(by(1.0))
 
     block, floor = scene.block, scene.floor
-    for _ in range(DISTURBED):
+    for number in range(DISTURBED):
+        r, side = np.random.default_rng([seed, 2, number // 2]), (-1.0) ** number
         kinetic = by(floor.friction)
         static = None if floor.static_friction is None else max(by(floor.static_friction), kinetic)
         bounce = min(by(floor.restitution), 1.0)
