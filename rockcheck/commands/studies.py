@@ -6,10 +6,10 @@ models.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, NoReturn, get_args
+from typing import Annotated, Any, NoReturn, get_args
 
 import numpy as np
 import typer
@@ -153,15 +153,14 @@ def assess(
     assessment = answers.Assessment(
         own=given,
         cases=named if records else cases,
-        models=tuple(chosen),
-        settings=chosen,
+        models=chosen,
         gaps=clear,
         sides=sides,
         samples=1 << max(1, (draws - 1).bit_length()) if draws else 0,
         recorded=bool(records),
         levels=None
         if tried.levels is None
-        else population_of(tried, given.scene, named if records else {}),
+        else population_of(tried, given.scene, named if records else {}, chosen),
         left_out=left_out,
     )
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
@@ -200,12 +199,16 @@ def check_tried(
 
 
 def population_of(
-    tried: Tried, scene: Scene, cases: dict[str, files.UncertainScene]
+    tried: Tried,
+    scene: Scene,
+    cases: dict[str, files.UncertainScene],
+    chosen: Mapping[str, Mapping[str, Any]],
 ) -> runs.Population:
     """What --levels asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
 
     An incremental dynamic analysis of the `cases` under records; without any, the fragility under
-    pulses of the scene's kind.
+    pulses of the scene's kind. The first of the `chosen` models plays, if runs of it end once they
+    are decided.
     """
     text = tried.levels or ""
     *measures, low, high, count = ["", "", "", *text.split(":")]
@@ -224,12 +227,15 @@ def population_of(
         )
     measure = ":".join(filter(None, measures))
     values = np.linspace(first, last, int(number))
+    decides = getattr(models.build(next(iter(chosen)), {}), "decides", False)
+    model = next(iter(chosen)) if decides else runs.SWIFT
+    settings = chosen.get(model, {})
     if not cases:
         if measure not in ("", "pga-ratio"):
             raise errors.InputError(
                 f"{measure} needs records; of pulses it is pga-ratio", "--levels"
             )
-        return runs.fragility(scene, values, PULSES)
+        return runs.fragility(scene, values, PULSES, model=model, settings=settings)
     return runs.ida(
         scene,
         [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],
@@ -241,6 +247,8 @@ def population_of(
             for name, one in cases.items()
             if one.scene.vertical != scene.vertical
         },
+        model=model,
+        settings=settings,
     )
 
 

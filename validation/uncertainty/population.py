@@ -29,29 +29,17 @@ if TYPE_CHECKING:
 NO_FIT = math.nan, math.nan
 
 
-class Runs(Stored):
-    """Runs of scenes by one model, one value a run.
+def play(scenes: Sequence[Scene], model: EventBasedModel) -> tuple[float, ...]:
+    """The peak rotation of each scene, alpha, played until it is certain, whatever its duration.
 
-    `side` is -1 overturned left, +1 right, 0 neither; of a run that failed it means nothing.
-    `peaks` are rotations, alpha: infinite of a block that overturned, NaN where the run failed.
-    """
-
-    side: tuple[int, ...]
-    peaks: tuple[float, ...]
-
-
-def play(scenes: Sequence[Scene], model: EventBasedModel) -> Runs:
-    """Play scenes until outcome and peak are certain, whatever their durations.
-
-    A run that fails is made once more at a hundredth of the tolerance. Raises `InputError` where
-    the model cannot play one of them.
+    Infinite of a block that overturned, NaN where the run failed, also once more at a hundredth of
+    the tolerance. Raises `InputError` where the model cannot play one of them.
     """
     from rockcheck.ebm.batch import pack, run_decided
 
     found = run_decided(pack(scenes, model), model, jobs=1)
     rotations = found.peak / np.array([scene.block.alpha for scene in scenes])
-    peaks = np.where(found.failed, np.nan, np.where(found.side, np.inf, rotations))
-    return Runs(side=found.side.tolist(), peaks=peaks.tolist())
+    return tuple(np.where(found.failed, np.nan, np.where(found.side, np.inf, rotations)).tolist())
 
 
 @dataclass(frozen=True)

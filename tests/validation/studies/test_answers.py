@@ -52,7 +52,7 @@ def found_of(cases, own, samples=0, **more):
     given = files.UncertainScene(
         scene, {"floor.friction": files.Spread(value=0.4, sd=0.04)}, np.eye(1)
     )
-    asked = {"models": ("ebm-unilateral", "cm"), "gaps": (0.0, 0.1), "sides": ("right",)}
+    asked = {"models": {"ebm-unilateral": {}, "cm": {}}, "gaps": (0.0, 0.1), "sides": ("right",)}
     return finding_of(
         Found(
             study=Assessment(

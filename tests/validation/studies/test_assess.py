@@ -255,7 +255,7 @@ def test_a_gap_that_was_not_played_is_not_called_safe(folder, later):
         cases={"cabinet": own},
         gaps=(0.05, 0.1),
         sides=("right",),
-        settings={"ebm-unilateral": {"impacts": "floor-first"}},
+        models={"ebm-unilateral": {"impacts": "floor-first"}},
     )
     found = study.gather(
         {

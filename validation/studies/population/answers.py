@@ -725,7 +725,7 @@ def _by_hand(found: Found) -> Answer:
 def _models(found: Found) -> Iterator[Block]:
     """How far the other models are from the first, and what the suites know of them."""
     trusted = {
-        model: experience.trust_of(model, found.study.settings.get(model, {})).get("peak_rotation")
+        model: experience.trust_of(model, found.study.models.get(model, {})).get("peak_rotation")
         for model in found.apart
     }
     rows = [
@@ -838,12 +838,12 @@ def _runs(found: Found) -> Iterator[Block]:
     without = ", ".join(case for case in study.cases if drawn and case not in drawn)
 
     names = ", ".join(next(iter(study.cases.values())).names)
+    scaled = study.levels.model if study.levels else study.model
     told = {
         f"left out, since not all of its draws were played: {without}": without,
         f"gaps and draws are played by {study.swift}": study.model != study.swift
         and (found.at_gaps or drawn),
-        f"intensities are played by {study.scales[0]}": study.model != study.scales[0]
-        and study.levels,
+        f"intensities are played by {scaled}": study.model != scaled,
         f"uncertain in the scene, and not drawn: {names}; --samples 64 draws them": names
         and not drawn
         and study.recorded,
@@ -892,12 +892,12 @@ class Assessment(Asked):
                 at_gaps={gap: some for gap, some in at_gaps.items() if some},
                 others={
                     model: {case: one.runs[0] for case, one in first[model].items()}
-                    for model in (*self.models[1:], LAW)
+                    for model in (*self.models, LAW)
                     if first.get(model)
                 },
                 sure=first["sure"],
                 own=first["sure"].get("", Sure()),
-                levels=self.levels.gather(ended, *self.scales) if self.levels else ("", ()),
+                levels=self.levels.gather(ended) if self.levels else ("", ()),
                 failed=len(ended) < len(done),
             )
         )

@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 import numpy as np
 from pydantic import Field
@@ -32,7 +32,7 @@ from rockcheck.scenes import (
 )
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy import compare, figures, impact_laws
-from rockcheck.validation.execute import models, provenance
+from rockcheck.validation.execute import models
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -82,20 +82,17 @@ class OneScene(Task):
         """Which runs."""
         return ", ".join(filter(None, self.of))
 
-    def depends(self) -> Any:
-        """The scene with its motion, the model, what else is asked for, and the code."""
-        return (
-            provenance.cell_key(self.scene, self.model, dict(self.settings)),
-            [v for k, v in self.fields().items() if k not in OneScene.__dataclass_fields__],
-            provenance.code_digest(type(self).__module__),
-        )
 
+def effort(model: str, settings: Mapping[str, Any], runs: int, every: int) -> dict[str, Any]:
+    """For a `Task`: the usual time of these runs, s, and the code that they may have to compile.
 
-def effort(model: str, settings: Mapping[str, Any], runs: int) -> dict[str, Any]:
-    """For a `Task`: the usual time of these runs, s, and the code that they may have to compile."""
+    It is played in this process where `every` run takes less time than a worker needs to start.
+    """
+    a_run = A_RUN if models.family(model).compiled else A_SLOW_RUN
     return {
-        "expected": runs * (A_RUN if models.family(model).compiled else A_SLOW_RUN),
+        "expected": runs * a_run,
         "compiles": models.compiles(model, settings),
+        "where": "here" if every * a_run < SOON else "worker",
     }
 
 
@@ -109,8 +106,8 @@ class Batch(OneScene):
     factors: tuple[float, ...] = field(default=(), repr=False)
     both: bool = False
 
-    def play(self) -> population.Runs:
-        """The runs."""
+    def play(self) -> tuple[float, ...]:
+        """The peak of each run."""
         player: Any = models.build(self.model, dict(self.settings))
         across, upward = self.scene.excitation, self.scene.vertical
         return population.play(
@@ -132,7 +129,8 @@ class Population:
     `cases` are the scenes by name; "" is one whose motions each have a line. A motion has a name
     and its own intensity; `upward` has the vertical ones that are scaled with it, by its name.
     `limits` are the events that have a curve: peaks (alpha) by name. `across` is the intensity,
-    `other` its axis in another unit; `data` is what `--json` says besides.
+    `other` its axis in another unit; `data` is what `--json` says besides. `model` plays, with
+    these `settings`.
     """
 
     cases: Mapping[str, Scene]
@@ -140,45 +138,39 @@ class Population:
     levels: population.Floats
     across: Column
     limits: Mapping[str, float]
+    model: str
     settings: Mapping[str, Any]
     data: Mapping[str, Any]
     other: dict[str, Any] | None = None
     upward: Mapping[str, Excitation] = field(default_factory=dict)
 
-    def batches(self, model: str = SWIFT, settings: Mapping[str, Any] = {}) -> list[Batch]:
-        """One a case and motion, by a model with these settings and, unless they differ, its own.
-
-        Raises `InputError` where the model cannot play a scene.
-        """
-        settings = {**self.settings, **settings}
-        player: Any = models.build(model, settings)
+    @cached_property
+    def batches(self) -> list[Batch]:
+        """One a case and motion. Raises `InputError` where the model cannot play a scene."""
+        player: Any = models.build(self.model, self.settings)
         for scene in self.cases.values():
             player.check(scene)
-        how = effort(model, settings, 2 * len(self.levels))
-        soon = how["expected"] * len(self.motions) * len(self.cases) < SOON
+        count, tasks = 2 * len(self.levels), len(self.motions) * len(self.cases)
+        how = effort(self.model, self.settings, count, count * tasks)
         return [
             Batch(
                 (case, name),
                 scene.replace(excitation=motion, vertical=self.upward.get(name, scene.vertical)),
-                model,
-                tuple(settings.items()),
+                self.model,
+                tuple(self.settings.items()),
                 (*(self.levels / own).tolist(), *(-self.levels / own).tolist()),
                 name in self.upward,
-                where="here" if soon else "worker",
                 **how,
             )
             for case, scene in self.cases.items()
             for name, motion, own in self.motions
         ]
 
-    def gather(self, done: Mapping[Any, Any], *by: Any) -> tuple[str, list[Block]]:
-        """The answer, and the blocks: a curve a case and event; the lines of all motions.
-
-        `by`: the model of the batches, and its settings.
-        """
-        played = [one for one in self.batches(*by) if isinstance(done.get(one), population.Runs)]
+    def gather(self, ended: Mapping[Any, Any]) -> tuple[str, list[Block]]:
+        """The answer, and the blocks: a curve a case and event; the lines of all motions."""
+        played = [one for one in self.batches if one in ended]
         peaks = {
-            case: np.array([done[one].peaks for one in played if one.of[0] == case]).reshape(
+            case: np.array([ended[one] for one in played if one.of[0] == case]).reshape(
                 -1, 2, len(self.levels)
             )
             for case in dict.fromkeys(batch.of[0] for batch in played)
@@ -387,6 +379,8 @@ def ida(
     measure: str = "pga",
     capacities: Sequence[float] = CAPACITIES,
     upward: Mapping[str, Excitation] | None = None,
+    model: str = SWIFT,
+    settings: Mapping[str, Any] = {},
 ) -> Population:
     """Peak rotation of the scene's block under each record, scaled to each intensity.
 
@@ -419,7 +413,8 @@ def ida(
             for limit in capacities
         },
         upward=upward or {},
-        settings={"tolerance": 1e-8},
+        model=model,
+        settings={"tolerance": 1e-8, **settings},
         data={
             "measure": measure,
             "label": label,
@@ -431,7 +426,12 @@ def ida(
 
 
 def fragility(
-    scene: Scene, levels: population.Floats, frequencies: tuple[float, float]
+    scene: Scene,
+    levels: population.Floats,
+    frequencies: tuple[float, float],
+    *,
+    model: str = SWIFT,
+    settings: Mapping[str, Any] = {},
 ) -> Population:
     """The probability of overturning over the intensity, with the wall and without.
 
@@ -457,7 +457,8 @@ def fragility(
         levels=levels,
         across=Column("intensity", "peak acceleration / (g tan α)"),
         limits={"": MOST},
-        settings={},
+        model=model,
+        settings=settings,
         data={"pga_g": in_g},
         other={"per_unit": in_g, "other_unit": "g", "other_label": "peak acceleration, g"},
     )
@@ -613,41 +614,33 @@ class Asked(Study):
     """What an assessment is asked for, and its tasks.
 
     `cases` are the scene under each of its motions, by their names. `own` is the
-    scene with its own excitation. The first of `models` plays each case; the others are compared
-    with it; `settings` are theirs, by model. `gaps` (m) are those of the walls on `sides`.
+    scene with its own excitation. The first of `models`, with their settings, plays each case; the
+    others are compared with it. `gaps` (m) are those of the walls on `sides`.
     `samples` numbers are drawn for each case and gap, or, without records, for the single run.
     `levels` is the population over intensities.
     """
 
     own: files.UncertainScene
     cases: Mapping[str, files.UncertainScene]
-    models: Sequence[str] = (SWIFT,)
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    models: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {SWIFT: {}})
     gaps: Sequence[float] = ()
     sides: Sequence[Side] = ()
     samples: int = 0
     recorded: bool = False
     levels: Population | None = None
     left_out: Sequence[str] = ()
-    record = population.Runs | Played | Sure
+    record = tuple[float, ...] | Played | Sure
     name = "assess"
 
     @property
     def model(self) -> str:
         """The model that plays each case."""
-        return self.models[0]
+        return next(iter(self.models))
 
     @property
     def swift(self) -> str:
         """The event-based model that plays draws and gaps."""
         return self.model if isinstance(models.build(self.model, {}), EventBasedModel) else SWIFT
-
-    @property
-    def scales(self) -> tuple[str, Mapping[str, Any]]:
-        """The event-based model that plays `levels`, and its settings."""
-        decides = getattr(models.build(self.model, {}), "decides", False)
-        model = self.model if decides else SWIFT
-        return model, self.settings.get(model, {})
 
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
@@ -677,7 +670,7 @@ class Asked(Study):
 
         `besides` are walls that the scene does not have.
         """
-        given = self.settings.get(model, {}) if settings is None else settings
+        given = self.models.get(model, {}) if settings is None else settings
         return {
             case: [
                 Run(
@@ -687,8 +680,7 @@ class Asked(Study):
                     tuple(given.items()),
                     part,
                     shown=not what and model == self.model,
-                    where=self._where,
-                    **effort(model, given, len(part)),
+                    **effort(model, given, len(part), self._every),
                 )
                 for part in [
                     tuple(variants[first : first + MOST_RUNS])
@@ -699,14 +691,9 @@ class Asked(Study):
         }
 
     @cached_property
-    def _where(self) -> Literal["worker", "here"]:
-        """In this process where all of it takes less than a worker needs to start."""
-        runs = len(self.cases) * (6 + len(self.draws)) * (1 + len(self.gaps))
-        return (
-            "here"
-            if all(models.family(model).compiled for model in self.models) and runs * A_RUN < SOON
-            else "worker"
-        )
+    def _every(self) -> int:
+        """About how many runs there are, but for those of `levels`."""
+        return len(self.cases) * (6 + len(self.draws)) * (1 + len(self.gaps))
 
     @cached_property
     def at_gaps(self) -> dict[float, dict[str, list[Task]]]:
@@ -731,7 +718,7 @@ class Asked(Study):
         "shown" each case as it is; "drawn" its draws; `gaps`; the names of other models, `LAW`
         among them; "sure" how sure each is, and, by the name "", the scene under its own motion.
         """
-        settings = self.settings.get(self.model, {})
+        settings = self.models[self.model]
         law = (
             {
                 LAW: self._runs(
@@ -753,7 +740,7 @@ class Asked(Study):
             "shown": self._runs("", self.model),
             "drawn": self._runs("draws", self.swift, self.draws),
             **self.at_gaps,
-            **{model: self._runs("", model) for model in self.models[1:]},
+            **{model: self._runs("", model) for model in [*self.models][1:]},
             **law,
             "sure": {
                 case: [
@@ -764,8 +751,7 @@ class Asked(Study):
                         tuple(settings.items()),
                         self.samples if drawn else 0,
                         given if drawn else None,
-                        where=self._where,
-                        **effort(self.model, settings, 4),
+                        **effort(self.model, settings, 4, self._every),
                     )
                 ]
                 for case, given in {"": self.own, **(self.cases if self.recorded else {})}.items()
@@ -776,7 +762,7 @@ class Asked(Study):
         """All of them at once."""
         return [
             *(task for part in self.parts.values() for some in part.values() for task in some),
-            *(self.levels.batches(*self.scales) if self.levels else ()),
+            *(self.levels.batches if self.levels else ()),
         ]
 
 
