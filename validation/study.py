@@ -21,15 +21,13 @@ from typing import Any, Literal
 from pydantic import TypeAdapter
 
 from rockcheck.scenes import progress, writing
-from rockcheck.validation.execute import pool, provenance
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import RECORDS, Store, name_of
 from rockcheck.validation.finding import Finding, Made
 
 FAULTS = "faults"
 #: Expected time (s) from which an estimate is announced before the work begins.
 LONG = 10.0
-#: Modules of models: these are imported by their names, which no study's code shows.
-MODELS = ("rockcheck.ebm", "rockcheck.cm", "rockcheck.engines")
 
 
 @dataclass(frozen=True)
@@ -63,12 +61,13 @@ class Task:
     def depends(self) -> Any:
         """All that the result depends on, as JSON.
 
-        By default the fields, the code that its module can reach and that of all `MODELS`, all
-        libraries, and, where it is "timed", the machine.
+        By default the fields, the code that its module can reach and that of all models, which are
+        imported by their names, all libraries, and, where it is "timed", the machine.
         """
+        modules = {type(self).__module__, *(kind.module for kind in models.FAMILIES.values())}
         return {
             "task": self.fields(),
-            "code": [provenance.code_digest(one) for one in (type(self).__module__, *MODELS)],
+            "code": [provenance.code_digest(one) for one in sorted(modules)],
             "versions": provenance.versions(),
             "machine": provenance.hardware() if self.where == "timed" else None,
         }
@@ -79,6 +78,11 @@ class Task:
         return provenance.digest(
             json.dumps([type(self).__qualname__, self.depends()], sort_keys=True, default=str)
         )
+
+    @property
+    def file(self) -> str:
+        """The name of its kept record."""
+        return name_of(type(self).__qualname__, self.key)
 
 
 class Study(ABC):
@@ -107,14 +111,10 @@ class Study(ABC):
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """The finding of the records; a task that there was no time for is missing in `done`."""
 
-    def file(self, task: Task) -> str:
-        """The name of a task's kept record."""
-        return name_of(self.name, task.key)
-
     def find(self, store: Store, task: Task) -> Any:
         """The kept record of a task; None if there is none, or its fields do not fit."""
         with suppress(KeyError, ValueError):
-            found = store.get(RECORDS, self.file(task)) or {}
+            found = store.get(RECORDS, task.file) or {}
             return self._adapter.validate_python(found["record"])
         return None
 
@@ -122,7 +122,7 @@ class Study(ABC):
         """Keep the record of a task."""
         store.put(
             RECORDS,
-            self.file(task),
+            task.file,
             {"record": self._adapter.dump_python(record, mode="json")},
         )
 
@@ -252,9 +252,7 @@ class _Run:
     def _end(self, task: Task, result: Any) -> None:
         self.done[task] = result
         if traceback := getattr(result, "traceback", ""):  # a result may have one, too
-            writing.write_whole(
-                writing.made(self.folder, FAULTS) / f"{self.study.file(task)}.txt", traceback
-            )
+            writing.write_whole(writing.made(self.folder, FAULTS) / f"{task.file}.txt", traceback)
         if not isinstance(result, pool.Failure):
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)

@@ -48,7 +48,7 @@ class Answers(Book):
         return [Played("".join(self.letters(task))) for task in tasks]
 
     def letters(self, task):
-        seen = self.played[task.scene.name, task.model]
+        seen = self.played[task.scene.name, task.request.model]
         for node in zip(task.amplitudes, task.frequencies, strict=True):
             seen.append(node)
             yield self.letter(task, len(seen) - 1)
@@ -83,7 +83,7 @@ def test_agreement_counts_equal_outcomes(agree):
             "cm": {0: (other := {"R": "S", "S": "R"}[right]), 39: "U", 40: other},
             "ebm-unilateral": {30: "U"},
         }
-        return wrong.get(task.model, {}).get(number, right)
+        return wrong.get(task.request.model, {}).get(number, right)
 
     spectra = {panel: made(panel, np.tile(np.arange(20) < 10, (20, 1)))}
     found, _ = agree(letter, ("ebm-unilateral", "cm"), spectra, 5)

@@ -59,31 +59,26 @@ class Played:
 
 @dataclass(frozen=True)
 class Nodes(Task):
-    """Nodes of one scene's spectrum by one model; `hash` of all that the record depends on."""
+    """Nodes of one scene's spectrum, as requested; `key` hashes all that the record depends on."""
 
-    hash: str
     what: What
     scene: Scene = field(compare=False)
     amplitudes: Floats = field(compare=False)
     frequencies: Floats = field(compare=False)
-    model: str = field(compare=False)
-    settings: Mapping[str, Any] = field(compare=False)
+    request: "Request" = field(compare=False)
+    key: str
 
     @property
     def label(self) -> str:
         """The scene, and the first of its nodes."""
         return (
-            f"{self.scene.name} by {self.model}, {self.what} from"
+            f"{self.scene.name} by {self.request.model}, {self.what} from"
             f" {self.frequencies[0]:.4g}, {self.amplitudes[0]:.4g}"
         )
 
-    def depends(self) -> str:
-        """Its hash."""
-        return self.hash
-
     def play(self) -> Played:
         """Outcomes or motions of the nodes, or whether they overturn after one impact."""
-        player: Any = models.build(self.model, self.settings)
+        player: Any = models.build(self.request.model, self.request.settings)
         where = self.scene, self.amplitudes, self.frequencies
         if self.what == "motions":
             return _motions(play_motions(*where, model=player, parts=PARTS, jobs=pool.cores()))
@@ -251,13 +246,12 @@ class Request:
         )
         return [
             Nodes(
-                provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
                 what,
                 scene,
                 a,
                 f,
-                self.model,
-                self.settings,
+                self,
+                provenance.digest(base + a.tobytes().hex() + f.tobytes().hex()),
                 expected=one * len(a),
                 where="here" if fast else "worker",
             )
