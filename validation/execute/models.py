@@ -233,14 +233,14 @@ SUMMED = ("wall_seconds", "cpu_seconds", "set_up", "steps", "evaluations")
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
-    """The model that a worker plays: its label in the suite, the name of its family, its settings.
+    """A model that is to play: its label, the name of its family, and its settings.
 
     `search_path` holds folders in which a user-defined model may lie.
     """
 
     label: str
     family: str
-    settings: dict[str, Any]
+    settings: dict[str, Any] = field(default_factory=dict, hash=False)
     search_path: tuple[str, ...] = ()
 
 

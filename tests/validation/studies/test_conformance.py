@@ -51,7 +51,16 @@ def planted(monkeypatch):
             "rockcheck.validation.execute.models.build",
             lambda *_: SimpleNamespace(simulate=play),
         )
-        return played(Player("planted", "best", 1e-3, "planted:Planted", {}, "1"))
+        return played(
+            Player(
+                label="planted",
+                family="planted:Planted",
+                settings={},
+                setup="best",
+                step=1e-3,
+                version="1",
+            )
+        )
 
     return gather
 

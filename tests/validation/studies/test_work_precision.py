@@ -184,7 +184,7 @@ def test_quantiles_are_those_of_the_sample_and_failed_runs_infinitely_wrong(good
 
 def test_every_member_meets_every_setting_once_and_only_the_finest_steps_are_not_timed():
     tasks = [task for task in WorkPrecision("models").tasks({}) if isinstance(task, Play)]
-    lines = [line for line in LINES.values() if not models.not_installed(line.model)]
+    lines = [line for line in LINES.values() if not models.not_installed(line.family)]
     settings = sum(len(line.values) for line in lines)
     assert len(set(tasks)) == len(tasks) == MEMBERS * len(FAMILIES) * settings
     assert {task for task in tasks if task.where == "worker"} == {
@@ -210,7 +210,7 @@ def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch, line, s
         for line in LINES.values()
         for scene in TWO_WALLS
         if line.converge
-        and not models.not_installed(line.model)
+        and not models.not_installed(line.family)
         and (line.label, scene) != ("drake", TWO_WALLS[0])  # Drake has no restitution
     ],
 )

@@ -8,7 +8,7 @@ friction, by dropping a block and by sliding it.
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
@@ -77,22 +77,18 @@ HEAD = (
 ROW = ("id", "name", "target", "value", "limit", "unit", "verdict", "reason")
 
 
-@dataclass(frozen=True)
-class Player:
-    """A participant: a model by name, with the settings that it is built with.
+@dataclass(frozen=True, kw_only=True)
+class Player(models.Work):
+    """A participant, by the engine's name.
 
-    `engine`, `version`, `settings` and `step` (s) are the words of its card. `cost` is the usual
-    CPU time of a simulated second; `search` lists folders that may hold the user's code.
+    `version`, `setup` and `step` (s) are the words of its card besides. `cost` is the usual CPU
+    time of a simulated second.
     """
 
-    engine: str
-    settings: str
+    setup: str
     step: float | str | None
-    model: str
-    given: Mapping[str, Any] = field(hash=False)
     version: str = ""
     lacks: tuple[str, ...] = ()
-    search: tuple[str, ...] = ()
     cost: float = 0.0
 
 
@@ -111,13 +107,13 @@ def named(name: str, settings: str | None, given: Mapping[str, Any]) -> Player:
     )
     step = built_by["time_step"]
     return Player(
-        name,
-        ", ".join([str(built_by.get("settings", AS_IT_COMES)), *more]),
-        step,
-        name,
-        built_by,
-        "" if own else provenance.version_of(models.family(name).libraries[0]),
-        search=(str(Path.cwd()),) if own else (),
+        label=name,
+        family=name,
+        settings=built_by,
+        setup=", ".join([str(built_by.get("settings", AS_IT_COMES)), *more]),
+        step=step,
+        version="" if own else provenance.version_of(models.family(name).libraries[0]),
+        search_path=(str(Path.cwd()),) if own else (),
         cost=A_STEP / (step if isinstance(step, float) and step > 0.0 else STEP),
     )
 
@@ -137,13 +133,13 @@ def written(folder: Path) -> Player:
         )
     )
     return Player(
-        about["engine"],
-        about.get("settings") or AS_IT_COMES,
-        about.get("step"),
-        "measured",
-        {"files": {name: str(folder / f"{name}.csv") for name in SCENES}},
-        about.get("version", ""),
-        tuple(map(str, about.get("lacks", ()))),
+        label=about["engine"],
+        family="measured",
+        settings={"files": {name: str(folder / f"{name}.csv") for name in SCENES}},
+        setup=about.get("settings") or AS_IT_COMES,
+        step=about.get("step"),
+        version=about.get("version", ""),
+        lacks=tuple(map(str, about.get("lacks", ()))),
     )
 
 
@@ -168,7 +164,7 @@ class Trial(Task):
     @property
     def label(self) -> str:
         """Engine, settings, phenomenon."""
-        return f"{self.player.engine}, {self.player.settings}: {self.id}"
+        return f"{self.player.label}, {self.player.setup}: {self.id}"
 
     def depends(self) -> Any:
         """Also the model's own code, and the files of histories."""
@@ -176,21 +172,22 @@ class Trial(Task):
         return {
             **super().depends(),
             "cells": [
-                provenance.cell_key(scene, who.model, who.given, who.search) for scene in scenes
+                provenance.cell_key(scene, who.family, who.settings, who.search_path)
+                for scene in scenes
             ],
         }
 
     def play(self) -> Seen:
         """Plays the scenes, reads the value off, and judges it."""
         who, what = self.player, PHENOMENA[self.id]
-        model: Any = models.build(who.model, who.given, who.search)
+        model: Any = models.build(who.family, who.settings, who.search_path)
         version = who.version or str(getattr(model, "version", ""))
         if what.needs in tuple(who.lacks or getattr(model, "lacks", tuple)()):
             return Seen(
                 None, "lacks", f"the engine has no {what.needs} with these settings", version
             )
         histories = [model.simulate(scene) for scene in what.scenes]
-        if who.model == "measured":
+        if who.family == "measured":
             for scene, history in zip(what.scenes, histories, strict=True):
                 _in_units(scene, history)
         try:
@@ -309,11 +306,11 @@ def _card(player: Player, found: Mapping[str, Seen | pool.Failure]) -> Card:
     counts = Counter(row["verdict"] for row in rows)
     version = next(filter(None, (one.version for one in seen.values())), player.version)
     return {
-        "engine": player.engine,
+        "engine": player.label,
         "version": version,
-        "settings": player.settings,
+        "settings": player.setup,
         "step": player.step,
-        "title": " ".join(filter(None, [player.engine, version])) + f", {player.settings}",
+        "title": " ".join(filter(None, [player.label, version])) + f", {player.setup}",
         "counts": {verdict: counts[verdict] for verdict in VERDICTS} | {"total": len(rows)},
         "phenomena": rows,
         "notes": list(dict.fromkeys(note for one in seen.values() for note in one.notes)),
@@ -694,10 +691,6 @@ class Tune(Task):
                     f"{printable(value)} is not allowed: give {least:g} to {most:g}",
                     "--tune" if name == "restitution" else f"--set {name}",
                 )
-
-    def depends(self) -> Any:
-        """Also the engine's code."""
-        return {**super().depends(), "home": provenance.code_digest(models.home(self.engine))}
 
     def play(self) -> Calibration:
         """Parameters in the engine's own words, and the contact reached with them.

@@ -22,7 +22,7 @@ import numpy as np
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
 from rockcheck.scenes import InputError, ModelFailure, Scene, files, printable
-from rockcheck.validation.execute import models
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -468,13 +468,10 @@ class Chunk(Task):
 
 def checked(label: str, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
     """One checked run; an exception of the program counts as a failure like any other."""
-    try:
-        return PLAYERS[label].check(scene, seed, number, only)
-    except Exception as error:  # the other runs go on, and this one is reported with its message
-        return CheckedRun(
-            figures={"ends": math.inf},
-            failure=printable(f"{type(error).__name__}: {error}", 300),
-        )
+    found: CheckedRun | pool.Failure = pool.guarded(PLAYERS[label].check, scene, seed, number, only)
+    if isinstance(found, pool.Failure):  # the other runs go on
+        return CheckedRun(figures={"ends": math.inf}, failure=found.reason)
+    return found
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from rockcheck.scenes import (
     printable,
 )
 from rockcheck.validation.execute import pool
-from rockcheck.validation.execute.models import build, not_installed
+from rockcheck.validation.execute.models import Work, build, not_installed
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, text
 from rockcheck.validation.studies.stress.invariants import (
     INVARIANTS,
@@ -73,17 +73,14 @@ HOUR, PUSHED, QUICK_REST, REST_STEP = 3600.0, 300.0, 10.0, 5e-3
 QUICK_STEPS, QUICK_VALUES = STEPS[1:-1:2], 2
 
 
-@dataclass(frozen=True)
-class ModelSetup:
+@dataclass(frozen=True, kw_only=True)
+class ModelSetup(Work):
     """A model with its default settings ("default") or its best ones.
 
     `knob` is its name for the step. A block is left alone for `alone` s. `finest` is the finest
     step that is tried, sqrt(R/g).
     """
 
-    label: str
-    family: str
-    settings: tuple[tuple[str, Any], ...]
     knob: str = "time_step"
     alone: float = HOUR
     finest: float = STEPS[-1]
@@ -96,21 +93,23 @@ SETUPS = {
             setup
             for engine in ("mujoco", "pybullet", "pymunk", "dart", "drake")
             for setup in (
-                ModelSetup(f"{engine} default", engine, (("settings", "default"),)),
-                ModelSetup(engine, engine, ()),
                 ModelSetup(
-                    f"{engine} adaptive",
-                    engine,
-                    (("time_step", "adaptive"),),
-                    "largest_step",
-                    PUSHED if engine == "dart" else HOUR,
-                    ADAPTIVE_FINEST,
+                    label=f"{engine} default", family=engine, settings={"settings": "default"}
+                ),
+                ModelSetup(label=engine, family=engine),
+                ModelSetup(
+                    label=f"{engine} adaptive",
+                    family=engine,
+                    settings={"time_step": "adaptive"},
+                    knob="largest_step",
+                    alone=PUSHED if engine == "dart" else HOUR,
+                    finest=ADAPTIVE_FINEST,
                 ),
             )
             if setup.label != "drake adaptive"  # its steps cannot vary
         ),
-        ModelSetup("cm paper", "cm", (("damping_rule", "paper"),)),
-        ModelSetup("cm", "cm", ()),
+        ModelSetup(label="cm paper", family="cm", settings={"damping_rule": "paper"}),
+        ModelSetup(label="cm", family="cm"),
     )
 }
 
@@ -158,9 +157,9 @@ def fault_of(line: ModelSetup, scene: Scene, step: float) -> str:
     # The CM's contact is as stiff as the block's size asks for.
     stiff = {"penetration": 1e-7 * radius} if line.family == "cm" else {}
     try:
-        history = build(
-            line.family, dict(line.settings) | {line.knob: step * unit} | stiff
-        ).simulate(scene)
+        history = build(line.family, line.settings | {line.knob: step * unit} | stiff).simulate(
+            scene
+        )
     except errors.ModelFailure as error:
         return "sinks" if "through the floor" in str(error) else "blows up"
     except errors.InputError as error:
@@ -203,7 +202,7 @@ def stand_still(label: str, case: str, duration: float) -> Found:
     # the CM's own step makes an hour cheap
     steps = {} if line.family == "cm" else {line.knob: step}
     try:
-        history = build(line.family, dict(line.settings) | steps).simulate(scene)
+        history = build(line.family, line.settings | steps).simulate(scene)
     except (errors.ModelFailure, errors.InputError) as error:
         return Found(duration, step, fault=printable(error, 120))
     channels, radius = history.channels, block.radius

@@ -9,7 +9,7 @@ Each is played up to its horizon of predictability and compared up to there.
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from statistics import median
 from typing import Any
@@ -199,18 +199,15 @@ SIDE_BY_SIDE = 1e-4
 FITTED = 3e-13, 0.2
 
 
-@dataclass(frozen=True)
-class DiagramLine:
+@dataclass(frozen=True, kw_only=True)
+class DiagramLine(models.Work):
     """A line of the diagrams: a model, and the setting that is swept, coarse to fine.
 
     `reference` is the model that it is compared with.
     """
 
-    label: str
-    model: str
     knob: str
     values: tuple[float, ...]
-    fixed: dict[str, Any] = field(default_factory=dict, hash=False)
     reference: str = "ebm-unilateral"
     #: The values of `--quick`, and those beside a wall, by which convergence is judged.
     quick: tuple[float, ...] = ()
@@ -239,23 +236,30 @@ ENGINES = {
 LINES = {
     line.label: line
     for line in (
-        DiagramLine("ebm", "ebm", "tolerance", _TOLERANCES, reference="ebm", quick=_TOLERANCES),
-        DiagramLine(
-            "ebm-unilateral", "ebm-unilateral", "tolerance", _TOLERANCES, quick=_TOLERANCES
+        *(
+            DiagramLine(
+                label=name,
+                family=name,
+                knob="tolerance",
+                values=_TOLERANCES,
+                reference=name,
+                quick=_TOLERANCES,
+            )
+            for name in ("ebm", "ebm-unilateral")
         ),
         DiagramLine(
-            "ebm-bouc-wen",
-            "ebm-bouc-wen",
-            "yield_displacement",
-            (1e-4, 1e-5, 1e-6),
+            label="ebm-bouc-wen",
+            family="ebm-bouc-wen",
+            knob="yield_displacement",
+            values=(1e-4, 1e-5, 1e-6),
             reference="ebm",
             quick=(1e-4, 1e-5),
         ),
         DiagramLine(
-            "cm",
-            "cm",
-            "penetration",
-            (1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
+            label="cm",
+            family="cm",
+            knob="penetration",
+            values=(1e-4, 1e-5, 1e-6, 1e-7, 1e-8),
             quick=(1e-5, 1e-6, 1e-7),
             converge=_PENETRATIONS,
         ),
@@ -264,28 +268,28 @@ LINES = {
             for engine, (steps, refined, varies) in ENGINES.items()
             for line in (
                 DiagramLine(
-                    engine,
-                    engine,
-                    "time_step",
-                    steps,
+                    label=engine,
+                    family=engine,
+                    knob="time_step",
+                    values=steps,
                     # without the finest one, which costs more than all others together
                     quick=steps[: max(len(steps) - 1, 2)],
                     converge=refined,
                 ),
                 DiagramLine(
-                    f"{engine} adaptive",
-                    engine,
-                    "largest_step",
-                    _LARGEST,
-                    {"time_step": "adaptive"},
+                    label=f"{engine} adaptive",
+                    family=engine,
+                    settings={"time_step": "adaptive"},
+                    knob="largest_step",
+                    values=_LARGEST,
                     quick=_LARGEST[1:3],
                 ),
                 DiagramLine(
-                    f"{engine} default",
-                    engine,
-                    "time_step",
-                    steps[:3],
-                    {"settings": "default"},
+                    label=f"{engine} default",
+                    family=engine,
+                    settings={"settings": "default"},
+                    knob="time_step",
+                    values=steps[:3],
                     quick=_STEPS[:2],
                 ),
             )
@@ -368,7 +372,7 @@ class Play(Task):
     def play(self) -> list[BenchmarkRun]:
         """Plays the member with the setting; short runs several times, for the median time."""
         line, ready = LINES[self.line], prepared(self.family, self.member)
-        model = models.build(line.model, {line.knob: self.value, **line.fixed})
+        model = models.build(line.family, {line.knob: self.value, **line.settings})
         history = model.simulate(ready.scene)
         costs = [history.cost]
         while len(costs) < self.repeats and costs[0].wall_seconds < LONG_ENOUGH:
@@ -481,7 +485,7 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
 
 def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind; `family` is the kind."""
-    engines = _ordered(frame[[LINES[line].model in ENGINES for line in frame.line]], "line")
+    engines = _ordered(frame[[LINES[line].family in ENGINES for line in frame.line]], "line")
     return points_of(
         pd.concat(
             engines[engines.family.str.startswith(starts)].assign(family=kind)
@@ -497,7 +501,7 @@ def at_the_cost(points: pd.DataFrame) -> list[float]:
     """
     lines = dict(grouped(points, "family", "line"))
     return [
-        error_at(lines.get((one.family, f"{LINES[one.line].model} adaptive"), points[:0]), one.cpu)
+        error_at(lines.get((one.family, f"{LINES[one.line].family} adaptive"), points[:0]), one.cpu)
         for one in points.itertuples()
     ]
 

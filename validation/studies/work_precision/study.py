@@ -119,7 +119,7 @@ class WorkPrecision(Study):
         lines = [
             (line, value)
             for line in runs.LINES.values()
-            if not models.not_installed(line.model)
+            if not models.not_installed(line.family)
             for value in (line.quick if self.quick else line.values)
         ]
         for member, family, (line, value) in itertools.product(
@@ -142,7 +142,7 @@ class WorkPrecision(Study):
         lines = [
             line
             for line in runs.LINES.values()
-            if line.converge and not models.not_installed(line.model)
+            if line.converge and not models.not_installed(line.family)
         ]
         for place, line, name in itertools.product(
             (1, 0) if self.quick else (2, 1, 0),
@@ -150,7 +150,7 @@ class WorkPrecision(Study):
             runs.QUICK_WALLS if self.quick else runs.WALLS,
         ):
             bounces = runs.WALLS[name].walls[0].restitution > 0.0
-            if place < len(line.converge) and not (line.model == "drake" and bounces):
+            if place < len(line.converge) and not (line.family == "drake" and bounces):
                 value = line.converge[place]
                 yield runs.Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
 
@@ -353,7 +353,7 @@ def _diagram(title: str, families: Sequence[str], points: pd.DataFrame) -> Plot:
                 mine.rms.tolist(),
                 mine.rms_10.clip(lower=FLOOR).tolist(),
                 mine.rms_90.clip(upper=3.0).tolist(),
-                runs.LINES[label].model,
+                runs.LINES[label].family,
                 LOOKS.get(label.split()[-1], "line"),
             )
             for (label,), mine in runs.grouped(shown, "line")
