@@ -18,11 +18,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import TypeAdapter
+from pydantic_core import to_jsonable_python
 
 from rockcheck.scenes import progress, writing
 from rockcheck.validation.execute import models, pool, provenance
-from rockcheck.validation.execute.store import RECORDS, Store, name_of
+from rockcheck.validation.execute.store import RECORDS, Store, adapter_of, name_of
 from rockcheck.validation.finding import Finding, Made
 
 FAULTS = "faults"
@@ -75,11 +75,10 @@ class Task:
     @cached_property
     def key(self) -> str:
         """Hash of what it depends on."""
-        return provenance.digest(
-            json.dumps([type(self).__qualname__, self.depends()], sort_keys=True, default=str)
-        )
+        said = to_jsonable_python([type(self).__qualname__, self.depends()], fallback=str)
+        return provenance.digest(json.dumps(said, sort_keys=True))
 
-    @property
+    @cached_property
     def file(self) -> str:
         """The name of its kept record."""
         return name_of(type(self).__qualname__, self.key)
@@ -115,7 +114,7 @@ class Study(ABC):
         """The kept record of a task; None if there is none, or its fields do not fit."""
         with suppress(KeyError, ValueError):
             found = store.get(RECORDS, task.file) or {}
-            return self._adapter.validate_python(found["record"])
+            return adapter_of(self.record).validate_python(found["record"])
         return None
 
     def keep(self, store: Store, task: Task, record: Any) -> None:
@@ -123,12 +122,8 @@ class Study(ABC):
         store.put(
             RECORDS,
             task.file,
-            {"record": self._adapter.dump_python(record, mode="json")},
+            {"record": adapter_of(self.record).dump_python(record, mode="json")},
         )
-
-    @cached_property
-    def _adapter(self) -> TypeAdapter[Any]:
-        return TypeAdapter(self.record)
 
 
 def run(

@@ -42,8 +42,6 @@ from rockcheck.validation.studies.population import answers, runs
 from rockcheck.validation.suite import motions
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
-#: Of the pulses of a fragility curve, omega_p/p.
-PULSES = (0.5, 8.0)
 #: Draws of the numbers of a single run.
 SAMPLES = 1024
 
@@ -235,7 +233,7 @@ def population_of(
             raise errors.InputError(
                 f"{measure} needs records; of pulses it is pga-ratio", "--levels"
             )
-        return runs.fragility(scene, values, PULSES, model=model, settings=settings)
+        return runs.fragility(scene, values, FREQUENCIES, model=model, settings=settings)
     return runs.ida(
         scene,
         [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],

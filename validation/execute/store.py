@@ -21,6 +21,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -40,6 +41,8 @@ SUFFIXES = {TABLE, f".events{TABLE}"}
 RECENT = 16
 #: Time (s) after which a result that no run has used is removed.
 KEEP = 14 * 86400.0
+#: What reads and writes values of a type; to make it takes longer than many a result.
+adapter_of = cache(TypeAdapter)
 
 
 def name_of(*parts: str) -> str:
@@ -133,7 +136,7 @@ class Store:
 
     def once(self, kind: str, name: str, form: Any, compute: Callable[[], T]) -> T:
         """The kept value of type `form`; computed and kept where it is missing or invalid."""
-        adapter: TypeAdapter[T] = TypeAdapter(form)
+        adapter: TypeAdapter[T] = adapter_of(form)
         with contextlib.suppress(KeyError, TypeError, ValueError):
             return adapter.validate_python((self.get(kind, name) or {})["kept"])
         found = compute()

@@ -48,10 +48,10 @@ TOML = (
 )
 
 
-def motion(gain: float, rate: float = 3.0) -> recordings.Recording:
+def motion(gain: float, rate: float = 3.0, step: int = 1) -> recordings.Recording:
     t = 0.02 * np.arange(200)
     samples = gain * np.sin(rate * t) * np.exp(-0.2 * t)
-    return recordings.Recording(samples=samples, time_step=0.02, unit="m/s2", form="CSV")
+    return recordings.Recording(samples=samples[::step], time_step=0.02, unit="m/s2", form="CSV")
 
 
 MOTIONS = [("H1", motion(1.0)), ("H2", motion(2.5, 5.0)), ("H3", motion(0.3, 2.0))]
@@ -177,6 +177,7 @@ def test_a_task_depends_on_all_that_its_runs_do():
         ida(SCENE.replace(gravity=9.8), MOTIONS, LEVELS),
         ida(SCENE, MOTIONS[1:], LEVELS),
         ida(SCENE, MOTIONS, LEVELS, measure="pgv"),
+        ida(SCENE, [("H1", motion(1.0, step=-1)), *MOTIONS[1:]], LEVELS),
     ]
     assert key not in {study.batches[0].key for study in others}
     assert ida(SCENE, MOTIONS, LEVELS, capacities=[0.3]).batches[0].key == key

@@ -45,9 +45,8 @@ STEPS = "numerical error"
 FATES = {"at rest": "stays", "moving": "stays, and still moves at the end"}
 #: Units as readers know them, where these are other words.
 UNITS = {"alpha": "α"}
-#: Of a probability; and what identifies a hand method.
+#: Of a probability.
 INTERVAL = ("probability", "low", "high")
-METHOD = ("name", "formula", "event", "source", "holds")
 #: A slip (m) or rotation (alpha) below this is none: models with contacts yield a little.
 MOVED = 1e-6
 #: Points of a history on the page.
@@ -660,7 +659,7 @@ def criteria_of(found: Found) -> Iterator[dict[str, Any]]:
         runs = [(*said[k], getattr(run, figure)) for run, said in cases]
         pairs = [(estimate, far) for _, estimate, far in runs if estimate is not None]
         yield {
-            **{key: getattr(one, key) for key in METHOD},
+            **{key: value for key, value in vars(one).items() if key != "says"},
             "predicts": sum(says for says, *_ in runs),
             "of": len(runs),
             "simulated": sum(far > least for *_, far in runs),

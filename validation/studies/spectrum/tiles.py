@@ -66,7 +66,7 @@ class Nodes(Task):
     amplitudes: Floats = field(compare=False)
     frequencies: Floats = field(compare=False)
     request: "Request" = field(compare=False)
-    key: str
+    key: str = field()
 
     @property
     def label(self) -> str:
