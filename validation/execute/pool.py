@@ -194,7 +194,7 @@ class Pool:
                         self._compiled.add(call.compiles)
                     if call not in told:
                         told.add(call)
-                        error = self._error(future)
+                        error = future.exception()
                         yield Ended(call, None if error else future.result(), error, seconds)
         finally:
             for future in running:
@@ -245,9 +245,6 @@ class Pool:
                 call.function, args=call.arguments, timeout=None if seconds == math.inf else seconds
             )
         ]
-
-    def _error(self, future: Future[Any]) -> BaseException | None:
-        return future.exception()
 
 
 @contextmanager
@@ -346,10 +343,6 @@ class Cluster(Pool):
             self._pool.get_executor(pure=False, retries=2, **where).submit(alone, *given)
             for where in (wishes if first and wishes else [{}])
         ]
-
-    def _error(self, future: Future[Any]) -> BaseException | None:
-        error = future.exception()
-        return error and ModelFailure(f"the cluster lost it: {error}")
 
 
 _mine = threading.local()
