@@ -458,6 +458,7 @@ class SuiteStudy(Study):
                 correlation=given.correlation.tolist(),
             )
             for name, given in suite.uncertain.items()
+            if name in self.planned
         }
         drawn = [self._ensemble(name) for name in suite.ensembles if name in self.planned]
         of_scenes = (
