@@ -12,7 +12,7 @@ from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
-from rockcheck.reports.view import FALL, SceneView, all_figures
+from rockcheck.reports.view import FALL, SceneView
 from rockcheck.scenes import Side, experience
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy import figures
@@ -370,7 +370,7 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     `why_apart`. `nearest` is the check that uses most of its limit, `used` that share; infinite
     where there is no history.
     """
-    cell, figures, against = cells[model], all_figures(cells[model]), run.reference
+    cell, figures, against = cells[model], cells[model].figures, run.reference
     of = "theta_rms", against
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
@@ -404,7 +404,7 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
 
     A block that may lean on a wall on that side is not falling.
     """
-    turns = (f for f in all_figures(cell) if f.unit == "alpha")
+    turns = (f for f in cell.figures if f.unit == "alpha")
     last = results.value_of(turns, "last_rotation") or 0.0
     side: Side = "left" if last > 0.0 else "right"
     return (
