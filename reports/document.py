@@ -6,15 +6,14 @@ Each block is rendered from one description. All pages have one look, made of th
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
@@ -36,8 +35,9 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Tex
 FIGURES = "figures"
 #: The data of a figure, and limits of drawing it anew: s, and MB.
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
-#: The tables of a finding in its run.json: their rows by the names of the columns.
-TABLES = TypeAdapter(dict[str, list[dict[str, Any]]])
+#: What belongs to a page of a run and of a study: figures, data and tables.
+OF_RUN = r"(?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*"
+OF_STUDY = r"figures/\w[\w.+=-]*|\w[\w.-]*\.csv"
 #: Of a verdict: its sign, and its colour on a terminal.
 VERDICTS = {
     "": ("", ""),
@@ -159,12 +159,10 @@ def block_markdown(block: Table | Plot | Text) -> str:
     return "\n\n".join(filter(None, [block.title and f"## {block.title}", *parts]))
 
 
-def _draw(plot: Plot, path: Path, stamp: str) -> None:
-    style.save_as(drawers.figure_of(plot), path, stamp=stamp, named=False)
-
-
-def _draw_again(data: Path, path: Path) -> None:
-    style.save_as(drawers.figure_of(PLOT.validate_python(reading.read_json(data))), path)
+def _draw(data: Path, path: Path, stamp: str = "") -> None:
+    """Draw a figure from its data: of the page with its stamp, else a file that the user named."""
+    plot = PLOT.validate_python(reading.read_json(data))
+    style.save_as(drawers.figure_of(plot), path, stamp=stamp, named=not stamp)
 
 
 def write_figure(folder: Path, name: str, path: Path) -> Path:
@@ -176,36 +174,10 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     known = {one.stem: one for one in (folder / FIGURES).glob("*.json")}
     data = known[errors.one_of("figure", name, known)]
     with Pool(1, DRAWING_MB) as pool:
-        (ended,) = pool.run([Call(guarded, (_draw_again, data, path), DRAWING)])
+        (ended,) = pool.run([Call(guarded, (_draw, data, path), DRAWING)])
     if isinstance(ended.outcome, Failure):
         raise InputError(f"{printable(data)}: no data of a figure: {ended.outcome.reason}")
     return path
-
-
-def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
-    """Tables and figures of the run that was in the folder, which this one does not have.
-
-    No other file is taken for one: a table has the columns that its run.json says, and a figure's
-    stamp is that of the data beside it.
-    """
-    before: dict[str, list[dict[str, Any]]] = {}
-    with suppress(InputError, KeyError, TypeError, ValidationError):
-        before = TABLES.validate_python(
-            reading.read_json(reading.within(folder, "run.json"))["tables"]
-        )
-    for name in before.keys() - {table.name for table in found.tables()}:
-        path = folder / f"{name}.csv"
-        heads = tuple(writing.table_text([*row], []) for row in before[name][:1])
-        if path.parent == folder and reading.head_of(path, 10_000).startswith(heads):
-            yield path
-    drawn = {plot.name for plot in found.plots()}
-    for data in (folder / FIGURES).glob("*.json"):
-        svg = data.with_suffix(".svg")
-        if data.stem not in drawn and (
-            style.stamp_in(svg).split()[:1]
-            == style.stamp_of(reading.head_of(data, reading.MOST_BYTES)).split()[:1]
-        ):
-            yield from (data, svg)
 
 
 def publish(found: Finding, folder: Path) -> Path:
@@ -215,7 +187,8 @@ def publish(found: Finding, folder: Path) -> Path:
     another are removed. Figures are written as the page shows them, and as the data that
     `write_figure` draws.
     """
-    for old in (*_left_by_another(folder, found), *folder.glob("failures/*.toml")):
+    before = belongings(folder / "index.html", OF_STUDY)
+    for old in folder.glob("failures/*.toml"):
         old.unlink()
     writing.write_whole(folder / "run.json", writing.json_text(found.as_dict()) + "\n")
     for name, content in (
@@ -229,12 +202,12 @@ def publish(found: Finding, folder: Path) -> Path:
     figures = writing.made(folder, FIGURES)
     calls = []
     for plot in plots:
-        drawn = replace(plot, played=None)
-        data, path = writing.json_text(asdict(drawn)), figures / f"{plot.name}.svg"
-        writing.write_whole(path.with_suffix(".json"), data)
-        stamp = style.stamp_of(data)
+        path, data = (figures / f"{plot.name}.{kind}" for kind in ("svg", "json"))
+        drawn = writing.json_text(asdict(replace(plot, played=None)))
+        writing.write_whole(data, drawn)
+        stamp = style.stamp_of(drawn)
         if style.stamp_in(path) != stamp:
-            calls.append(Call(_draw, (drawn, path, stamp)))
+            calls.append(Call(_draw, (data, path, stamp)))
     list(drawers.side_by_side(calls))
     write_assets(folder)
     if live := [drawers.live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
@@ -242,7 +215,7 @@ def publish(found: Finding, folder: Path) -> Path:
             folder / "curves.js",
             writing.script_text("window.rockcheckCurves", writing.finite(live)),
         )
-    return write_page(
+    page = write_page(
         folder,
         "index.html",
         "finding.html",
@@ -264,6 +237,8 @@ def publish(found: Finding, folder: Path) -> Path:
         row_cells=row_cells,
         formats=(),
     )
+    remove(folder, before - belongings(page, OF_STUDY))
+    return page
 
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -298,17 +273,15 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     )
 
 
-def belongings(page: Path) -> set[str]:
-    """The figures and data of a page of a run, from its folder; none of a page without a stamp.
+def belongings(page: Path, files: str = OF_RUN) -> set[str]:
+    """The `files` of a page that it links, from its folder; none of a page without a stamp.
 
     No other file is taken for one, whatever is linked by a page that somebody sent.
     """
     if not style.stamp_in(page):
         return set()
     names = re.findall(
-        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*)"',
-        reading.head_of(page, reading.MOST_BYTES),
-        re.ASCII,
+        rf'(?:href|src)="({files})"', reading.head_of(page, reading.MOST_BYTES), re.ASCII
     )
     drawn = [name.removesuffix(".svg") + ".json" for name in names if name.endswith(".svg")]
     return {*names, *drawn, f"{FIGURES}/{page.stem}-small.svg"}

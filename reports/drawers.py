@@ -246,19 +246,12 @@ def spectra(plot: Plot) -> Figure:
     rows = max(panel["place"][0] + panel["place"][1] for panel in panels)
     horizontal, vertical = axis_labels(data["record"])
     handles, columns = _legend(data)
-    places = _places(
-        panels,
-        (width, data["height"]),
-        rows,
-        title=0.27 if plot.title else 0.03,
-        units=0.4 if pulse else 0.0,
-        below=0.5 + 0.15 * -(-len(handles) // columns),
-    )
-    with new_figure(figsize=(width, data["height"])) as figure:
+    with new_figure(figsize=(width, data["height"]), layout="constrained") as figure:
+        grid = figure.add_gridspec(rows, 1 + max(panel["place"][2] for panel in panels))
         x, y = data["frequencies"], data["amplitudes"]
-        for panel, place in zip(panels, places, strict=True):
+        for panel in panels:
             row, high, column = panel["place"]
-            axes = figure.add_axes(place)
+            axes = figure.add_subplot(grid[row : row + high, column])
             letters = np.array(list(panel["outcomes"])).reshape(len(y), len(x))
             _paint(axes, letters, x, y, free=panel["free"], law=panel.get("law"))
             axes.set_title(panel["title"], fontsize=7.0)
@@ -276,40 +269,9 @@ def spectra(plot: Plot) -> Figure:
             if own := pulse.get("own"):
                 axes.plot(*own, **OWN_MARK)
             _units(axes, data)
-        figure.legend(handles=handles, loc="lower center", ncols=columns, fontsize=7)
-        figure.suptitle(
-            plot.title, fontsize=9, x=0.01, y=1.0 - 0.06 / data["height"], ha="left", va="top"
-        )
+        figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
+        figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
     return figure
-
-
-def _places(
-    panels: Any, size: tuple[float, float], rows: int, *, title: float, units: float, below: float
-) -> list[tuple[float, float, float, float]]:
-    """Where each panel's axes are: left, bottom, width and height, in shares of the figure.
-
-    Its `size`, and the room for its title, for a pulse's units (above and beside), and for what
-    stands below, are in inches: a layout engine would need longer than the drawing.
-    """
-    width, height = size
-    wide: dict[int, float] = {}
-    for panel in panels:
-        _, high, column = panel["place"]
-        labelled = 0.53 if "row" in panel else 0.45
-        wide[column] = max(wide.get(column, 0.1), labelled if column < high else 0.1)
-    across = (width - 0.1 - units - sum(wide.values())) / len(wide)
-    above = title + 0.22 + 0.13 * max(panel["title"].count("\n") for panel in panels) + units
-    between = 0.3 if any(panel["title"] for panel in panels if panel["place"][0] > 0) else 0.12
-    row_height = (height - above - below + between) / rows
-    return [
-        (
-            (sum(wide[k] for k in range(column + 1)) + column * across) / width,
-            (height - above - (row + high) * row_height + between) / height,
-            across / width,
-            (high * row_height - between) / height,
-        )
-        for row, high, column in (panel["place"] for panel in panels)
-    ]
 
 
 def _units(axes: Any, data: Any) -> None:

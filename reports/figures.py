@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from rockcheck.reports.show.words import number, scene_facts
 from rockcheck.reports.style import PAGE, SUPERSCRIPTS, Figure, Look, new_figure
-from rockcheck.reports.tables import checks_table, formula, runs_table, verdict_mark
+from rockcheck.reports.tables import checks_table, runs_table, verdict_mark
 from rockcheck.reports.view import (
     CHANNELS,
     PAPER_CHANNELS,
@@ -664,7 +664,7 @@ class EnsembleView(View):
                 Column("only the model falls"),
                 Column("both stay"),
                 *(
-                    Column(name, title, help=formula(name))
+                    Column(name, title, help=measures.STATISTICS[name].formula)
                     for name, title in STATISTICS_SHOWN.items()
                 ),
             ],

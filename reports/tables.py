@@ -12,7 +12,7 @@ from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
-from rockcheck.reports.view import FALL, SceneView, all_figures
+from rockcheck.reports.view import FALL, SceneView
 from rockcheck.scenes import Side, experience
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy import figures
@@ -28,8 +28,9 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
-from rockcheck.validation.suite import across, results, tolerances
+from rockcheck.validation.suite import across, results
 from rockcheck.validation.suite.tables import used
+from rockcheck.validation.suite.tolerances import apart, known
 
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {
@@ -104,7 +105,7 @@ def _check_row(
         else Mark(VERDICTS[check.verdict][0], weighs),
         Mark(cell.scene, link=(links or {}).get(cell.scene, "")),
         cell.model,
-        Mark(figure.label, words=formula(figure.measure), more=against + window(figure)),
+        Mark(figure.label, words=known(figure.measure).formula, more=against + window(figure)),
         check.kind,
         number(check.expected),
         "fell" if figure.of_a_fall else f"{number(figure.value, 4)} {unit(figure.unit)}",
@@ -112,11 +113,6 @@ def _check_row(
         used(check),
         Mark(check.reason or figure.note, more=check.why),
     ]
-
-
-def formula(measure: str) -> str:
-    """How a measure is defined, empty where it is not known."""
-    return tolerances.MEASURES[measure].formula if measure in tolerances.MEASURES else ""
 
 
 def worst_first(run: results.Run) -> list[tuple[results.Cell, results.Check | None]]:
@@ -208,7 +204,7 @@ def measures_table(view: SceneView, against: str) -> Table:
         [text("measure"), *map(Column, models)],
         [
             [
-                Mark(firsts[key].label, words=formula(key[0]), more=window(firsts[key])),
+                Mark(firsts[key].label, words=known(key[0]).formula, more=window(firsts[key])),
                 *(marks.get((*key, model)) for model in models),
             ]
             for key in sorted(firsts, key=lambda key: (key[0], firsts[key].until or math.inf))
@@ -359,11 +355,8 @@ def _moved(check: results.Check) -> bool:
     value, expected = check.figure.value, check.expected
     if check.drift is None or value is None or expected is None:
         return check.weighs != "pass"
-    measure = tolerances.MEASURES.get(check.figure.measure)
-    return (
-        tolerances.apart(value, expected, check.floor, (measure.ideal if measure else None) or 0.0)
-        > check.drift
-    )
+    ideal = known(check.figure.measure).ideal or 0.0
+    return apart(value, expected, check.floor, ideal) > check.drift
 
 
 def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> Entry:
@@ -377,7 +370,7 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     `why_apart`. `nearest` is the check that uses most of its limit, `used` that share; infinite
     where there is no history.
     """
-    cell, figures, against = cells[model], all_figures(cells[model]), run.reference
+    cell, figures, against = cells[model], cells[model].figures, run.reference
     of = "theta_rms", against
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
@@ -411,7 +404,7 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
 
     A block that may lean on a wall on that side is not falling.
     """
-    turns = (f for f in all_figures(cell) if f.unit == "alpha")
+    turns = (f for f in cell.figures if f.unit == "alpha")
     last = results.value_of(turns, "last_rotation") or 0.0
     side: Side = "left" if last > 0.0 else "right"
     return (

@@ -14,7 +14,7 @@ import numpy as np
 from rockcheck.reports.style import Look, looks
 from rockcheck.scenes import Floats, History, InputError, Scene, kinematics, reading
 from rockcheck.scenes.history import COLUMNS, events_path
-from rockcheck.validation.discrepancy import compare, figures
+from rockcheck.validation.discrepancy import compare
 from rockcheck.validation.suite import results
 
 #: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
@@ -354,7 +354,7 @@ class SceneView(View):
             (
                 figure.until
                 for cell in self.cells
-                for figure in all_figures(cell)
+                for figure in cell.figures
                 if figure.window == "horizon" and figure.until is not None
             ),
             default=None,
@@ -444,8 +444,3 @@ def slugs_of(names: Collection[str]) -> dict[str, str]:
         slug = next(one for one in numbered if one.lower() not in taken)
         taken[slug.lower()] = slug
     return dict(zip(names, taken.values(), strict=True))
-
-
-def all_figures(cell: results.Cell) -> list[figures.Figure]:
-    """The figures of a cell, those with a check first."""
-    return [*(check.figure for check in cell.checks), *cell.figures]

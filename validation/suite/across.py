@@ -168,9 +168,8 @@ def _moved(title: str, was: float | None, now: float | None) -> bool:
     """
     if was is None or now is None:
         return was is not now
-    measure = tolerances.MEASURES.get(re.split("[@ ]", title.rpartition(": ")[2])[0])
-    least = measure.resolution if measure else 0.0
-    return abs(now - was) > max(least, ROUNDING * max(abs(was), abs(now)))
+    measure = tolerances.known(re.split("[@ ]", title.rpartition(": ")[2])[0])
+    return abs(now - was) > max(measure.resolution, ROUNDING * max(abs(was), abs(now)))
 
 
 class Moment(Stored):

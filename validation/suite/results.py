@@ -28,6 +28,7 @@ from pydantic import Field, ValidationError, field_validator
 from rockcheck.scenes import Cost, InputError, Scene, errors, printable, reading, writing
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.figures import Figure, Stored
+from rockcheck.validation.finding import Verdict
 from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 
@@ -40,9 +41,19 @@ FAULT = 70
 #: Verdict on one check: as expected; nearer to the perfect value; a ratio to zero; inside the
 #: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
 CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
-#: Verdict on a cell or a run: the worst of its checks, "incomplete" where a model is not installed,
-#: or "error" where one failed.
-Verdict = Literal["pass", "incomplete", "changed", "fail", "error"]
+#: Verdict on a cell or a run for people: the worst of its checks, "incomplete" where a model is not
+#: installed, "error" where one failed. What waits for nothing but tolerances has not failed.
+Words = Literal["not judged", "pass", "incomplete", "changed", "no tolerance yet", "fail", "error"]
+#: The verdict for machines by that for people, the worst last.
+VERDICTS: Mapping[Words, Verdict] = {
+    "not judged": "pass",
+    "pass": "pass",
+    "incomplete": "incomplete",
+    "changed": "changed",
+    "no tolerance yet": "fail",
+    "fail": "fail",
+    "error": "error",
+}
 #: What fails besides figures out of a limit: nothing; changed figures and a model that is not
 #: installed; "both": better figures, too.
 Strict = bool | Literal["both"]
@@ -53,7 +64,7 @@ FAILS: Mapping[Strict, tuple[CheckVerdict, ...]] = {
 }
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
-SEVERITY: tuple[Verdict, ...] = ("pass", "incomplete", "changed", "fail", "error")
+SEVERITY = tuple(VERDICTS)
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free
 #: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
 #: closed form. "absolute": a figure of the cell itself against its expected value.
@@ -178,19 +189,20 @@ class Cell(Stored):
         return None if self.numerical is None else self.numerical.converged
 
     @property
-    def verdict(self) -> Verdict:
+    def words(self) -> Words:
         """The worst of the cell's checks; "error" if the model failed, "incomplete" if missing."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
-        weighed: list[Verdict] = [check.weighs for check in self.checks]
-        return max(weighed, key=SEVERITY.index, default="pass")
+        found: list[Words] = [
+            "no tolerance yet" if check.words == "no tolerance yet" else check.weighs
+            for check in self.checks
+        ]
+        return max(found, key=SEVERITY.index, default="pass")
 
     @property
-    def words(self) -> str:
-        """The verdict for people; "no tolerance yet" if only that keeps the cell from passing."""
-        found = {check.words for check in self.checks if self.status == "done"}
-        waits = "no tolerance yet" in found and "fail" not in found
-        return "no tolerance yet" if waits else self.verdict
+    def verdict(self) -> Verdict:
+        """The verdict for machines: a figure without a tolerance does not pass."""
+        return VERDICTS[self.words]
 
 
 class EnsembleRecord(Stored):
@@ -266,22 +278,20 @@ class Run(Stored):
         return self.faults if judged or not self.judged else (*self.faults, nothing)
 
     @property
-    def verdict(self) -> Verdict:
-        """The worst cell's verdict; at least "fail" where something is `wrong`."""
-        weighed = [cell.verdict for cell in self.cells if cell.status != "unavailable"]
-        return max([*weighed, "fail" if self.wrong else "pass"], key=SEVERITY.index)
+    def words(self) -> Words:
+        """The worst cell's verdict; at least "fail" where something is `wrong`.
+
+        "not judged" if a run without judgement passes.
+        """
+        found: list[Words] = ["fail" if self.wrong else "pass"]
+        found += [cell.words for cell in self.cells if cell.status != "unavailable"]
+        worst = max(found, key=SEVERITY.index)
+        return "not judged" if worst == "pass" and not self.judged else worst
 
     @property
-    def words(self) -> str:
-        """The verdict for people; "not judged" if a run without judgement passes.
-
-        "no tolerance yet" if only missing tolerances keep the run from passing.
-        """
-        if not self.judged and self.verdict == "pass":
-            return "not judged"
-        found = {cell.words for cell in self.cells}
-        bad = bool(self.faults) or bool(found & {"fail", "error"})
-        return "no tolerance yet" if "no tolerance yet" in found and not bad else self.verdict
+    def verdict(self) -> Verdict:
+        """The verdict for machines, as that of a cell."""
+        return VERDICTS[self.words]
 
     @property
     def exit_code(self) -> int:

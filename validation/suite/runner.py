@@ -44,23 +44,17 @@ class Planned(Task):
     """A cell to be played: a scene, or the scenes `numbers` of an `ensemble`, by a model.
 
     An ensemble's scenes are drawn from `scene`. `place` is the name of the scene, or of the
-    ensemble. `key` is the hash of all that the result depends on.
+    ensemble, `file` that of its files. `key` is the hash of all that the result depends on.
     """
 
+    file: str = field()
+    key: str = field(compare=False)
     place: str = field(compare=False)
     scene: Scene = field(compare=False)
     variant: models.Work = field(compare=False)
-    model: str
-    key: str
     uncertainty: bool = field(default=False, compare=False)
     ensemble: motions.Ensemble | None = field(default=None, compare=False)
     numbers: range = field(default=range(0), compare=False)
-
-    @property
-    def file(self) -> str:
-        """Name of its files."""
-        part = [f"{self.numbers.start}"] if self.ensemble else []
-        return name_of(self.place, self.variant.label, *part, self.key)
 
     @property
     def label(self) -> str:
@@ -348,7 +342,7 @@ class SuiteStudy(Study):
         self.planned: dict[str, dict[str, list[Planned]]] = {}
         self.items = [item for cell in suite.cells() for item in self._planned(*cell)]
         for item in self.items:
-            self.planned.setdefault(item.place, {}).setdefault(item.model, []).append(item)
+            self.planned.setdefault(item.place, {}).setdefault(item.variant.label, []).append(item)
         #: What each that has ended gave, without files, or why it gave nothing.
         self.ended: dict[Planned, Any] = {
             item: pool.Failure(missing)
@@ -380,14 +374,15 @@ class SuiteStudy(Study):
                 for n in (every[k : k + ensemble.batch] for k in every[:: ensemble.batch])
             ]
         for numbers, depends in parts:
+            settings = {**variant.settings, **depends}
+            key = provenance.cell_key(scene, kind, settings, variant.search_path)
+            first = [f"{numbers.start}"] if ensemble else []
             yield Planned(
+                name_of(place, variant.label, *first, key),
+                key,
                 place,
                 scene,
                 variant,
-                variant.label,
-                provenance.cell_key(
-                    scene, kind, {**variant.settings, **depends}, variant.search_path
-                ),
                 own.given.uncertainty,
                 ensemble,
                 numbers,
@@ -459,6 +454,7 @@ class SuiteStudy(Study):
                 correlation=given.correlation.tolist(),
             )
             for name, given in suite.uncertain.items()
+            if name in self.planned
         }
         drawn = [self._ensemble(name) for name in suite.ensembles if name in self.planned]
         of_scenes = (
@@ -533,13 +529,13 @@ class SuiteStudy(Study):
         if isinstance(played, pool.Failure):
             return results.Cell(**self._about(parts, played.reason))
         record, scene, own = played.record, planned.scene, self.own[planned.place]
-        required = own.required(scene.name, planned.model)
+        required = own.required(scene.name, planned.variant.label)
         found = self._compared(planned, required)
         floor = partial(tolerances.floor_of, scene=scene, numerical=record.numerical)
         checks = list(_checks(own, required, found.figures, floor))
         moved = [one for one in checks if one.kind == "absolute" and one.weighs != "pass"]
         same_equations = tolerances.Place(
-            scene.name, planned.model, own.given.reference, "theta_rms"
+            scene.name, planned.variant.label, own.given.reference, "theta_rms"
         )
         if moved and reference and own.kind(same_equations) == "numerical":
             # the reference's own figures; one that is not as expected itself is no yardstick
@@ -609,7 +605,7 @@ class SuiteStudy(Study):
         against = [[name, one.key if one else "", windows] for name, one, windows in asked]
         # with the code of this module and of `compare`
         depends = [planned.key, against, sorted(ends.items()), provenance.code_digest(__name__)]
-        name = name_of(planned.place, planned.model, provenance.digest(json.dumps(depends)))
+        name = name_of(planned.place, planned.variant.label, provenance.digest(json.dumps(depends)))
         compute = partial(self._figures, planned, asked, ends)
         return self.store.once(COMPARISONS, name, ComparisonRecord, compute)
 
@@ -690,7 +686,7 @@ class SuiteStudy(Study):
         costs: Sequence[results.CostRecord],
         whole: results.EnsembleRecord,
     ) -> results.Cell:
-        name, label = batches[0].place, batches[0].model
+        name, label = batches[0].place, batches[0].variant.label
         mine, others, reason = whole.samples[label], whole.finished, ""
         if mine.failures:
             first = mine.outcomes[int(np.argmin(np.isfinite(mine.peaks)))]

@@ -8,13 +8,11 @@ from typing import Any
 
 from rockcheck.scenes import printable, writing
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, text
+from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, Verdict, text
 from rockcheck.validation.suite import results, tolerances
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
-#: Measures whose figure is yes or no.
-YES_NO = {measure.name for measure in tolerances.MEASURES.values() if measure.yes_no}
 OUTCOMES = (
     "peak: largest rotation; apart: RMS difference from the reference, to the horizon of"
     " predictability; in alpha"
@@ -86,13 +84,13 @@ def _verdict_row(cell: results.Cell) -> list[Any]:
     weighed = [
         one
         for one in cell.checks
-        if one.verdict == "fail" or (one.limit and one.figure.measure not in YES_NO)
+        if one.verdict == "fail" or (one.limit and not tolerances.known(one.figure.measure).yes_no)
     ]
     near = max(weighed, key=used, default=None)
     unsure = ", not converged" if cell.converged is False else ""
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
     idle = cell.status == "done" and not cell.checks
-    state: results.Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
+    state: Verdict = "changed" if cell.words == "no tolerance yet" else cell.verdict
     return [
         cell.model,
         judged if cell.status == "done" else cell.reason or "failed",
@@ -102,7 +100,7 @@ def _verdict_row(cell: results.Cell) -> list[Any]:
 
 
 def _limit_used(check: results.Check) -> float | str:
-    if check.figure.measure in YES_NO:
+    if tolerances.known(check.figure.measure).yes_no:
         return figures.value_words(check.figure.value, yes_no=True)
     return "-" if check.words == "no tolerance yet" else used(check)
 
@@ -218,25 +216,25 @@ def used(check: results.Check) -> float:
     Infinite where that cannot be said. 0 for a check that is not defined, of a yes-or-no measure,
     and for a better figure whose limit lies around the outdated expected value.
     """
-    value, limit, fails = check.figure.value, check.limit, check.verdict == "fail"
+    measure, value, limit = tolerances.known(check.figure.measure), check.figure.value, check.limit
+    fails = check.verdict == "fail"
     if check.verdict == "not defined" or (check.verdict == "better" and check.beside is not None):
         return 0.0
     if value is None or limit is None or check.gap:
         return math.inf
-    if not limit or check.figure.measure in YES_NO:
+    if not limit or measure.yes_no:
         return math.inf if fails else 0.0
     most = math.inf if fails else 1.0
     if check.ideal is None:  # an "at least" measure: the needed share of the value
         return min(limit / value if value > 0.0 else math.inf, most)
-    role = getattr(tolerances.MEASURES.get(check.figure.measure), "role", "error")
-    floor = 0.0 if role == "error" else check.floor
+    floor = 0.0 if measure.role == "error" else check.floor
     return min(tolerances.apart(value, check.ideal, floor) / limit, most)
 
 
 def share(check: results.Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
-    if figure.measure in YES_NO:
+    if tolerances.known(figure.measure).yes_no:
         return f"{figure.windowed} {figures.value_words(figure.value, yes_no=True)}"
     value = (
         "-"

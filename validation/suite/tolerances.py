@@ -60,6 +60,8 @@ from rockcheck.validation.uncertainty.numerical import Numerical
 MEASURES: Mapping[str, figures.Measure] = ChainMap(
     measures.DIFFERENCES, measures.FIGURES, measures.STATISTICS
 )
+#: In place of a measure that only another version has: nothing is known of it.
+UNKNOWN = figures.Measure("", "", "", "", float, resolution=0.0)
 #: The third name of a table of a cell's own figures, in place of a reference model.
 OWN_FIGURES = "figures"
 HORIZON = "horizon"
@@ -81,6 +83,11 @@ def measure_of(what: str) -> figures.Measure:
             f"window {printable(window)!r} of {name}: give seconds such as 8s, or {HORIZON}"
         )
     return MEASURES[name]
+
+
+def known(name: str) -> figures.Measure:
+    """The measure of a figure of any run; `UNKNOWN` where this version has none of that name."""
+    return MEASURES.get(name, UNKNOWN)
 
 
 class Tolerance(Frozen):
