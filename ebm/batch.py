@@ -22,31 +22,26 @@ _CHUNK = 256
 
 @dataclass(frozen=True, kw_only=True)
 class Outcomes:
-    """What a batch found, one value a run.
+    """What a batch found.
 
-    `side` is -1 overturned left, +1 overturned right, 0 not overturned; `peak` the largest |theta|
-    in rad (pi/2 when overturned; rotations after the outcome is certain are counted too), `t` the
-    time in sqrt(R/g) at which the run was decided, and `motion`, a MOTION, where it then was;
-    `steps` the number of Taylor expansions.
+    `runs` has a FOUND a run: `t`, in sqrt(R/g), and `motion` are those at which it was decided;
+    `peak` is pi/2 when it overturned, and counts rotations after the outcome is certain, too. `out`
+    has, as asked for, columns (x, y, theta and their rates) of the first `rows` output rows.
     """
 
-    side: NDArray[np.int8]
-    motion: NDArray[np.void]
-    t: Floats
-    peak: Floats
-    #: How each run ended, a key of `ebm.core.names.FAILURES` where it failed; and whether it then
-    #: was at rest.
-    ending: NDArray[np.int64]
-    steps: NDArray[np.int64]
-    at_rest: NDArray[np.bool_]
-    #: As asked for, columns (x, y, theta and their rates) of its first `rows` output rows.
-    rows: NDArray[np.int64]
+    runs: NDArray[np.void]
     out: Floats
+
+    @property
+    def side(self) -> NDArray[np.int8]:
+        """-1 overturned left, 1 overturned right, 0 not overturned."""
+        overturned = self.runs["ending"] == Ending.OVERTURNED
+        return np.where(overturned, -np.sign(self.runs["motion"]["theta"]), 0.0).astype(np.int8)
 
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Which runs reached a cap or had no consistent motion."""
-        return ~np.isin(self.ending, (Ending.DONE, Ending.OVERTURNED))
+        return ~np.isin(self.runs["ending"], (Ending.DONE, Ending.OVERTURNED))
 
 
 def run_batch(
@@ -70,10 +65,8 @@ def run_batch(
     """
     if not model.decides:
         raise InputError("a batch has Coulomb's friction or none", "friction")
-    count = len(packed.durations)
+    count = len(packed.given)
     found = np.empty(count, FOUND)
-    if until_decided:
-        packed = packed._replace(durations=np.full(count, 1e6))
 
     def chunk(first: int) -> Floats:
         some = found[first : first + _CHUNK]
@@ -81,8 +74,9 @@ def run_batch(
         out, modes = np.zeros((size, rows, 6)), np.zeros((size, rows), dtype=np.int8)
         states = state_for(model, min(model.most_steps, 2_000_000), until_decided)
         records = Records(out, modes, np.empty((size, 0, 5)))
-        given = packed.part(slice(first, first + size)), states, workspace(), records, some
-        loop_of(model, *given)(*given)
+        part = packed._replace(given=packed.given[first : first + size])
+        work = part, states, workspace(), records, some
+        loop_of(model, *work)(*work)
         return out[:, :, columns].copy()
 
     kept = [np.empty((0, rows, 6))[:, :, columns]]
@@ -90,15 +84,10 @@ def run_batch(
         for n, out in enumerate(pool.map(chunk, range(0, count, _CHUNK)), 1):
             kept.append(out)
             on_progress(min(_CHUNK * n, count), count)
-    overturned = found["ending"] == Ending.OVERTURNED
-    outcomes = Outcomes(
-        side=np.where(overturned, -np.sign(found["motion"]["theta"]), 0.0).astype(np.int8),
-        out=np.concatenate(kept),
-        **{name: found[name].copy() for name in FOUND.names or ()},
-    )
+    outcomes = Outcomes(runs=found, out=np.concatenate(kept))
     if strict and outcomes.failed.any():
         first = int(np.argmax(outcomes.failed))
-        why = FAILURES[int(outcomes.ending[first])]
+        why = FAILURES[int(found["ending"][first])]
         raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
     return outcomes
 
@@ -113,7 +102,6 @@ def run_decided(
     """`run_batch` until all is decided; a run that fails is made once more by `model.finer()`."""
     found = run_batch(packed, model, strict=False, jobs=jobs, on_progress=on_progress)
     if (again := found.failed).any():
-        finer = run_batch(packed.part(again), model.finer(), strict=False, jobs=jobs)
-        for mine, better in zip(vars(found).values(), vars(finer).values(), strict=True):
-            mine[again] = better
+        some = packed._replace(given=packed.given[again])
+        found.runs[again] = run_batch(some, model.finer(), strict=False, jobs=jobs).runs
     return found

@@ -18,7 +18,7 @@ from rockcheck.ebm.core import march
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import FORM, ground_of
 from rockcheck.ebm.core.names import LAWS, Shape
-from rockcheck.ebm.core.state import MOTION, STATE, Base, Rows
+from rockcheck.ebm.core.state import GIVEN, STATE, Base, Rows
 from rockcheck.scenes import Floats, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
@@ -126,18 +126,20 @@ def pack(scenes: Sequence[Scene], model: Any) -> Rows:
     for scene in scenes:
         model.check(scene)
     grounds = [ground for scene in scenes for ground in base_of(scene)]
-    forms = np.array([ground.form for ground in grounds], dtype=FORM)
-    forms["first"] = np.cumsum(forms["count"]) - forms["count"]
-    units = np.array([time_unit(scene) for scene in scenes])
-    return Rows(
-        settings=np.array([setting_of(scene, model) for scene in scenes], SETTING),
-        horizontal=forms[::2].copy(),
-        vertical=forms[1::2].copy(),
-        starts=np.array([tuple(state_of(scene).tolist()) for scene in scenes], MOTION),
-        durations=np.array([scene.duration for scene in scenes]) / units,
-        output_steps=np.array([scene.output_step for scene in scenes]) / units,
-        samples=np.concatenate([np.empty(0), *(ground.samples for ground in grounds)]),
-    )
+    forms = np.array([ground.form for ground in grounds], FORM).reshape(-1, 2)
+    forms["first"] = np.cumsum(forms["count"]).reshape(-1, 2) - forms["count"]
+    given = [
+        (
+            setting_of(scene, model),
+            *both,
+            tuple(state_of(scene).tolist()),
+            scene.duration / time_unit(scene),
+            scene.output_step / time_unit(scene),
+        )
+        for scene, both in zip(scenes, forms, strict=True)
+    ]
+    samples = [np.empty(0), *(ground.samples for ground in grounds)]
+    return Rows(np.array(given, GIVEN), np.concatenate(samples))
 
 
 def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Rows:
@@ -146,17 +148,17 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     `amplitudes` (m/s^2) and `periods` (s) are 1-D arrays of one length.
     """
     pulse = scene.excitation.model_copy(update={"amplitude": 1.0, "period": 1.0})
-    *columns, samples = pack([scene.replace(excitation=pulse)], model)
-    rows = Rows._make([*(np.repeat(column, len(periods)) for column in columns), samples])
+    one, samples = pack([scene.replace(excitation=pulse)], model)
+    given = np.repeat(one, len(periods))
     # A pulse of amplitude a and period T is a times the unit pulse at time t/T.
-    horizontal, ratio = rows.horizontal, 1.0 / periods
+    horizontal, ratio = given["horizontal"], 1.0 / periods
     bell = horizontal["kind"][0] == Shape.GAUSSIAN
     for power in range(4):
         horizontal[f"c{power}"] *= amplitudes * (ratio**power if bell else 1.0)
     horizontal["rate"] *= ratio**2 if bell else ratio
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods
-    return rows
+    return Rows(given, samples)
 
 
 def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArray[np.void]:

@@ -228,20 +228,20 @@ def play_motions(
     played = [made(a if changing else 1.0, f) for a, f in nodes]
     lengths = np.array([one.duration / natural.time_unit(one) for one in played])
     packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
-    packed = packed._replace(durations=lengths, output_steps=lengths / parts)
+    packed.given["duration"], packed.given["output_step"] = lengths, lengths / parts
     found = batch.run_batch(
         packed, model, until_decided=False, rows=parts + 1, strict=False, jobs=jobs
     )
     motions: list[Motion | None] = []
-    for one, failed, side, at_rest, states, written in zip(
-        played, found.failed, found.side, found.at_rest, found.out, found.rows, strict=True
+    for one, failed, side, run, states in zip(
+        played, found.failed, found.side, found.runs, found.out, strict=True
     ):
-        x, y, theta = natural.to_si(one, states[: max(int(written), 1)])[:, :3].T
+        x, y, theta = natural.to_si(one, states[: max(int(run.rows), 1)])[:, :3].T
         t = one.duration / parts * np.arange(len(theta))
         upright = np.logical_and.accumulate(np.abs(theta) < 0.5 * math.pi)
         rows = np.column_stack([t, theta, x, y])[: max(int(upright.sum()), 1)]
         outcome = {LEFT: "overturned left", RIGHT: "overturned right"}.get(
-            int(side), "at rest" if at_rest else "moving"
+            int(side), "at rest" if run.at_rest else "moving"
         )
         motions.append(None if failed else Motion(one.block, rows, outcome))
     return motions

@@ -19,6 +19,9 @@ from rockcheck.ebm.core.state import NEW_STATE, Base, Records, Run, mode_code, r
 from rockcheck.ebm.core.strike import strike
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
+#: The duration of a run that ends as soon as it is decided.
+_ENDLESS = 1e6
+
 
 def loop_with(friction: ModuleType) -> object:
     """The function that plays the rows of `play`: the event loop with four doors of `friction`."""
@@ -67,17 +70,17 @@ def loop_with(friction: ModuleType) -> object:
         """
         state = states[0]
         begins[0].control = state.control
-        for i in range(len(rows.durations)):
+        for i in range(len(rows.given)):
+            given, samples = rows.given[i], rows.samples
             states[0] = begins[0]
-            state.motion = rows.starts[i]
-            state.t_end, state.control.output_step = rows.durations[i], rows.output_steps[i]
-            sideways, upward, samples = rows.horizontal[i], rows.vertical[i], rows.samples
+            state.motion, state.control.output_step = given.motion, given.output_step
+            state.t_end, sideways, upward = given.duration, given.horizontal, given.vertical
             base = Base(
                 ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
                 ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
             )
             written = Records(records.out[i], records.out_mode[i], records.log[i])
-            march(rows.settings[i], base, Run(state, work[0], work[1], written))
+            march(given.setting, base, Run(state, work[0], work[1], written))
             kept = found[i]
             kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
             kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
@@ -91,6 +94,8 @@ def begin(block, base, run):
     """Prepares the first mode at t = 0, in a state that is new but for its motion and control."""
     state, motion, control = run.state, run.state.motion, run.state.control
     state.peak = abs(motion.theta)
+    if control.until_decided:
+        state.t_end = _ENDLESS
     # All that a block does before it topples happens within alpha. Terms fall like the powers of a
     # ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what
     # is left out is a geometric series. It may be half of the tolerance.

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core import names
-from rockcheck.ebm.core.block import filled, record
+from rockcheck.ebm.core.block import SETTING, filled, record
 from rockcheck.ebm.core.contact_impacts import IMPACT
-from rockcheck.ebm.core.ground import Ground
+from rockcheck.ebm.core.ground import FORM, Ground
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Pivot, Row
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.settle import SETTLE
@@ -149,6 +149,16 @@ NEW_STATE = np.array(
     ]
 )
 
+#: What each of many runs begins with: block, floor and walls, the base motion, the motion; and how
+#: long it lasts, if not until it is decided, and how far apart its output rows are.
+GIVEN = record(
+    setting=SETTING,
+    horizontal=FORM,
+    vertical=FORM,
+    motion=MOTION,
+    duration="f8",
+    output_step="f8",
+)
 #: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an
 #: Ending), counts of its steps and of the rows written, and whether it then stood at rest.
 FOUND = record(motion=MOTION, t="f8", peak="f8", ending="i8", steps="i8", rows="i8", at_rest="?")
@@ -162,23 +172,10 @@ class Base(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """The input of runs, a row each.
+    """The input of runs: a GIVEN each, and the samples of all base motions."""
 
-    A SETTING, two FORMs, the MOTION at the start, the duration and the spacing of the output rows;
-    and the samples of all.
-    """
-
-    settings: NDArray[np.void]
-    horizontal: NDArray[np.void]
-    vertical: NDArray[np.void]
-    starts: NDArray[np.void]
-    durations: Floats
-    output_steps: Floats
+    given: NDArray[np.void]
     samples: Floats
-
-    def part(self, part: "slice | NDArray[np.bool_]") -> "Rows":
-        """Some of the runs. The samples stay those of all."""
-        return Rows._make([*(column[part] for column in self[:-1]), self.samples])
 
 
 class Records(NamedTuple):

@@ -160,22 +160,22 @@ def test_as_one_at_a_time():
     for i, scene in enumerate(ENSEMBLE):
         history = UNILATERAL.simulate(scene)
         theta = history.channels["theta"]
-        assert np.array_equal(found.out[i, : found.rows[i]], theta)
+        assert np.array_equal(found.out[i, : found.runs[i].rows], theta)
         fallen = {-1: "overturned left", 1: "overturned right"}.get(int(found.side[i]))
         assert fallen == (history.outcome if "overturned" in history.outcome else None)
         if fallen:
-            assert found.motion["theta"][i] == -0.5 * math.pi * found.side[i]
-            assert found.peak[i] == pytest.approx(0.5 * math.pi)
+            assert found.runs[i].motion.theta == -0.5 * math.pi * found.side[i]
+            assert found.runs[i].peak == pytest.approx(0.5 * math.pi)
         else:
-            assert found.peak[i] >= np.max(np.abs(theta)) > found.peak[i] - 1e-3
-            assert found.motion["theta"][i] == pytest.approx(theta[-1], abs=1e-12)
+            assert found.runs[i].peak >= np.max(np.abs(theta)) > found.runs[i].peak - 1e-3
+            assert found.runs[i].motion.theta == pytest.approx(theta[-1], abs=1e-12)
 
 
 @pytest.mark.parametrize("jobs", [1, 2, 5])
 def test_threads_change_nothing(jobs):
     once, again = batch(ENSEMBLE, rows=50), batch(ENSEMBLE * 20, rows=50, jobs=jobs)
-    for name, times in (("out", (20, 1, 1)), ("peak", 20)):
-        assert np.array_equal(np.tile(getattr(once, name), times), getattr(again, name))
+    assert np.array_equal(np.tile(once.out, (20, 1, 1)), again.out)
+    assert np.array_equal(np.tile(once.runs, 20), again.runs)
 
 
 @pytest.mark.parametrize(

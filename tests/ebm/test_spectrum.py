@@ -104,9 +104,9 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
 
     def failing(packed, model, **rest):
         found = run(packed, model, **rest)
-        tolerances.append((len(packed.durations), model.tolerance))
+        tolerances.append((len(packed.given), model.tolerance))
         if len(tolerances) == 1:
-            found.ending[1], found.side[1] = Ending.TOO_MANY_STEPS, 0
+            found.runs["ending"][1] = Ending.TOO_MANY_STEPS
         return found
 
     monkeypatch.setattr(batch, "run_batch", failing)
@@ -133,11 +133,11 @@ def test_a_block_that_rocks_for_ever_beside_an_elastic_wall_is_safe(tolerance):
     early = batch.run_batch(batch.pack(nodes, model), model)
     fine = EventBasedModel(tolerance=1e-13)
     whole = batch.run_batch(batch.pack(nodes, fine), fine, until_decided=False)
-    assert early.steps.max() < 500 < whole.steps.min()
+    assert early.runs["steps"].max() < 500 < whole.runs["steps"].min()
     np.testing.assert_allclose(
-        early.peak, whole.peak, rtol=100.0 * tolerance + 1e-9
+        early.runs["peak"], whole.runs["peak"], rtol=100.0 * tolerance + 1e-9
     )  # errors before the wall grow
-    energy = np.cos(PAPER_BLOCK.alpha - early.peak) - np.cos(PAPER_BLOCK.alpha)
+    energy = np.cos(PAPER_BLOCK.alpha - early.runs["peak"]) - np.cos(PAPER_BLOCK.alpha)
     assert (
         energy / (1.0 - np.cos(PAPER_BLOCK.alpha))
     ).max() > 0.9  # where impacts might add what is missing
@@ -153,9 +153,11 @@ def decided_early(scenes, tolerance, **near):
     )
     np.testing.assert_array_equal(early.side, whole.side)
     np.testing.assert_allclose(
-        early.peak, np.maximum(whole.peak, np.abs(whole.out[..., 2]).max(axis=1)), **near
+        early.runs["peak"],
+        np.maximum(whole.runs["peak"], np.abs(whole.out[..., 2]).max(axis=1)),
+        **near,
     )
-    assert np.sum(early.steps) < np.sum(whole.steps)
+    assert np.sum(early.runs["steps"]) < np.sum(whole.runs["steps"])
     return early
 
 
@@ -200,8 +202,8 @@ def test_beside_a_wall_a_safe_block_is_known_before_the_pulse_is_over():
     nodes = grid(5.0, Wall(side="left", gap=0.003))
     early = decided_early(nodes, 1e-9, rtol=1e-6)
     quiet = np.array([quiet_from(natural.base_of(node), 1e-9) for node in nodes])
-    safe = (early.side == 0) & (early.peak > 0.0)
-    assert np.count_nonzero(early.t[safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
+    safe = (early.side == 0) & (early.runs["peak"] > 0.0)
+    assert np.count_nonzero(early.runs["t"][safe] < quiet[safe]) > 0.8 * np.count_nonzero(safe) > 20
 
 
 def test_what_is_decided_early_of_loaded_blocks():

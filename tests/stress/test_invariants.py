@@ -137,15 +137,19 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_invariant_notices_its_fault(name, monkeypatch):
-    plain, play = EventBasedModel.simulate, invariants.batch.run_batch
+    plain, play, pack = EventBasedModel.simulate, invariants.batch.run_batch, invariants.batch.pack
     monkeypatch.setattr(
         EventBasedModel, "simulate", lambda *given: spoilt(plain(*given), **FAULTS[name])
     )
     monkeypatch.setattr(
         invariants.batch,
         "run_batch",
-        lambda *given, **how: dataclasses.replace(
-            play(*given, **how), peak=np.array([1.0 * how["until_decided"]])
+        lambda given, model, **how: play(
+            pack([SLIDES_AND_HITS.replace(excitation=Rest())], model)
+            if how["until_decided"]
+            else given,
+            model,
+            **how,
         ),
     )
     played = check_run(

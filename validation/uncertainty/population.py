@@ -38,7 +38,7 @@ def play(scenes: Sequence[Scene], model: EventBasedModel) -> tuple[float, ...]:
     from rockcheck.ebm.batch import pack, run_decided
 
     found = run_decided(pack(scenes, model), model, jobs=1)
-    rotations = found.peak / np.array([scene.block.alpha for scene in scenes])
+    rotations = found.runs["peak"] / np.array([scene.block.alpha for scene in scenes])
     return tuple(np.where(found.failed, np.nan, np.where(found.side, np.inf, rotations)).tolist())
 
 
@@ -237,13 +237,13 @@ def propagate(
     # The scene itself, and its draws.
     scenes = [given.scene, *map(given.at, values)]
     found, peaks = _played(scenes, model, rows=len(given.scene.output_times))
-    ended = np.arange(found.out.shape[1]) >= found.rows[:, None]
-    theta = np.where(ended, found.motion["theta"][:, None], found.out)[1:]
+    ended = np.arange(found.out.shape[1]) >= found.runs["rows"][:, None]
+    theta = np.where(ended, found.runs["motion"]["theta"][:, None], found.out)[1:]
     low, high = _ends(theta / given.scene.block.alpha)
     slips = np.array(
         [
             kinematics.slip(scene.block, x, tilt)
-            for scene, end in zip(scenes, found.motion.tolist(), strict=True)
+            for scene, end in zip(scenes, found.runs["motion"].tolist(), strict=True)
             for x, _, tilt, *_ in natural.to_si(scene, np.array([end]))
         ]
     )
@@ -288,7 +288,7 @@ def _played(
 
     found = run_batch(pack(scenes, model), model, until_decided=False, rows=rows, columns=2)
     alphas = np.array([scene.block.alpha for scene in scenes])
-    return found, np.minimum(found.peak / alphas, 1.0)
+    return found, np.minimum(found.runs["peak"] / alphas, 1.0)
 
 
 def sensitivities(

@@ -311,9 +311,9 @@ def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
     )
     whole, decided = model.simulate(scene), run_batch(pack([scene], model), model)
     assert (whole.outcome, decided.side[0]) == ("overturned right", 1)
-    assert decided.peak[0] == pytest.approx(0.5 * math.pi)
+    assert decided.runs[0].peak == pytest.approx(0.5 * math.pi)
     unit = math.sqrt(PAPER_BLOCK.radius / scene.gravity)
-    assert decided.t[0] * unit < whole.event_list[-1].t - 0.1
+    assert decided.runs[0].t * unit < whole.event_list[-1].t - 0.1
 
 
 def test_every_modelling_choice_has_a_pinned_scene():

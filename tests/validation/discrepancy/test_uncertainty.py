@@ -122,7 +122,7 @@ def peaks_of(given, points):
     """Peaks (alpha, at most 1) at points of the unit cube."""
     model = EventBasedModel(pivot="unilateral", tolerance=1e-8)
     scenes = [given.at(row) for row in given.values(points)]
-    peak = run_batch(pack(scenes, model), model, until_decided=False).peak
+    peak = run_batch(pack(scenes, model), model, until_decided=False).runs["peak"]
     return np.minimum(peak / given.scene.block.alpha, 1.0)
 
 

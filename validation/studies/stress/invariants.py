@@ -423,16 +423,17 @@ def _decided_apart(model: EventBasedModel, scene: Scene) -> float:
         return 0.0
     rows, capped = batch.pack([scene], model), model.model_copy(update={"most_steps": MOST_STEPS})
     quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
-    ends = rows.durations / scene.duration * quiet + SETTLED
-    rows = rows._replace(durations=ends, output_steps=ends / MOST_ROWS)
+    ends = rows.given["duration"] / scene.duration * quiet + SETTLED
+    rows.given["duration"], rows.given["output_step"] = ends, ends / MOST_ROWS
     early, whole = (
         batch.run_batch(rows, capped, until_decided=not count, rows=count, strict=False, jobs=1)
         for count in (0, MOST_ROWS)
     )
-    if early.failed[0] or not (whole.side[0] or whole.at_rest[0]):
+    decided, run = early.runs[0], whole.runs[0]
+    if early.failed[0] or not (whole.side[0] or run.at_rest):
         return 0.0
-    seen = np.max(np.abs(whole.out[0, : whole.rows[0], 2])) - whole.peak[0]
-    apart = max(abs(early.peak - whole.peak)[0], seen)
+    seen = np.max(np.abs(whole.out[0, : run.rows, 2])) - run.peak
+    apart = max(abs(decided.peak - run.peak), seen)
     return float(apart) if early.side == whole.side else math.pi
 
 

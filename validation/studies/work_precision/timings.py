@@ -182,15 +182,15 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
             found[tolerance] = play(model)
             costs[tolerance].append((time.process_time() - began_cpu, time.perf_counter() - began))
     for tolerance, outcomes in found.items():
-        error, one = np.abs(outcomes.peak - reference.peak), median(ones)
+        error, one = np.abs(outcomes.runs["peak"] - reference.runs["peak"]), median(ones)
         cpu, wall = (
-            median(some) / len(packed.durations) for some in zip(*costs[tolerance], strict=True)
+            median(some) / len(packed.given) for some in zip(*costs[tolerance], strict=True)
         )
         rows.append(
             BatchTime(
                 case=name,
                 tolerance=tolerance,
-                runs=len(packed.durations),
+                runs=len(packed.given),
                 cpu=cpu,
                 wall=wall,
                 evaluations=cpu / one,
@@ -313,7 +313,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
         model = EventBasedModel(tolerance=1e-8, **settings)
         packed = pack_pulses(scene, model, strengths, periods)
         run = partial(run_batch, packed, model, until_decided=until_decided, strict=False, jobs=1)
-        return _timed(lambda _: run(), len(packed.durations)), run
+        return _timed(lambda _: run(), len(packed.given)), run
 
     sticky = PLAIN.replace(floor=Floor(friction=1.3))
     basis = batch(PLAIN)
