@@ -10,7 +10,6 @@ from scipy.signal import cont2discrete, lfilter
 
 from rockcheck.scenes import Record, Rest, Ricker, Sine
 from rockcheck.scenes.recordings import intensity
-from rockcheck.scenes.recordings.oscillator import largest_response
 from rockcheck.scenes.recordings.recording import Recording
 
 
@@ -125,14 +124,13 @@ def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping)
 
 @pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
 def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
-    samples, parts = np.random.default_rng(3).normal(size=40), 2
-    step, rate, damping, tail = 0.01, math.tau / period, 0.1, 30
-    above, below, _ = cont2discrete(
-        ([rate**2], [1.0, 2.0 * damping * rate, rate**2]), step, method="foh"
-    )
+    samples, parts = np.random.default_rng(3).normal(size=40), math.ceil(0.8 / period)
+    rate = math.tau / period
+    record = Recording(samples=samples, time_step=0.01, unit="m/s2", form="CSV")
+    above, below, _ = cont2discrete(([rate**2], [1.0, 0.2 * rate, rate**2]), 0.01 / parts, "foh")
     ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
-    assert largest_response(samples, parts, tail, step, rate, damping) == pytest.approx(
-        np.max(np.abs(lfilter(np.ravel(above), below, np.r_[ground, np.zeros(tail)]))), rel=1e-9
+    assert intensity.spectral_acceleration(record, period, 0.1) * G == pytest.approx(
+        np.max(np.abs(lfilter(np.ravel(above), below, np.r_[ground, np.zeros(320)]))), rel=1e-9
     )
 
 
