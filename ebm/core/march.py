@@ -1,12 +1,11 @@
 """The event loop: expand, locate, sample, advance, resolve, select, until the end. Natural units.
 
 docs/theory.md, "How an event is handled", goes with this file. What depends on friction stands
-behind four doors: `expand`, `locate`, `advance` and `after_event` of ebm.core.coulomb or
-ebm.core.bouc_wen.
+behind four doors of the module `friction`, ebm.core.coulomb or ebm.core.bouc_wen: `expand`,
+`locate`, `advance` and `after_event`.
 """
 
 import math
-from types import ModuleType
 
 import numpy as np
 
@@ -23,70 +22,65 @@ from rockcheck.scenes.compiled import inner_kernel, kernel
 _ENDLESS = 1e6
 
 
-def loop_with(friction: ModuleType) -> object:
-    """The function that plays the rows of `play`: the event loop with four doors of `friction`."""
-    expand, locate = friction.expand, friction.locate
-    advance_friction, after_event = friction.advance, friction.after_event
+@inner_kernel
+def march(friction, block, base, run):
+    """Simulates from the state's motion at t = 0 to its t_end, in the state."""
+    state = run.state
+    begin(block, base, run)
+    while state.ending == Ending.GOING:
+        if state.changing:
+            state.changing = False
+            friction.after_event(block, base, run)
+        elif steps.waits(base, state):
+            steps.rest(block, base, run)
+        elif steps.may_go_on(block, base, run):
+            step(friction, block, base, run)
+    end(run)
 
-    @inner_kernel
-    def march(block, base, run):
-        """Simulates from the state's motion at t = 0 to its t_end, in the state."""
-        state = run.state
-        begin(block, base, run)
-        while state.ending == Ending.GOING:
-            if state.changing:
-                state.changing = False
-                after_event(block, base, run)
-            elif steps.waits(base, state):
-                steps.rest(block, base, run)
-            elif steps.may_go_on(block, base, run):
-                step(block, base, run)
-        end(run)
 
-    @inner_kernel
-    def step(block, base, run):
-        """One Taylor step, and the event that ends it."""
-        state = run.state
-        smooth = min(ground.smooth_until(base, state.t), state.t_end)
-        expand(block, base, run, smooth - state.t)
-        state.smooth_until = smooth  # not before: what is known of the base would be read again
-        state.tau = math.nan
-        if state.length > 0.0:  # no step is good for a series that is not finite
-            locate(block, run)
-        if not math.isfinite(state.tau):
-            state.ending = Ending.NOT_FINITE
-            return
-        steps.sample(block, run)
-        steps.advance(block, base, run)
-        advance_friction(run)
-        if not steps.passes_on(block, base, run):
-            resolve(block, base, run)
+@inner_kernel
+def step(friction, block, base, run):
+    """One Taylor step, and the event that ends it."""
+    state = run.state
+    smooth = min(ground.smooth_until(base, state.t), state.t_end)
+    friction.expand(block, base, run, smooth - state.t)
+    state.smooth_until = smooth  # not before: what is known of the base would be read again
+    state.tau = math.nan
+    if state.length > 0.0:  # no step is good for a series that is not finite
+        friction.locate(block, run)
+    if not math.isfinite(state.tau):
+        state.ending = Ending.NOT_FINITE
+        return
+    steps.sample(block, run)
+    steps.advance(block, base, run)
+    friction.advance(run)
+    if not steps.passes_on(block, base, run):
+        resolve(block, base, run)
 
-    @inner_kernel
-    def play_rows(rows, states, begins, work, records, found):
-        """Plays the rows one after the other in the state, and notes what is kept of each.
 
-        `begins` is a copy of NEW_STATE.
-        """
-        state = states[0]
-        begins[0].control = state.control
-        for i in range(len(rows.given)):
-            given, samples = rows.given[i], rows.samples
-            states[0] = begins[0]
-            state.motion, state.control.output_step = given.motion, given.output_step
-            state.t_end, sideways, upward = given.duration, given.horizontal, given.vertical
-            base = Base(
-                ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
-                ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
-            )
-            written = Records(records.out[i], records.out_mode[i], records.log[i])
-            march(given.setting, base, Run(state, work[0], work[1], written))
-            kept = found[i]
-            kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
-            kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
-            kept.at_rest = rests(state.mode)
+@inner_kernel
+def play_rows(friction, rows, states, begins, work, records, found):
+    """Plays the rows of `play` one after the other in the state, and notes what is kept of each.
 
-    return play_rows
+    `friction` is the module with its doors, `begins` a copy of NEW_STATE.
+    """
+    state = states[0]
+    begins[0].control = state.control
+    for i in range(len(rows.given)):
+        given, samples = rows.given[i], rows.samples
+        states[0] = begins[0]
+        state.motion, state.control.output_step = given.motion, given.output_step
+        state.t_end, sideways, upward = given.duration, given.horizontal, given.vertical
+        base = Base(
+            ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
+            ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
+        )
+        written = Records(records.out[i], records.out_mode[i], records.log[i])
+        march(friction, given.setting, base, Run(state, work[0], work[1], written))
+        kept = found[i]
+        kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
+        kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
+        kept.at_rest = rests(state.mode)
 
 
 @inner_kernel
@@ -135,9 +129,6 @@ def end(run):
         steps.sample_rest(run, np.inf)
 
 
-_play_rows, _play_rows_bouc_wen = loop_with(coulomb), loop_with(bouc_wen)
-
-
 @kernel
 def play(rows, states, work, records, found):
     """Plays runs one after the other, with Coulomb's friction.
@@ -147,13 +138,13 @@ def play(rows, states, work, records, found):
     `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
     after, impulse.
     """
-    _play_rows(rows, states, NEW_STATE.copy(), work, records, found)
+    play_rows(coulomb, rows, states, NEW_STATE.copy(), work, records, found)
 
 
 @kernel
 def play_bouc_wen(rows, states, work, records, found):
     """As `play`, with Bouc-Wen friction."""
-    _play_rows_bouc_wen(rows, states, NEW_STATE.copy(), work, records, found)
+    play_rows(bouc_wen, rows, states, NEW_STATE.copy(), work, records, found)
 
 
 #: The event loop with each friction of a model's settings.

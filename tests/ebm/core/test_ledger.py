@@ -65,7 +65,7 @@ def test_the_theory_page_links_each_stage_to_its_function():
         "Resolve",
         "Select",
     ]
-    loop = inspect.getsource(march.loop_with)
+    loop = inspect.getsource(march)
     places = []
     for _, module, name in stages:
         assert callable(getattr(importlib.import_module(f"rockcheck.ebm.core.{module}"), name))
