@@ -115,11 +115,9 @@ class Measure:
     resolution: float = 1e-6
 
     @property
-    def role(self) -> Literal["error", "quantity", "count"]:
-        """The kind of its values: an error has a perfect value, and the nearer to it the better."""
-        if self.ideal is not None or self.sense == "at least":
-            return "error"
-        return "quantity" if self.resolution else "count"
+    def is_error(self) -> bool:
+        """Whether it has a perfect value, the nearer to it the better; else it is a quantity."""
+        return self.ideal is not None or self.sense == "at least"
 
 
 def by_name(*measures: Measure) -> dict[str, Measure]:

@@ -227,7 +227,7 @@ def used(check: results.Check) -> float:
     most = math.inf if fails else 1.0
     if check.ideal is None:  # an "at least" measure: the needed share of the value
         return min(limit / value if value > 0.0 else math.inf, most)
-    floor = 0.0 if measure.role == "error" else check.floor
+    floor = 0.0 if measure.is_error else check.floor
     return min(tolerances.apart(value, check.ideal, floor) / limit, most)
 
 

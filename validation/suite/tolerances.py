@@ -17,20 +17,19 @@ holds where a scene has no line for the measure, and completes a scene's own lin
 (from `expected` for figures of the cell itself; for "at least" measures the value itself). All in
 the measure's unit.
 
-The judgement of a figure depends on its measure's role:
+The judgement of a figure depends on its measure:
 
-| role | distance within `limit` | better, where it moved by more than `drift` |
+| measure | distance within `limit` | better, where it moved by more than `drift` |
 |---|---|---|
 | error (has a perfect value) | from the perfect value | that distance fell by more than it |
 | quantity | from `expected`, beyond its floor | it came nearer to the reference's by more |
-| count | from `expected` | as a quantity |
 
 The move of a figure is its difference from `expected`, counting only the parts beyond their floor
-(`floor_of`): two values below it do not differ. The limit of an error is not changed by the floor.
-A figure that moved by more than `drift` is *better* if the last column holds, else *changed*;
-better passes, even for a quantity or count beyond its limit. A quantity is better only where the
-reference solves the same equations and is itself as expected (`runner`). A ratio to zero is *not
-defined*.
+(`floor_of`; a count has none): two values below it do not differ. The limit of an error is not
+changed by the floor. A figure that moved by more than `drift` is *better* if the last column holds,
+else *changed*; better passes, even for a quantity beyond its limit. A quantity is better only where
+the reference solves the same equations and is itself as expected (`runner`). A ratio to zero is
+*not defined*.
 """
 
 import math
@@ -131,7 +130,7 @@ def parse_tolerances(
                 raise InputError(
                     f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}"
                 )
-            if measure.ideal is None and measure.sense == "at most" and tolerance.expected is None:
+            if tolerance.expected is None and not measure.is_error:
                 raise InputError("is missing", "expected")
         except InputError as error:
             raise InputError(f"{printable(place)}: {error}") from None
@@ -190,7 +189,7 @@ def floor_of(measure: figures.Measure, scene: Scene, numerical: Numerical | None
         figures.between_rows(
             measure.unit, scene.frequency_parameter, scene.gravity, scene.output_step
         )
-        if measure.role == "quantity"
+        if not measure.is_error
         else 0.0
     )
     return max(measure.resolution, rows, next((u for u in known if u is not None), 0.0))
@@ -222,14 +221,14 @@ def judge(
     elif gap or tolerance is None:
         reason = gap or "no tolerance yet"
     else:
-        perfect = measure.ideal if measure.role == "error" else beside
+        perfect = measure.ideal if measure.is_error else beside
         verdict, reason = _verdict(figure, value, tolerance, measure, least, kind, perfect)
     return results.Check(
         figure=figure,
         kind=kind,
         verdict=verdict,
         reason=reason,
-        ideal=measure.ideal if measure.role == "error" else given.expected,
+        ideal=measure.ideal if measure.is_error else given.expected,
         expected=given.expected,
         limit=None if tolerance is None else tolerance.limit,
         drift=given.drift,
@@ -256,7 +255,7 @@ def _verdict(
     expected, drift = line.expected, math.inf if line.drift is None else line.drift
     moved = 0.0 if expected is None else apart(value, expected, floor, measure.ideal or 0.0)
     outside = _outside(figure, value, line, measure, moved)
-    if outside and measure.role == "error":
+    if outside and measure.is_error:
         return "fail", outside
     if expected is None or not (outside or moved > drift):
         return "pass", ""
@@ -282,8 +281,8 @@ def _outside(
     limit, unit = line.limit, "" if figure.unit == "1" else f" {figure.unit}"
     if measure.sense == "at least":
         return "" if value >= limit else f"{value:.4g} is below the limit {limit:.4g}{unit}"
-    ideal = measure.ideal if measure.role == "error" else line.expected
-    away = math.inf if ideal is None else abs(value - ideal) if measure.role == "error" else moved
+    ideal = measure.ideal if measure.is_error else line.expected
+    away = math.inf if ideal is None else abs(value - ideal) if measure.is_error else moved
     if away <= limit:
         return ""
     if limit:
@@ -406,7 +405,7 @@ def _bounds(check: results.Check, value: float, moved: float) -> tuple[float, fl
     )
     if measure.yes_no:
         limit, drift = size, moved  # 0: must be yes; 1: need not be
-    tighter = check.verdict == "better" and measure.role == "error"
+    tighter = check.verdict == "better" and measure.is_error
     if check.limit is not None and check.verdict != "fail":
         stricter = max if at_least else min
         limit = stricter(check.limit, limit) if tighter else check.limit

@@ -59,7 +59,10 @@ FLOOR = {"floor": 2.3e-5}
             (
                 measure,
                 line,
-                FLOOR if tolerances.MEASURES[measure].role == "quantity" else {},
+                FLOOR
+                if tolerances.MEASURES[measure].resolution
+                and not tolerances.MEASURES[measure].is_error
+                else {},
                 values,
             )
             for measure, line, values in (
