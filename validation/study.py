@@ -79,7 +79,7 @@ class Task:
         return provenance.digest(json.dumps(said, sort_keys=True))
 
     @cached_property
-    def file(self) -> str:
+    def kept_as(self) -> str:
         """The name of its kept record."""
         return name_of(type(self).__qualname__, self.key)
 
@@ -113,7 +113,7 @@ class Study(ABC):
     def find(self, store: Store, task: Task) -> Any:
         """The kept record of a task; None if there is none, or its fields do not fit."""
         with suppress(KeyError, ValueError):
-            found = store.get(RECORDS, task.file) or {}
+            found = store.get(RECORDS, task.kept_as) or {}
             return adapter_of(self.record).validate_python(found["record"])
         return None
 
@@ -121,7 +121,7 @@ class Study(ABC):
         """Keep the record of a task."""
         store.put(
             RECORDS,
-            task.file,
+            task.kept_as,
             {"record": adapter_of(self.record).dump_python(record, mode="json")},
         )
 
@@ -247,7 +247,9 @@ class _Run:
     def _end(self, task: Task, result: Any) -> None:
         self.done[task] = result
         if traceback := getattr(result, "traceback", ""):  # a result may have one, too
-            writing.write_whole(writing.made(self.folder, FAULTS) / f"{task.file}.txt", traceback)
+            writing.write_whole(
+                writing.made(self.folder, FAULTS) / f"{task.kept_as}.txt", traceback
+            )
         if not isinstance(result, pool.Failure):
             self.study.keep(self.store, task, result)
         self.heard(len(self.done), len(self.known), task.label)

@@ -44,10 +44,10 @@ class Planned(Task):
     """A cell to be played: a scene, or the scenes `numbers` of an `ensemble`, by a model.
 
     An ensemble's scenes are drawn from `scene`. `place` is the name of the scene, or of the
-    ensemble, `file` that of its files. `key` is the hash of all that the result depends on.
+    ensemble, `kept_as` that of its files. `key` is the hash of all that the result depends on.
     """
 
-    file: str = field()
+    kept_as: str = field()
     key: str = field(compare=False)
     place: str = field(compare=False)
     scene: Scene = field(compare=False)
@@ -411,7 +411,7 @@ class SuiteStudy(Study):
         """The kept record of a batch, or of a cell whose history is whole; else None."""
         kind, form = task.kept
         with suppress(ValueError):  # a kept record may lack fields that it must have
-            found = form(**(store.get(kind, task.file) or {}))
+            found = form(**(store.get(kind, task.kept_as) or {}))
             self.ended[task] = models.Played(found, read_back=True)
         return self.ended.get(task)
 
@@ -423,7 +423,7 @@ class SuiteStudy(Study):
         self.ended[task] = replace(record, files={}, history=None)
         if not record.traceback:  # else some scenes of a batch failed: not to be read back
             content = record.record.model_dump(mode="json")
-            self.store.put(task.kept[0], task.file, content, record.files, record.history)
+            self.store.put(task.kept[0], task.kept_as, content, record.files, record.history)
         if task.ensemble is None:
             self._compare(task.place)
 
@@ -508,7 +508,7 @@ class SuiteStudy(Study):
         status = "failed" if reason else "done"
         if missing := models.not_installed(variant.family):
             status = "absent" if models.class_of(variant.family).has_wheel() else "unavailable"
-        traced = [f"{FAULTS}/{part.file}.txt" for part in parts if self.ended[part].traceback]
+        traced = [f"{FAULTS}/{part.kept_as}.txt" for part in parts if self.ended[part].traceback]
         return {
             "scene": first.place,
             "model": variant.label,
@@ -554,7 +554,7 @@ class SuiteStudy(Study):
             **self._about(parts)
             | {
                 "settings": record.settings,
-                "history": f"{HISTORIES}/{planned.file}{TABLE}",
+                "history": f"{HISTORIES}/{planned.kept_as}{TABLE}",
                 "outcome": record.outcome,
                 "overturned_at": found.overturned_at,
                 "notes": record.notes,
@@ -616,12 +616,12 @@ class SuiteStudy(Study):
         ends: Mapping[str, float],
     ) -> ComparisonRecord:
         """The measures asked of a cell, each window to its end (s), else over the whole time."""
-        candidate, scene = self.store.load(planned.file), planned.scene
+        candidate, scene = self.store.load(planned.kept_as), planned.scene
         landing = landing_of(self.store, scene)
         parted = landing.t if landing else math.inf
         figures: list[Compared] = []
         for _, reference, windows in asked:
-            yardstick = self.store.load(reference.file) if reference else None
+            yardstick = self.store.load(reference.kept_as) if reference else None
             others = under_other_laws(scene, reference.variant) if reference and landing else {}
             for window, names in windows.items():
                 until = ends.get(window)

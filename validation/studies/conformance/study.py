@@ -646,12 +646,10 @@ KNOBS: dict[str, tuple[tuple[float, float], Mapping[str, str]]] = {
 class Calibration:
     """Parameters in the engine's own words, and the contact reached with them.
 
-    Reached are `restitution`, `friction` and `penetration` (m) at a `step` (s); `reached` tells
-    whether they are near enough to the wanted ones.
+    Reached are `restitution`, `friction` and `penetration` (m); `reached` tells whether they are
+    near enough to the wanted ones.
     """
 
-    engine: str
-    step: float
     parameters: dict[str, str]
     restitution: float
     friction: float
@@ -755,8 +753,6 @@ class Tune(Task):
         used = {"step": step, "restitution": found, "friction": asked, **model.tuned(step)}
         used |= {"push": -used.get("erp", 0.0) / step**2, "damp": -found / step}
         return Calibration(
-            self.engine,
-            step,
             {where: what.format_map(used) for where, what in words.items()},
             rebound,
             slid,
@@ -781,12 +777,11 @@ class Tuning(Study):
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
         """Tables of parameters and contacts reached. Raises `InputError` where no engine can."""
-        ended = list(map(done.get, self.wanted))
-        found = [one for one in ended if isinstance(one, Calibration)]
-        refused = [one for one in ended if isinstance(one, pool.Failure) and one.refused]
+        found = {task: one for task, one in done.items() if isinstance(one, Calibration)}
+        refused = [one for one in done.values() if isinstance(one, pool.Failure) and one.refused]
         if refused and not found:
             raise errors.InputError(refused[0].reason)
-        reached = sum(one.reached for one in found)
+        reached = sum(one.reached for one in found.values())
         return Finding(
             self.name,
             "Parameters for a wanted restitution",
@@ -795,7 +790,11 @@ class Tuning(Study):
                 Table(
                     "parameters",
                     [Column("engine", kind="model"), text("where"), text("what")],
-                    [[one.engine, *pair] for one in found for pair in one.parameters.items()],
+                    [
+                        [task.engine, *pair]
+                        for task, one in found.items()
+                        for pair in one.parameters.items()
+                    ],
                     "Parameters",
                 ),
                 Table(
@@ -810,15 +809,21 @@ class Tuning(Study):
                     ],
                     [
                         [
-                            *(one.engine, one.step, one.restitution, one.friction, one.penetration),
+                            *(task.engine, task.time_step),
+                            *(one.restitution, one.friction, one.penetration),
                             Mark(one.reached, "pass" if one.reached else "fail"),
                         ]
-                        for one in found
+                        for task, one in found.items()
                     ],
                     "Reached",
                 ),
             ],
-            {"engines": {one.engine: asdict(one) for one in found}},
+            {
+                "engines": {
+                    task.engine: {"engine": task.engine, "step": task.time_step, **asdict(one)}
+                    for task, one in found.items()
+                }
+            },
             "pass" if reached == len(self.wanted) else "fail",
             int(reached < len(self.wanted)),
         )
