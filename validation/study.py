@@ -18,7 +18,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic_core import to_jsonable_python
+from pydantic import BaseModel
 
 from rockcheck.scenes import progress, writing
 from rockcheck.validation.execute import models, pool, provenance
@@ -75,13 +75,18 @@ class Task:
     @cached_property
     def key(self) -> str:
         """Hash of what it depends on."""
-        said = to_jsonable_python([type(self).__qualname__, self.depends()], fallback=str)
-        return provenance.digest(json.dumps(said, sort_keys=True))
+        said = type(self).__qualname__, self.depends()
+        return provenance.digest(json.dumps(said, sort_keys=True, default=_plain))
 
     @cached_property
     def kept_as(self) -> str:
         """The name of its kept record."""
         return name_of(type(self).__qualname__, self.key)
+
+
+def _plain(value: object) -> Any:
+    # a scene's own words leave the samples of its record out
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
 
 
 class Study(ABC):
@@ -150,8 +155,7 @@ def run(
     began = time.monotonic()
     going = _Run(study, folder, jobs, scheduler, force, on_progress)
     ended = 0
-    with going.stack:
-        going.stack.callback(pool.THREADS.reset, pool.THREADS.set(jobs))
+    with going.stack, progress.within(pool.THREADS, jobs):
         try:
             going.play(began + 60.0 * minutes if minutes else math.inf)
         except KeyboardInterrupt:
