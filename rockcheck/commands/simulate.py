@@ -4,7 +4,6 @@ And `rockcheck warm`: compiles the models' code ahead, in several processes, so 
 for no compiler.
 """
 
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -184,10 +183,8 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
             raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
         raise errors.ModelFailure(f"{result.reason}{where}")
-    with tempfile.TemporaryDirectory() as folder:
-        for suffix, content in result.files.items():
-            (Path(folder) / f"history{suffix}").write_bytes(content)
-        return History.load(Path(folder) / f"history{store.TABLE}")
+    played: History = result.history
+    return played
 
 
 #: The parts that are compiled, the longest first: the models that run them. The event loops of both
