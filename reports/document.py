@@ -30,7 +30,7 @@ from rockcheck.reports.show.words import (
 )
 from rockcheck.scenes import InputError, errors, printable, reading, writing
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
-from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
+from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, hash_of, plain
 
 #: The folder of a page's figures.
 FIGURES = "figures"
@@ -38,6 +38,8 @@ FIGURES = "figures"
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
 #: The tables of a finding in its run.json: their rows by the names of the columns.
 TABLES = TypeAdapter(dict[str, list[dict[str, Any]]])
+#: Its further files there: their hashes by their names.
+FILES = TypeAdapter(dict[str, str])
 #: Of a verdict: its sign, and its colour on a terminal.
 VERDICTS = {
     "": ("", ""),
@@ -183,16 +185,20 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
 
 
 def _left_by_another(folder: Path, found: Finding) -> Iterator[Path]:
-    """Tables and figures of the run that was in the folder, which this one does not have.
+    """Tables, figures and files of the run that was in the folder, which this one does not have.
 
-    No other file is taken for one: a table has the columns that its run.json says, and a figure's
-    stamp is that of the data beside it.
+    No other file is taken for one: a table has the columns that its run.json says, a figure's stamp
+    is that of the data beside it, and a file has the hash that run.json says.
     """
-    before: dict[str, list[dict[str, Any]]] = {}
+    before, kept = dict[str, list[dict[str, Any]]](), dict[str, str]()
     with suppress(InputError, KeyError, TypeError, ValidationError):
-        before = TABLES.validate_python(
-            reading.read_json(reading.within(folder, "run.json"))["tables"]
-        )
+        told = reading.read_json(reading.within(folder, "run.json"))
+        before = TABLES.validate_python(told["tables"])
+        kept = FILES.validate_python(told["files"])
+    for name in kept.keys() - found.files:
+        with suppress(InputError):
+            if hash_of(reading.read_bytes(reading.within(folder, name))) == kept[name]:
+                yield folder / name
     for name in before.keys() - {table.name for table in found.tables()}:
         path = folder / f"{name}.csv"
         heads = tuple(writing.table_text([*row], []) for row in before[name][:1])

@@ -5,11 +5,17 @@ A table is described once. `rockcheck.reports.document` renders it; nothing here
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, ClassVar, Literal
 
 Verdict = Literal["", "pass", "changed", "incomplete", "fail", "error"]
+
+
+def hash_of(content: str | bytes) -> str:
+    """SHA-256 of a file's content, by which the next run knows it for its own."""
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -259,6 +265,7 @@ class Finding:
             **self.data,
             "tables": {table.name: table.records() for table in self.tables()},
             "failures": dict(self.failures),
+            "files": {name: hash_of(content) for name, content in self.files.items()},
             "complete": self.complete,
             "made": None if self.made is None else asdict(self.made),
         }

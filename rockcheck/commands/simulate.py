@@ -10,7 +10,7 @@ from functools import partial
 from importlib import resources
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -183,8 +183,7 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
             raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
         raise errors.ModelFailure(f"{result.reason}{where}")
-    played: History = result.history
-    return played
+    return cast(History, result.history)
 
 
 #: The parts that are compiled, the longest first: the models that run them. The event loops of both

@@ -15,7 +15,17 @@ from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.reports.document import FIGURES, belongings, publish
 from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, OWN_MARK, draw_spectrum, figure_of
 from rockcheck.scenes import reading
-from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
+from rockcheck.validation.finding import (
+    Axis,
+    Column,
+    Finding,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    hash_of,
+    plain,
+)
 from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
 from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.study import (
@@ -198,9 +208,11 @@ def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
 def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
     (tmp_path / "mine.csv").write_text("a\n", "utf-8")
     first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
-    publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)
-    publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
-    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs"}
+    publish(
+        Finding("made", "Made up", "", [first, second, *PLOTS], files={"a.csv": "b\n"}), tmp_path
+    )
+    publish(Finding("made", "Made up", "", [second, PLOTS[1]], files={"b.csv": "b\n"}), tmp_path)
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs", "b"}
     assert {path.stem for path in (tmp_path / FIGURES).iterdir()} == {"strips"}
 
 
@@ -209,7 +221,10 @@ def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
     folder = tmp_path / "sub"
     (folder / FIGURES).mkdir(parents=True)
     rows = [{"a": 1.0}]
-    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
+    said = {
+        "tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}},
+        "files": {"../mine.csv": hash_of("a\n"), "empty.csv": hash_of("b\n"), "sub": ""},
+    }
     (folder / "run.json").write_text(json.dumps(said), "utf-8")
     mine = [
         tmp_path / "mine.csv",

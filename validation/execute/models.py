@@ -267,9 +267,8 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     Raises the model's errors.
     """
     began = time.perf_counter()
-    history = _simulate(work, scene)
-    if is_own(work.family):  # which may return anything
-        history = _read_back(history)
+    returned = _simulate(work, scene)
+    history = _read_back(returned) if is_own(work.family) else returned  # which may be anything
     found = (
         numerical.numerical_uncertainty(
             build(work.family, work.settings, work.search_path), scene, history

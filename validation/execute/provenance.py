@@ -82,8 +82,7 @@ def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     kept for later processes, under a hash of all our sources. A module without a file, as in a
     notebook, has another one at each call: nobody can say that its code is still the same.
     """
-    unread = _source(module, search_path) is None
-    return uuid.uuid4().hex if unread else _code_digest(module, search_path)
+    return _code_digest(module, search_path) if _source(module, search_path) else uuid.uuid4().hex
 
 
 @cache
@@ -125,8 +124,9 @@ def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]
     together = top != OWN_PACKAGE and home is not None and home.name not in INSTALLED
 
     def ours(name: str) -> bool:
-        own = name.split(".")[0] in (OWN_PACKAGE, top)
-        return own or (together and _folder(name, search_path) == home)
+        return name.split(".")[0] in (OWN_PACKAGE, top) or (
+            together and _folder(name, search_path) == home
+        )
 
     waiting = [module]
     while waiting:
