@@ -77,8 +77,6 @@ def new(
         raise errors.InputError(
             f"{printable(path)}: is there already; it is left as it is"
         ) from None
-    except OSError as error:
-        raise errors.InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     size = f"{2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m"
     lines = [
         f"{path}: a block of {size}",
@@ -138,13 +136,8 @@ def run(
         within(ONE_RUN, True),
     ):
         history = simulate(what)
-    try:
-        for path in histories:
-            history.save(path)
-    except OSError as error:
-        raise errors.InputError(
-            f"{printable(path)}: cannot be written: {error.strerror}", "--output"
-        ) from None
+    for path in histories:
+        history.save(path)
     motion = motion_of(history, what)
     console().print(
         f"{title}: {', '.join([history.fate, *motion_words(motion)])},"

@@ -50,9 +50,8 @@ def test_a_fault_that_cannot_be_written_down_is_told(tmp_path, monkeypatch, type
 
 
 def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
-    said = typed("--help")[0]
     page = (Path(__file__).parents[2] / "docs" / "ci.md").read_text("utf-8")
-    told = dict(re.findall(r"^ +(\d+) +(\S.*)$", said, re.MULTILINE))
+    told = dict(re.findall(r"^ +(\d+) +(\S.*)$", typed("--help")[0], re.MULTILINE))
     assert told == {str(code): meaning for code, meaning in cli.EXIT_CODES.items()}
     assert {int(code) for code in re.findall(r"\n\| (\d+) \| ", page)} >= {*cli.EXIT_CODES}
 

@@ -168,10 +168,16 @@ def test_accept_leaves_what_passes_and_refuses_what_it_may_not_write(
     accepted, one, reason, refusals
 ):
     changes, refused, text = accepted(FILE, one, reason=reason)
-    assert (changes, text) == ([], FILE)
-    assert [said in line for said, line in zip(refusals, refused, strict=True)] == [True] * len(
-        refusals
-    )
+    assert (
+        changes,
+        text,
+        [said for said, line in zip(refusals, refused, strict=True) if said in line],
+    ) == ([], FILE, refusals)
+
+
+@pytest.mark.parametrize("text", ["s.m.q.x = { a = 1 }\ns.m.p.x = { a = 1 }\n", "s = { m = {} }\n"])
+def test_accept_leaves_a_file_whose_form_it_cannot_keep(accepted, fault_of, text):
+    assert "[scene.model.reference]" in str(fault_of(accepted, text, check(1.0, None)))
 
 
 @pytest.mark.parametrize(
