@@ -297,13 +297,13 @@ class History(Shown):
             event_list = tuple(
                 Event(
                     t=float(t),
-                    kind=str(kind),
-                    mode_before=before if isinstance(before, str) else "",
-                    mode_after=after if isinstance(after, str) else "",
-                    impulse=float(impulse),
+                    kind=kind,
+                    mode_before=before,
+                    mode_after=after,
+                    impulse=float(impulse or 0.0),
                 )
                 for t, kind, before, after, impulse in events.reindex(
-                    columns=EVENT_COLUMNS
+                    columns=EVENT_COLUMNS, fill_value=""
                 ).itertuples(index=False)
             )
             np.asarray_chkfinite([(one.t, one.impulse) for one in event_list])
