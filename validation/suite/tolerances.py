@@ -366,8 +366,8 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     expected = (
         check.expected
         if check.verdict == "pass" and check.expected is not None
-        else value  # no room, no rounding
-        if 0.0 in (check.limit, check.drift)
+        else value  # no room for rounding
+        if any(n is not None and n <= 1e-7 * abs(value) for n in (check.limit, check.drift))
         else float(f"{value:.8g}")
     )
     limit, drift = _bounds(check, value, abs(value - expected))

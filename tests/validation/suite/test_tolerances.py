@@ -118,13 +118,20 @@ FAR = tolerances.Tolerance(expected=0.1, limit=0.2, drift=0.01, why="a test")
         (check(1e-3, FAR), None, ": tightened: ", line_of(1e-3, 2e-3, 2e-4)),
         (check(0.15, FAR), "why not", ": moved: ", line_of(0.15, 0.2, 0.01, "why not")),
         (check(0.5, FAR), "so", ": loosened: ", line_of(0.5, 1.0, 0.01, "so")),
-        # A line without a band gets one that today's value is within; one of 0 takes no rounding.
+        # A line without a band gets one that today's value is within; a narrow one takes no
+        # rounding.
         (check(0.15, FAR.replace(drift=None)), None, ": tightened: ", line_of(0.1, 0.2, 0.055)),
         (
             check(0.1234567891, FAR.replace(drift=0.0)),
             "so",
             ": moved: ",
             line_of(0.1234567891, 0.2, 0.0, "so"),
+        ),
+        (
+            check(0.1234567891, FAR.replace(drift=1e-11)),
+            "so",
+            ": moved: ",
+            line_of(0.1234567891, 0.2, 1e-11, "so"),
         ),
         # A quantity that has come to that of the reference.
         (check(0.5, FAR, "last_x", beside=0.5), None, ": tightened: ", line_of(0.5, 0.2, 0.01)),
