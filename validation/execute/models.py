@@ -303,8 +303,9 @@ def _read_back(history: History) -> History:
         try:
             return History.load(path)
         except InputError as error:
-            said = str(error).partition(": ")[2]
-            raise ModelFailure(f"its history cannot be read back: {said}") from None
+            raise ModelFailure(
+                f"its history cannot be read back: {str(error).partition(': ')[2]}"
+            ) from None
 
 
 def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:

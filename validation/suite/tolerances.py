@@ -366,9 +366,7 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     expected = (
         check.expected
         if check.verdict == "pass" and check.expected is not None
-        else value  # no room for rounding
-        if any(n is not None and n <= 1e-7 * abs(value) for n in (check.limit, check.drift))
-        else float(f"{value:.8g}")
+        else _short(value, check.limit, check.drift)
     )
     limit, drift = _bounds(check, value, abs(value - expected))
     line: dict[str, Any] = {
@@ -385,6 +383,15 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
         floor=check.floor,
     )
     return line if again.verdict == "pass" else again.reason
+
+
+def _short(value: float, *rooms: float | None) -> float:
+    """`value` with eight digits where there is room for rounding in limit and drift band."""
+    return (
+        value
+        if any(room is not None and room <= 1e-7 * abs(value) for room in rooms)
+        else float(f"{value:.8g}")
+    )
 
 
 def _bounds(check: results.Check, value: float, moved: float) -> tuple[float, float]:
