@@ -15,7 +15,7 @@ import uuid
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import metadata, resources
-from importlib.machinery import PathFinder
+from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
@@ -158,10 +158,17 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
         origin = spec and spec.origin
     except ValueError:  # it is loaded, as a script is, and has no spec
         origin = getattr(sys.modules.get(top), "__file__", None)
-    path = Path(origin) if origin else None
+    path = Path(origin) if origin and os.path.isfile(origin) else None  # not "<stdin>"
     if path and inner:
         base = path.parent.joinpath(*inner)
-        return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
+        return next(
+            (
+                file
+                for ending in ("/__init__.py", ".py", *EXTENSION_SUFFIXES)
+                if (file := Path(f"{base}{ending}")).is_file()
+            ),
+            None,
+        )
     return path
 
 

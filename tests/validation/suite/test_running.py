@@ -141,7 +141,8 @@ def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, writte
         (code, "class Fails", "# a remark\nclass Fails", []),
         (code, "= self.offset", "= 1.0 * self.offset", ["still", "a", "b"]),
         (code, "import time", "import time, beside", ["still", "a", "b"]),
-        (written("beside.py", "number = 1\n"), "1", "2", ["still", "a", "b"]),
+        (written("beside.py", "if 0:\n    import core\n"), "0", "0.0", ["still", "a", "b"]),
+        (written(f"core{provenance.EXTENSION_SUFFIXES[0]}", "\0a"), "a", "b", ["still", "a", "b"]),
     ):
         file.write_text(file.read_text().replace(old, new))
         assert [cell.model for cell in run(path).cells if not cell.read_back] == played, new
