@@ -4,16 +4,18 @@ Each block is rendered from one description. All pages have one look, made of th
 `data/templates`.
 """
 
+import hashlib
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
@@ -35,9 +37,8 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Tex
 FIGURES = "figures"
 #: The data of a figure, and limits of drawing it anew: s, and MB.
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
-#: What belongs to a page of a run and of a study: figures, data and tables.
-OF_RUN = r"(?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*"
-OF_STUDY = r"figures/\w[\w.+=-]*|\w[\w.-]*\.csv"
+#: The files of a study in its run.json: their hashes by their names.
+FILES = TypeAdapter(dict[str, str])
 #: Of a verdict: its sign, and its colour on a terminal.
 VERDICTS = {
     "": ("", ""),
@@ -180,34 +181,63 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     return path
 
 
+def hash_of(content: str | bytes) -> str:
+    """SHA-256 of a file's content, by which the next run knows it for its own."""
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
+
+
+def _left_by_another(folder: Path, hashes: Mapping[str, str]) -> Iterator[str]:
+    """Files of the run that was in the folder, which this one does not have.
+
+    No other file is taken for one: it has the hash that run.json says, and a figure's stamp is that
+    of the data beside it.
+    """
+    before: dict[str, str] = {}
+    with suppress(InputError, KeyError, TypeError, ValidationError):
+        before = FILES.validate_python(
+            reading.read_json(reading.within(folder, "run.json"))["files"]
+        )
+    for name in before.keys() - hashes.keys():
+        with suppress(InputError):
+            content = reading.read_bytes(reading.within(folder, name))
+            if hash_of(content) != before[name]:
+                continue
+            yield name
+            stamp, figure = style.stamp_of(content.decode(errors="replace")), Path(name)
+            drawn = figure.with_suffix(".svg")
+            if figure.parts[0] == FIGURES and stamp.split()[0] in style.stamp_in(folder / drawn):
+                yield str(drawn)
+
+
 def publish(found: Finding, folder: Path) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
-    The scenes of failures are written beside them. The folder holds one run: tables and figures of
-    another are removed. Figures are written as the page shows them, and as the data that
-    `write_figure` draws.
+    The scenes of failures are written beside them. The folder holds one run: files of another are
+    removed. Figures are written as the page shows them, and as the data that `write_figure` draws.
     """
-    before = belongings(folder / "index.html", OF_STUDY)
-    for old in folder.glob("failures/*.toml"):
-        old.unlink()
-    writing.write_whole(folder / "run.json", writing.json_text(found.as_dict()) + "\n")
-    for name, content in (
-        *((f"{table.name}.csv", csv(table)) for table in found.tables()),
-        *found.files.items(),
-        ("summary.md", markdown(found)),
-    ):
+    plots = list(found.plots())
+    data = {
+        f"{FIGURES}/{plot.name}.json": writing.json_text(asdict(replace(plot, played=None)))
+        for plot in plots
+    }
+    contents: dict[str, str | bytes] = {
+        **{f"{table.name}.csv": csv(table) for table in found.tables()},
+        **found.files,
+        **data,
+        "summary.md": markdown(found),
+    }
+    hashes = {name: hash_of(content) for name, content in contents.items()}
+    remove(folder, _left_by_another(folder, hashes))
+    contents["run.json"] = writing.json_text(found.as_dict() | {"files": hashes}) + "\n"
+    for name, content in contents.items():
         *parts, last = name.split("/")
         writing.write_whole(writing.made(folder, *parts) / last, content)
-    plots = list(found.plots())
     figures = writing.made(folder, FIGURES)
     calls = []
-    for plot in plots:
-        path, data = (figures / f"{plot.name}.{kind}" for kind in ("svg", "json"))
-        drawn = writing.json_text(asdict(replace(plot, played=None)))
-        writing.write_whole(data, drawn)
-        stamp = style.stamp_of(drawn)
+    for name, drawn in data.items():
+        path, stamp = (folder / name).with_suffix(".svg"), style.stamp_of(drawn)
         if style.stamp_in(path) != stamp:
-            calls.append(Call(_draw, (data, path, stamp)))
+            calls.append(Call(_draw, (folder / name, path, stamp)))
     list(drawers.side_by_side(calls))
     write_assets(folder)
     if live := [drawers.live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
@@ -215,7 +245,7 @@ def publish(found: Finding, folder: Path) -> Path:
             folder / "curves.js",
             writing.script_text("window.rockcheckCurves", writing.finite(live)),
         )
-    page = write_page(
+    return write_page(
         folder,
         "index.html",
         "finding.html",
@@ -237,8 +267,6 @@ def publish(found: Finding, folder: Path) -> Path:
         row_cells=row_cells,
         formats=(),
     )
-    remove(folder, before - belongings(page, OF_STUDY))
-    return page
 
 
 DATA = Path(str(resources.files("rockcheck.reports"))) / "data"
@@ -273,15 +301,17 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     )
 
 
-def belongings(page: Path, files: str = OF_RUN) -> set[str]:
-    """The `files` of a page that it links, from its folder; none of a page without a stamp.
+def belongings(page: Path) -> set[str]:
+    """The figures and data of a page of a run, from its folder; none of a page without a stamp.
 
     No other file is taken for one, whatever is linked by a page that somebody sent.
     """
     if not style.stamp_in(page):
         return set()
     names = re.findall(
-        rf'(?:href|src)="({files})"', reading.head_of(page, reading.MOST_BYTES), re.ASCII
+        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*)"',
+        reading.head_of(page, reading.MOST_BYTES),
+        re.ASCII,
     )
     drawn = [name.removesuffix(".svg") + ".json" for name in names if name.endswith(".svg")]
     return {*names, *drawn, f"{FIGURES}/{page.stem}-small.svg"}

@@ -90,14 +90,19 @@ def _turn(folder: Path) -> Iterator[None]:
 def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     """Write run.json, its schema and the tables; returns run.json.
 
-    The histories are there already. Unless it is to have `pages`, those of an earlier run are
-    removed: they show other numbers. Two runs take turns.
+    The histories are there already. Pages of an earlier run are removed, since they show other
+    numbers: the index, and unless it is to have `pages` all, with the trend. Two runs take turns.
     """
     told = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
     told |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
         if not pages:
             _remove(folder)
+            if (folder / "trend/run.json").is_file():
+                document.remove(folder, ["trend/index.html"])
+        index = document.belongings(folder / INDEX)  # none of a page that is not ours
+        document.remove(folder, {name for name in index if "-small." not in name})
+        document.remove(folder, [INDEX] * bool(index))
         writing.write_together({folder / name: content for name, content in told.items()})
         return run.save(folder)
 

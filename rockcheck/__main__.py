@@ -40,8 +40,11 @@ class _Pipe(io.FileIO):
 
 def main() -> int:
     """Run the command line; returns the exit code."""
-    from rockcheck.commands.cli import main as run
-    from rockcheck.scenes import progress
+    try:
+        from rockcheck.commands.cli import main as run
+        from rockcheck.scenes import progress
+    except KeyboardInterrupt:
+        os._exit(130)
 
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

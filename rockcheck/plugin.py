@@ -45,7 +45,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture
-def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cell]:
+def rockcheck_check(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Callable[..., results.Cell]:
     """Run a cell and its references; the test fails if the cell is out of tolerance.
 
     `rockcheck_check(scene, model=..., suite=None, strict=False)` returns the finished
@@ -76,7 +78,11 @@ def rockcheck_check(request: pytest.FixtureRequest) -> Callable[..., results.Cel
             ],
         )
         finished = runner.run_suite(
-            loaded.only(scene, model), config.cache.mkdir("rockcheck"), strict=strict
+            loaded.only(scene, model),
+            config.cache.mkdir("rockcheck")
+            if hasattr(config, "cache")  # it may be turned off
+            else tmp_path_factory.mktemp("rockcheck"),
+            strict=strict,
         )
         cell = finished.by_scene[scene][model]
         if wrong := list(tables.cell_lines(cell, strict)):

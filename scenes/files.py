@@ -57,6 +57,9 @@ def load_uncertain_scene(source: str | Path) -> UncertainScene:
 
     Raises as `load_scene`.
     """
+    refuse(
+        (not isinstance(source, str | Path), "give a name, or the path of a .toml file", "source")
+    )
     known = named_scenes()
     path = known.get(str(source), Path(source))
     if path.suffix.lower() != ".toml":

@@ -285,7 +285,9 @@ class History(Shown):
             raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
         frame = read_table(path).rename(columns=str.strip)
         beside = events_path(path)
-        events = read_table(beside) if beside.exists() else pd.DataFrame()
+        # Any text is a kind or a mode, also "None" and "hit #2".
+        words = {"dtype": dict.fromkeys(WORDS, str), "keep_default_na": False, "comment": None}
+        events = read_table(beside, **words) if beside.exists() else pd.DataFrame()
         # pandas would take the first column for names of rows.
         if len(frame) and not isinstance(frame.index, pd.RangeIndex):
             raise InputError(f"{shown}: rows have more values than the heading has columns")
@@ -295,15 +297,16 @@ class History(Shown):
             event_list = tuple(
                 Event(
                     t=float(t),
-                    kind=str(kind),
-                    mode_before=before if isinstance(before, str) else "",
-                    mode_after=after if isinstance(after, str) else "",
-                    impulse=float(impulse),
+                    kind=kind,
+                    mode_before=before,
+                    mode_after=after,
+                    impulse=float(impulse or 0.0),
                 )
                 for t, kind, before, after, impulse in events.reindex(
-                    columns=EVENT_COLUMNS
+                    columns=EVENT_COLUMNS, fill_value=""
                 ).itertuples(index=False)
             )
+            np.asarray_chkfinite([(one.t, one.impulse) for one in event_list])
             cost = Cost(**{k: v for k, v in about.cost.items() if k in Cost.__dataclass_fields__})
         except (AttributeError, TypeError, ValueError):
             raise InputError(

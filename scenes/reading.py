@@ -147,7 +147,7 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
             stream = cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
             _check_lines(stream, shown)
             stream.seek(0)
-            return pd.read_csv(stream, comment="#", **options)
+            return pd.read_csv(stream, **{"comment": "#", **options})
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{shown}: a compressed file that is damaged") from None
         except InputError:

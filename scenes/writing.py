@@ -7,7 +7,7 @@ import math
 import operator
 import os
 import re
-import tempfile
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import cache
@@ -57,7 +57,7 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
     If the user `named` this very file, a pipe or a device such as /dev/stdout is written into, and
     a link stays one. Raises `OSError` that names the file.
     """
-    finished: list[tuple[str, Path]] = []
+    finished: list[tuple[Path, Path]] = []
     with ExitStack() as leavings:
         for path, content in contents.items():
             with _naming(path):
@@ -66,18 +66,13 @@ def write_together(contents: Mapping[Path, str | bytes], *, named: bool = False)
                 if named and path.exists() and not path.is_file() and not path.is_dir():
                     path.write_bytes(data)
                     continue
-                with tempfile.NamedTemporaryFile(
-                    dir=target.parent,
-                    prefix=f".{target.name[:60]}.",
-                    suffix=".part",
-                    delete=False,
-                ) as stream:
-                    leavings.callback(Path(stream.name).unlink, missing_ok=True)
+                new = target.with_name(f".{target.name[:60]}.{uuid.uuid4().hex[:8]}.part")
+                with new.open("xb") as stream:  # for whom the user's umask says
+                    leavings.callback(new.unlink, missing_ok=True)
                     stream.write(data)
-                os.chmod(stream.name, 0o644)
                 if target.is_dir() and not target.is_symlink():
                     raise IsADirectoryError(21, "Is a directory")
-                finished.append((stream.name, target))
+                finished.append((new, target))
         for temporary, target in finished:
             with _naming(target):
                 os.replace(temporary, target)
@@ -89,7 +84,7 @@ def write_new(path: Path, content: str) -> None:
     Raises `FileExistsError` where it is.
     """
     with _naming(path):
-        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
         try:
             with os.fdopen(handle, "wb") as stream:
                 stream.write(content.encode())

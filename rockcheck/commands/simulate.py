@@ -4,14 +4,13 @@ And `rockcheck warm`: compiles the models' code ahead, in several processes, so 
 for no compiler.
 """
 
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import resources
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -78,8 +77,6 @@ def new(
         raise errors.InputError(
             f"{printable(path)}: is there already; it is left as it is"
         ) from None
-    except OSError as error:
-        raise errors.InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
     size = f"{2 * scene.block.half_width:g} m x {2 * scene.block.half_height:g} m"
     lines = [
         f"{path}: a block of {size}",
@@ -139,13 +136,8 @@ def run(
         within(ONE_RUN, True),
     ):
         history = simulate(what)
-    try:
-        for path in histories:
-            history.save(path)
-    except OSError as error:
-        raise errors.InputError(
-            f"{printable(path)}: cannot be written: {error.strerror}", "--output"
-        ) from None
+    for path in histories:
+        history.save(path)
     motion = motion_of(history, what)
     console().print(
         f"{title}: {', '.join([history.fate, *motion_words(motion)])},"
@@ -184,10 +176,7 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
             raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
         raise errors.ModelFailure(f"{result.reason}{where}")
-    with tempfile.TemporaryDirectory() as folder:
-        for suffix, content in result.files.items():
-            (Path(folder) / f"history{suffix}").write_bytes(content)
-        return History.load(Path(folder) / f"history{store.TABLE}")
+    return cast(History, result.history)
 
 
 #: The parts that are compiled, the longest first: the models that run them. The event loops of both

@@ -137,7 +137,7 @@ def run(
     document.show(tables.finding_of(finished), console())
     tell_faults(finished, folder)
     if history is not None:
-        moment = across.moment_of(finished, Path(finished.tolerances_file).parent)
+        moment = across.moment_of(finished, suite.path.parent)
         trend = across.trend_of(across.remember(history, moment))
         document.show(trend, console())
         if report:

@@ -114,8 +114,8 @@ def test_json_is_all_that_is_on_stdout(mine, told):
     assert found["theta_rms"] == pytest.approx(0.001 / load_scene("mine.toml").block.alpha)
     report = told("spectrum", "mine.toml", "--size", "3")["report"]
     assert report == "rockcheck-report/spectrum/index.html"
-    Path("suite.toml").write_text(SUITE)
-    suite = "suite.toml", *STILL[1:], "--jobs", "1"
+    suite = "suite\udcff.toml", *STILL[1:], "--jobs", "1"  # a name that is not UTF-8
+    Path(suite[0]).write_text(SUITE)
     run = told("validate", *suite, "--no-report", code=1)
     assert (run["verdict"], len(run["reasons"])) == ("fail", 1)
     (cell,) = run["cells"]

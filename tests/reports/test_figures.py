@@ -12,10 +12,19 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
-from rockcheck.reports.document import FIGURES, belongings, publish
+from rockcheck.reports.document import FIGURES, belongings, hash_of, publish
 from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, OWN_MARK, draw_spectrum, figure_of
 from rockcheck.scenes import reading
-from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table, plain
+from rockcheck.validation.finding import (
+    Axis,
+    Column,
+    Finding,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    plain,
+)
 from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
 from rockcheck.validation.paper.measures import Paper, beyond, findings_of
 from rockcheck.validation.studies.spectrum.study import (
@@ -198,9 +207,11 @@ def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
 def test_the_folder_holds_one_run_and_files_of_the_users(tmp_path):
     (tmp_path / "mine.csv").write_text("a\n", "utf-8")
     first, second = (Table(name, [Column("a")], [[1.0]]) for name in ("gaps", "runs"))
-    publish(Finding("made", "Made up", "", [first, second, *PLOTS]), tmp_path)
-    publish(Finding("made", "Made up", "", [second, PLOTS[1]]), tmp_path)
-    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs"}
+    publish(
+        Finding("made", "Made up", "", [first, second, *PLOTS], files={"a.csv": "b\n"}), tmp_path
+    )
+    publish(Finding("made", "Made up", "", [second, PLOTS[1]], files={"b.csv": "b\n"}), tmp_path)
+    assert {path.stem for path in tmp_path.glob("*.csv")} == {"mine", "runs", "b"}
     assert {path.stem for path in (tmp_path / FIGURES).iterdir()} == {"strips"}
 
 
@@ -208,8 +219,8 @@ def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
     """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
     folder = tmp_path / "sub"
     (folder / FIGURES).mkdir(parents=True)
-    rows = [{"a": 1.0}]
-    said = {"tables": {"../mine": rows, "own": rows, "empty": [], "odd": {"a": 1}}}
+    theirs = {"../mine.csv": "a\n", "empty.csv": "b\n", "figures/a.json": "b\n", "own.csv": "a\n"}
+    said = {"files": {name: hash_of(content) for name, content in theirs.items()} | {"sub": ""}}
     (folder / "run.json").write_text(json.dumps(said), "utf-8")
     mine = [
         tmp_path / "mine.csv",

@@ -28,8 +28,11 @@ period = 0.98
 
 def test_a_scene_file(written):
     scene = load_scene(written("bookcase.toml", TEXT))
-    assert (scene.name, scene.wall("left").gap) == ("bookcase", 0.053)
-    assert scene.excitation == Ricker(amplitude=6.0, period=0.98)
+    assert (scene.name, scene.wall("left").gap, scene.excitation) == (
+        "bookcase",
+        0.053,
+        Ricker(amplitude=6.0, period=0.98),
+    )
     assert load_scene(str(written("a.toml", 'name = "other"\n' + TEXT))).name == "other"
 
 
@@ -73,7 +76,11 @@ def test_faults_name_file_key_and_value(old, new, said, written, fault_of):
 
 @pytest.mark.parametrize(
     ("source", "said"),
-    [("fig4aa", "did you mean 'fig4a'?"), ("scene.json", "or the path of a .toml file")],
+    [
+        ("fig4aa", "did you mean 'fig4a'?"),
+        ("scene.json", "or the path of a .toml file"),
+        (None, "source: give a name"),
+    ],
 )
 def test_what_is_no_scene_is_told(source, said, fault_of):
     assert said in str(fault_of(load_scene, source))

@@ -3,6 +3,8 @@ the shape."""
 
 import json
 import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -47,24 +49,71 @@ def test_what_was_played_is_read_back_whatever_plays_it(tmp_path, log, jobs):
     rows = [[value, value**2] for value in values]
     assert found.table("squares").rows == run(study, **how).table("squares").rows == rows
     assert (played(log), heard[0], heard[-1], found.complete) == (values, (0, 3), (5, 5), True)
-    assert found.made
     assert (run(study, **how, force=True).data, played(log)) == ({"count": 5}, sorted(2 * values))
 
 
 def test_a_fault_of_one_task_takes_no_other_down(tmp_path, log):
     found = run(Squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
-    assert found.data == {"count": 1}
-    assert {
+    assert found.data | {
         where.partition(",")[0]: why.partition(":")[0] for where, why in found.failures.items()
     } == {
+        "count": 1,
         "13": "no square of 13",
         "14": "ZeroDivisionError",
         "15": "the process ended with code 3",
     }
-    (trace,) = (tmp_path / "out" / FAULTS).iterdir()
-    assert "a bug" in trace.read_text()
+    assert ["a bug" in one.read_text() for one in (tmp_path / "out" / FAULTS).iterdir()] == [True]
     run(Squares([2.0, 13.0], log), tmp_path / "out", jobs=1)
     assert played(log) == [2.0, 13.0, 13.0, 14.0, 15.0], "what failed is played again"
+
+
+#: A study as a script, which imports what lies beside it.
+SCRIPT = """
+from dataclasses import dataclass
+from pathlib import Path
+from beside import number
+from rockcheck.validation.finding import Finding
+from rockcheck.validation.study import Study, Task, run
+
+@dataclass(frozen=True)
+class Of(Task):
+    number: float
+
+@dataclass(frozen=True)
+class Product:
+    value: float
+
+class Once(Study):
+    name, record = "once", Product
+
+    def tasks(self, done):
+        return [Of(1.0)]
+
+    @staticmethod
+    def play(task):
+        return Product(2.0 * task.number * number)
+
+    def gather(self, done):
+        return Finding("once", "", ", ".join(str(one.value) for one in done.values()))
+
+print(run(Once(), Path("out"), jobs=0).answer)
+"""
+
+
+def test_a_script_that_changed_plays_again(tmp_path, written):
+    """Also one of whose neighbours has."""
+    assert [
+        float(
+            subprocess.check_output(
+                [sys.executable, written("made.py", text)], cwd=written("beside.py", beside).parent
+            )
+        )
+        for text, beside in (
+            (SCRIPT, "number = 1.0"),
+            (SCRIPT.replace("2.0 *", "3.0 *"), "number = 1.0"),
+            (SCRIPT.replace("2.0 *", "3.0 *"), "number = 5.0"),
+        )
+    ] == [2.0, 3.0, 15.0]
 
 
 def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path, log):

@@ -2,9 +2,11 @@
 
 import importlib
 import sys
+import tempfile
 import time
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -249,8 +251,7 @@ class Played:
     """The result of a worker: the record, and the history's files by suffix.
 
     `read_back`: it was not played, but kept by an earlier run. `history` is the content of the
-    files, None for a batch and for a user-defined model, which may return anything. `traceback` is
-    that of an exception in a scene of a batch.
+    files, None for a batch. `traceback` is that of an exception in a scene of a batch.
     """
 
     record: Any
@@ -266,7 +267,8 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     Raises the model's errors.
     """
     began = time.perf_counter()
-    history = _simulate(work, scene)
+    returned = _simulate(work, scene)
+    history = _read_back(returned) if is_own(work.family) else returned  # which may be anything
     found = (
         numerical.numerical_uncertainty(
             build(work.family, work.settings, work.search_path), scene, history
@@ -289,8 +291,21 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
             "cost": {**vars(history.cost), "worker_seconds": time.perf_counter() - began},
         },
         history.packed(),
-        None if is_own(work.family) else history,
+        history,
     )
+
+
+def _read_back(history: History) -> History:
+    """The history as its files hold it; raises `ModelFailure` where these would be unusable."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "history.csv.gz"
+        history.save(path)
+        try:
+            return History.load(path)
+        except InputError as error:
+            raise ModelFailure(
+                f"its history cannot be read back: {str(error).partition(': ')[2]}"
+            ) from None
 
 
 def play_batch(work: Work, scenes: Sequence[Scene]) -> Played:

@@ -10,10 +10,12 @@ import json
 import os
 import platform
 import re
-from collections.abc import Container, Iterable, Mapping
+import sys
+import uuid
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib import metadata, resources
-from importlib.machinery import PathFinder
+from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from importlib.util import find_spec
 from itertools import accumulate
 from pathlib import Path
@@ -29,6 +31,8 @@ from rockcheck.validation.execute.store import Store, name_of
 OWN_PACKAGE = "rockcheck"
 #: The kind of results that a digest of our code is, in the user's own store.
 CODE = "code"
+#: Names of the folders that installed packages lie in.
+INSTALLED = ("site-packages", "dist-packages")
 
 
 def cell_key(
@@ -70,14 +74,19 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-@cache
 def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     """Hash of the code of a module and of all project modules that it imports.
 
     Imports count at its top and inside functions. The hash is that of the syntax trees without
     docstrings: comments, layout and documentation do not count. For rockcheck's own modules it is
-    kept for later processes, under a hash of all our sources.
+    kept for later processes, under a hash of all our sources. A module without a file, as in a
+    notebook, has another one at each call: nobody can say that its code is still the same.
     """
+    return _code_digest(module, search_path) if _source(module, search_path) else uuid.uuid4().hex
+
+
+@cache
+def _code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     with contextlib.suppress(InputError, OSError):  # there may be no folder to keep it in
         if module.split(".")[0] == OWN_PACKAGE:
             user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
@@ -106,20 +115,35 @@ def _of_all_sources() -> str:
 def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
     """Names and files of the project modules that `module` can import, itself included.
 
-    The packages that contain a module count, but not the other modules that they import.
+    Those of its own package, of rockcheck, and what lies beside a script or package of the user's
+    own. The packages that contain a module count, but not the other modules that they import.
     """
     found: dict[str, Path] = {}
-    packages = {OWN_PACKAGE, module.split(".")[0]}
+    top, home = module.split(".")[0], _folder(module, search_path)
+    # Beside rockcheck, or an installed package, lie those of others.
+    together = top != OWN_PACKAGE and home is not None and home.name not in INSTALLED
+
+    def ours(name: str) -> bool:
+        return name.split(".")[0] in (OWN_PACKAGE, top) or (
+            together and _folder(name, search_path) == home
+        )
+
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        path = _source(name, search_path) if name.split(".")[0] in packages else None
+        path = _source(name, search_path) if ours(name) else None
         if path and name not in found:
             found[name] = path
             package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-            waiting += _imports(path, package, packages, search_path)
+            waiting += _imports(path, package, ours, search_path)
     above = {one for name in found for one in accumulate(name.split(".")[:-1], "{}.{}".format)}
     return {one: path for one in above if (path := _source(one, search_path))} | found
+
+
+def _folder(name: str, search_path: tuple[str, ...]) -> Path | None:
+    """The folder that a module's topmost package, or the module itself, lies in."""
+    path = _source(name.split(".")[0], search_path)
+    return path.parents[path.name == "__init__.py"] if path else None
 
 
 @cache
@@ -131,17 +155,25 @@ def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
     top, *inner = name.split(".")
     try:
         spec = find_spec(top) or PathFinder.find_spec(top, list(search_path))
-    except ValueError:  # it is loaded, and does not say from where
-        return None
-    path = Path(spec.origin) if spec and spec.origin else None
+        origin = spec and spec.origin
+    except ValueError:  # it is loaded, as a script is, and has no spec
+        origin = getattr(sys.modules.get(top), "__file__", None)
+    path = Path(origin) if origin and os.path.isfile(origin) else None  # not "<stdin>"
     if path and inner:
         base = path.parent.joinpath(*inner)
-        return next(filter(Path.is_file, (base / "__init__.py", base.with_suffix(".py"))), None)
+        return next(
+            (
+                file
+                for ending in ("/__init__.py", ".py", *EXTENSION_SUFFIXES)
+                if (file := Path(f"{base}{ending}")).is_file()
+            ),
+            None,
+        )
     return path
 
 
 def _imports(
-    path: Path, package: str, packages: Container[str], search_path: tuple[str, ...]
+    path: Path, package: str, ours: Callable[[str], bool], search_path: tuple[str, ...]
 ) -> Iterable[str]:
     """Names of the modules that a file of `package` imports.
 
@@ -156,17 +188,20 @@ def _imports(
             base = ".".join(filter(None, [*above, node.module]))
             for alias in node.names:
                 inner = f"{base}.{alias.name}"
-                yield (
-                    inner
-                    if base.split(".")[0] in packages and _source(inner, search_path)
-                    else base
-                )
+                yield (inner if ours(base) and _source(inner, search_path) else base)
 
 
 @cache
 def _source_of(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], str]:
-    """What a source file imports, and its syntax tree without docstrings, as text."""
-    tree, imports = ast.parse(path.read_text(encoding="utf-8")), []
+    """What a source file imports, and its syntax tree without docstrings, as text.
+
+    Of a file that is no Python, such as a compiled module, a hash of its content.
+    """
+    content, imports = path.read_bytes(), list[ast.Import | ast.ImportFrom]()
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):
+        return imports, hashlib.sha256(content).hexdigest()
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             imports.append(node)

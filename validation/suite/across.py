@@ -249,17 +249,14 @@ def recall(path: Path) -> list[Moment]:
 def remember(path: Path, moment: Moment) -> list[Moment]:
     """Append a run to the history; returns all its runs of the same suite, the oldest first.
 
-    Raises `InputError` (see `recall`), also where the file cannot be written.
+    Raises `InputError` (see `recall`).
     """
     known = recall(path)
-    try:
-        with path.open("a+b") as stream:
-            if stream.tell():  # an editor may have left the last line without its end
-                stream.seek(-1, os.SEEK_END)
-            end = b"" if stream.read(1) in b"\n" else b"\n"
-            stream.write(end + moment.model_dump_json().encode() + b"\n")
-    except OSError as error:
-        raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+    with path.open("a+b") as stream:
+        if stream.tell():  # an editor may have left the last line without its end
+            stream.seek(-1, os.SEEK_END)
+        end = b"" if stream.read(1) in b"\n" else b"\n"
+        stream.write(end + moment.model_dump_json().encode() + b"\n")
     return [one for one in (*known, moment) if one.suite == moment.suite]
 
 

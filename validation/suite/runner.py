@@ -22,7 +22,15 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon
 from rockcheck.ebm.horizon import may_fly, other_laws
-from rockcheck.scenes import History, InputError, ModelFailure, NonNegative, Scene, progress
+from rockcheck.scenes import (
+    History,
+    InputError,
+    ModelFailure,
+    NonNegative,
+    Scene,
+    errors,
+    progress,
+)
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, gap_of
 from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
@@ -492,7 +500,7 @@ class SuiteStudy(Study):
             versions=provenance.versions(),
             hardware=provenance.hardware(),
             judged=suite.judged,
-            tolerances_file=str(suite.tolerances_path),
+            tolerances_file=errors.inert(str(suite.tolerances_path)),
         )
         return Finding(
             self.name,

@@ -196,7 +196,10 @@ class Suite:
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
         own = self.owners.get(scene, self)
-        for what, name, known in (("scene", scene, self.scenes), ("model", model, own.models)):
+        for what, name, known in (
+            ("scene", scene, self.scenes),
+            ("model", model, [label for _, label in _played([scene], own.models)]),
+        ):
             errors.one_of(f"{what} of the suite", name, known)
         yardstick = own.given.reference, OWN_FIGURES  # if it is as expected itself
         tolerances = {
@@ -324,7 +327,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     except errors.InputError as error:
         raise errors.InputError(f"{printable(tolerances_path)}: {error}") from None
     return Suite(
-        name=path.stem,
+        name=errors.inert(path.stem),
         path=path,
         given=given,
         scenes=scenes,
@@ -478,7 +481,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
     }
     return Suite(
-        name=path.stem,
+        name=errors.inert(path.stem),
         path=path,
         given=given.model_copy(
             update={

@@ -34,6 +34,7 @@ the reference solves the same equations and is itself as expected (`runner`). A 
 
 import math
 import re
+import tomllib
 from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -324,32 +325,38 @@ def accepted_in(
 ) -> tuple[list[str], list[str]]:
     """Write the figures of these checks into a tolerance file; see `suites.accept`.
 
-    `nested`: into the table `[tolerances]` of a suite file. Raises `InputError` where that fails.
+    `nested`: into the table `[tolerances]` of a suite file. Raises `InputError` for a file whose
+    form cannot be kept.
     """
     changes, refused = list[str](), list[str]()
     document = tomlkit.parse(reading.read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if nested else document
-    for cell, check in checks:
-        against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
-        where = Place(cell.scene, cell.model, against, check.figure.windowed)
-        old = {name: getattr(check, name) for name in Tolerance.model_fields}
-        if isinstance(line, str):
-            refused.append(f"{where}: {line}")
-        elif line != old:
-            changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
-            entry = tomlkit.inline_table()
-            entry.update(line)
-            table = (
-                tables.setdefault(cell.scene, tomlkit.table(is_super_table=True))
-                .setdefault(cell.model, tomlkit.table(is_super_table=True))
-                .setdefault(against, tomlkit.table())
-            )
-            table[check.figure.windowed] = entry
+    try:
+        for cell, check in checks:
+            against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
+            where = Place(cell.scene, cell.model, against, check.figure.windowed)
+            old = {name: getattr(check, name) for name in Tolerance.model_fields}
+            if isinstance(line, str):
+                refused.append(f"{where}: {line}")
+            elif line != old:
+                changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
+                entry = tomlkit.inline_table()
+                entry.update(line)
+                table = (
+                    tables.setdefault(cell.scene, tomlkit.table(is_super_table=True))
+                    .setdefault(cell.model, tomlkit.table(is_super_table=True))
+                    .setdefault(against, tomlkit.table())
+                )
+                table[check.figure.windowed] = entry
+        text = tomlkit.dumps(document)
+        errors.refuse((tomllib.loads(text) != document.unwrap(), "is broken", str(path)))
+    except ValueError:  # tables in one line, or keys with points
+        raise InputError(
+            f"{printable(path)}: cannot be changed: write a table a scene, model and reference,"
+            " [scene.model.reference]"
+        ) from None
     if write and changes:
-        try:
-            writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", tomlkit.dumps(document)))
-        except OSError as error:
-            raise InputError(f"{printable(path)}: cannot be written: {error.strerror}") from None
+        writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", text))
     return changes, refused
 
 
@@ -365,9 +372,7 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
     expected = (
         check.expected
         if check.verdict == "pass" and check.expected is not None
-        else value  # no room, no rounding
-        if 0.0 in (check.limit, check.drift)
-        else float(f"{value:.8g}")
+        else _short(value, check.limit, check.drift)
     )
     limit, drift = _bounds(check, value, abs(value - expected))
     line: dict[str, Any] = {
@@ -384,6 +389,15 @@ def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:
         floor=check.floor,
     )
     return line if again.verdict == "pass" else again.reason
+
+
+def _short(value: float, *rooms: float | None) -> float:
+    """`value` with eight digits where there is room for rounding in limit and drift band."""
+    return (
+        value
+        if any(room is not None and room <= 1e-7 * abs(value) for room in rooms)
+        else float(f"{value:.8g}")
+    )
 
 
 def _bounds(check: results.Check, value: float, moved: float) -> tuple[float, float]:

@@ -25,9 +25,11 @@ class Still(Frozen):
 
 
 class NotFinite(Frozen):
+    end: tuple[str, float] = ("theta", np.nan)  # a channel's last value
+
     def simulate(self, scene: Scene) -> History:
         history = Still().simulate(scene)
-        history.channels["theta"][-1] = np.nan
+        history.channels[self.end[0]][-1] = self.end[1]
         return history
 
 

@@ -448,8 +448,8 @@ class Chunk(Task):
 
     @property
     def label(self) -> str:
-        """For progress."""
-        return self.model
+        """For progress and failures."""
+        return f"{self.model}, runs {self.first} to {self.first + self.count - 1}"
 
     def play(self) -> RunTotals:
         """The totals of the runs."""
@@ -480,7 +480,11 @@ class Shrinking(Task):
 
     broken: Broken
     trials: int
-    label = "smallest scenes"
+
+    @property
+    def label(self) -> str:
+        """For progress and failures."""
+        return f"smallest scene of {self.broken.name}, {self.trials} trials"
 
     def play(self) -> str:
         """The file of the smallest scene that was found."""
