@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm.core.names import FAILURES, Ending
 from rockcheck.ebm.core.state import FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.ebm.natural import control_of, loop_of, pack, pack_pulses
+from rockcheck.ebm.natural import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
 
 __all__ = ["Outcomes", "pack", "pack_pulses", "run_batch", "run_decided"]
@@ -72,10 +72,10 @@ def run_batch(
         some = found[first : first + _CHUNK]
         size = len(some)
         out, modes = np.zeros((size, rows, 6)), np.zeros((size, rows), dtype=np.int8)
-        control = control_of(model, min(model.most_steps, 2_000_000), until_decided)
+        states = state_for(model, min(model.most_steps, 2_000_000), until_decided)
         records = Records(out, modes, np.empty((size, 0, 5)))
         part = packed._replace(given=packed.given[first : first + size])
-        work = part, control, workspace(), records, some
+        work = part, states, workspace(), records, some
         loop_of(model, *work)(*work)
         return out[:, :, columns].copy()
 

@@ -123,15 +123,15 @@ class EventBasedModel(Frozen):
             out_mode=np.zeros(shape, dtype=np.int8),
             log=np.empty((1, self.most_events, 5)),
         )
-        control, work = natural.control_of(self, 0), state.workspace()
+        states, work = natural.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
-        ending, ready, seconds, cpu = self._played(given, control, work, records, kept)
-        motion, t, _, _, at_rest, steps, happened, written, gains, gain, rules = kept[0].tolist()
+        ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
+        motion, t, _, _, steps, written, at_rest = kept[0].tolist()
         if ending in names.FAILURES:
             raise errors.ModelFailure(
                 f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s"
             )
-        out, modes, log = (rows[0] for rows in records)
+        found, (out, modes, log) = states[0], (rows[0] for rows in records)
         rows = max(written, 1)
         speed = scene.block.radius / unit
         out[0] = natural.state_of(scene) if written == 0 else out[0]
@@ -143,7 +143,7 @@ class EventBasedModel(Frozen):
                 mode_after=names.MODE_NAMES[int(after)],
                 impulse=impulse * speed,
             )
-            for at, kind, before, after, impulse in log[: min(happened, len(log))].tolist()
+            for at, kind, before, after, impulse in log[: min(found.events, len(log))].tolist()
         ]
         cost = history.Cost(
             wall_seconds=seconds,
@@ -151,11 +151,11 @@ class EventBasedModel(Frozen):
             set_up=ready - began,
             steps=steps,
             evaluations=steps,
-            energy_gains=gains,
-            largest_energy_gain=gain,
+            energy_gains=int(found.gains),
+            largest_energy_gain=float(found.largest_gain),
             rules={
                 name: int(count)
-                for name, count in zip(names.RULE_NAMES, rules, strict=True)
+                for name, count in zip(names.RULE_NAMES, found.rules, strict=True)
                 if count
             },
         )
@@ -183,11 +183,11 @@ class EventBasedModel(Frozen):
         change = np.max(np.abs(fine - coarse)) / scene.block.alpha
         return replace(played, cost=replace(cost, error_estimate=float(change)))
 
-    def _played(self, rows: Any, control: Any, *work: Any) -> tuple[int, float, float, float]:
+    def _played(self, rows: Any, states: Any, *work: Any) -> tuple[int, float, float, float]:
         """Plays a run. Returns its Ending, when its clock started, its wall and CPU time (s)."""
         from rockcheck.ebm import natural
 
-        runs = rows, control, *work
+        runs = rows, states, *work
         # What is compiled or loaded is so before the clock starts. A run of few steps is played
         # here: to hand it over takes longer. Each sample of a record is a step.
         short = len(rows.samples) < _INTERPRETED
@@ -197,7 +197,7 @@ class EventBasedModel(Frozen):
         loop = slow or natural.loop_of(self, *runs)
 
         def play(most_steps: int) -> int:
-            control.most_steps = most_steps
+            states["control"]["most_steps"] = most_steps
             loop(*runs)
             return int(work[-1]["ending"][0])
 

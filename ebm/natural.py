@@ -12,12 +12,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rockcheck.ebm.core import march
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import FORM, ground_of
 from rockcheck.ebm.core.names import LAWS, Shape
-from rockcheck.ebm.core.state import CONTROL, GIVEN, Base, Rows
+from rockcheck.ebm.core.state import GIVEN, STATE, Base, Rows
 from rockcheck.scenes import Floats, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
@@ -160,15 +161,11 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     return Rows(given, samples)
 
 
-def control_of(model: Any, most_steps: int, until_decided: bool = False) -> np.record:
-    """What the model's settings ask of a run."""
-    return filled(
-        CONTROL,
-        tolerance=model.tolerance,
-        most_steps=most_steps,
-        most_events=model.most_events,
-        until_decided=until_decided,
-    )
+def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArray[np.void]:
+    """An array of one state, with what the model's settings ask of a run."""
+    states = np.zeros(1, STATE)
+    states["control"] = model.tolerance, most_steps, model.most_events, until_decided, 0.0
+    return states
 
 
 def loop_of(model: Any, *given: Any) -> Callable[..., None]:

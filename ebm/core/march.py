@@ -59,12 +59,13 @@ def step(friction, block, base, run):
 
 
 @inner_kernel
-def play_rows(friction, rows, control, states, begins, work, records, found):
+def play_rows(friction, rows, states, begins, work, records, found):
     """Plays the rows of `play` one after the other in the state, and notes what is kept of each.
 
-    `friction` is the module with its doors; `states` and `begins` are copies of NEW_STATE.
+    `friction` is the module with its doors, `begins` a copy of NEW_STATE.
     """
-    state, begins[0].control = states[0], control
+    state = states[0]
+    begins[0].control = state.control
     for i in range(len(rows.given)):
         given, samples = rows.given[i], rows.samples
         states[0] = begins[0]
@@ -78,9 +79,8 @@ def play_rows(friction, rows, control, states, begins, work, records, found):
         march(friction, given.setting, base, Run(state, work[0], work[1], written))
         kept = found[i]
         kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
-        kept.ending, kept.at_rest = state.ending, rests(state.mode)
-        kept.steps, kept.events, kept.rows = state.steps, state.events, state.rows
-        kept.gains, kept.largest_gain, kept.rules = state.gains, state.largest_gain, state.rules
+        kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
+        kept.at_rest = rests(state.mode)
 
 
 @inner_kernel
@@ -130,20 +130,21 @@ def end(run):
 
 
 @kernel
-def play(rows, control, work, records, found):
+def play(rows, states, work, records, found):
     """Plays runs one after the other, with Coulomb's friction.
 
-    `control` is a CONTROL, `work` a `workspace()`; `found[i]`, a FOUND, is what is kept of row i.
-    Of row i `records.out[i]` (n x 6) has the motion at k * output_step, `out_mode[i]` its modes;
-    `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode after, impulse.
+    `states` is an array of one STATE with its control, `work` a `workspace()`; `found[i]`, a FOUND,
+    is what is kept of row i. Of row i `records.out[i]` (n x 6) has the motion at k * output_step,
+    `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
+    after, impulse.
     """
-    play_rows(coulomb, rows, control, NEW_STATE.copy(), NEW_STATE.copy(), work, records, found)
+    play_rows(coulomb, rows, states, NEW_STATE.copy(), work, records, found)
 
 
 @kernel
-def play_bouc_wen(rows, control, work, records, found):
+def play_bouc_wen(rows, states, work, records, found):
     """As `play`, with Bouc-Wen friction."""
-    play_rows(bouc_wen, rows, control, NEW_STATE.copy(), NEW_STATE.copy(), work, records, found)
+    play_rows(bouc_wen, rows, states, NEW_STATE.copy(), work, records, found)
 
 
 #: The event loop with each friction of a model's settings.

@@ -160,20 +160,8 @@ GIVEN = record(
     output_step="f8",
 )
 #: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an
-#: Ending), and whether it then stood at rest; and the counts of STATE.
-FOUND = record(
-    motion=MOTION,
-    t="f8",
-    peak="f8",
-    ending="i8",
-    at_rest="?",
-    steps="i8",
-    events="i8",
-    rows="i8",
-    gains="i8",
-    largest_gain="f8",
-    rules=("i8", (names.RULES,)),
-)
+#: Ending), counts of its steps and of the rows written, and whether it then stood at rest.
+FOUND = record(motion=MOTION, t="f8", peak="f8", ending="i8", steps="i8", rows="i8", at_rest="?")
 
 
 class Base(NamedTuple):

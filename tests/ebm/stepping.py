@@ -11,7 +11,7 @@ from rockcheck.ebm.core import march
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.state import FOUND, NEW_STATE, Records, Run, workspace
-from rockcheck.ebm.natural import control_of, pack
+from rockcheck.ebm.natural import pack, state_for
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
@@ -38,16 +38,16 @@ def six(motion: Any) -> np.ndarray:
 
 
 def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
-    """What the compiled loop finds that plays the scene, without rows."""
-    found = np.empty(1, FOUND)
+    """The state after the compiled loop has played the scene, without rows."""
+    states = state_for(model, model.most_steps)
     march.play(
         pack([scene], model),
-        control_of(model, model.most_steps),
+        states,
         work or workspace(),
         Records(*(part[None] for part in nothing())),
-        found,
+        np.empty(1, FOUND),
     )
-    return found[0]
+    return states[0]
 
 
 def assert_contacts_hold(scene: Scene, history: History, reach: float = 1e-9) -> None:
