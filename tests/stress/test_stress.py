@@ -11,6 +11,7 @@ from rockcheck.commands.cli import main
 from rockcheck.reports.document import publish
 from rockcheck.scenes import Block, Floor, Record, Rest, Scene, Sine, Wall, files, writing
 from rockcheck.validation.execute import models, pool
+from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.stress.generator import random_scene
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.studies.stress.runs import (
@@ -113,7 +114,8 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, label
             rules={"settles": 2},
         ),
     )
-    stale = writing.write_whole(writing.made(tmp_path, "failures") / "old.toml", "")
+    stale = tmp_path / "failures" / "old.toml"
+    publish(Finding("stress", "of another run", "", files={"failures/old.toml": ""}), tmp_path)
     study = Stress("runs", models=(label,), runs=12)
     found = run(study, tmp_path, jobs=0)
     page = publish(found, tmp_path).read_text()
