@@ -219,9 +219,10 @@ def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
     """As nobody but a stranger writes run.json, or a user keeps figures of his own."""
     folder = tmp_path / "sub"
     (folder / FIGURES).mkdir(parents=True)
-    theirs = {"../mine.csv": "a\n", "empty.csv": "b\n", "figures/a.json": "b\n", "own.csv": "a\n"}
-    said = {"files": {name: hash_of(content) for name, content in theirs.items()} | {"sub": ""}}
-    (folder / "run.json").write_text(json.dumps(said), "utf-8")
+    said = dict.fromkeys(("../mine.csv", "own.csv"), hash_of("a\n")) | dict.fromkeys(
+        ("empty.csv", "figures/a.json"), hash_of("b\n")
+    )
+    (folder / "run.json").write_text(json.dumps({"files": said | {"sub": ""}}), "utf-8")
     mine = [
         tmp_path / "mine.csv",
         *(folder / f"{name}.csv" for name in ("empty", "odd")),
