@@ -110,10 +110,13 @@ def only_falls(a, row, n, tau):
 
 
 @inner_kernel
-def may_exceed(a, row, n, tau, level):
-    """Whether c may be above a level between 0 and tau."""
+def may_top(a, row, rate, n, tau, level):
+    """Whether c may turn back above a level between 0 and tau; `rate` is the row of its slope."""
     low, high = halves(a, row, n)
-    return a[row, 0] - least_change(low * -1.0, high * -1.0, tau) > level
+    if not a[row, 0] - least_change(low * -1.0, high * -1.0, tau) > level:
+        return False
+    low, high = halves(a, rate, n - 1)
+    return a[rate, 0] + least_change(low, high, tau) < 0.0
 
 
 @inner_kernel

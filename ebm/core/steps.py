@@ -13,7 +13,7 @@ from rockcheck.ebm.core.ground import next_exceedance
 from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Rule, Shape
-from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, largest, may_exceed, slope, value
+from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, largest, may_top, slope, value
 from rockcheck.ebm.core.state import mode_code, note, on_wall, rests
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -61,10 +61,12 @@ def advance(block, base, run):
     state, mode, motion, a = run.state, run.state.mode, run.state.motion, run.a
     order, tau, t = state.order, state.tau, state.t
     motion_at(block, state, run.a, tau, motion)
-    falls = mode.family == Family.TILT and mode.sense * motion.w < 0.0
-    if falls and may_exceed(a, Row.PHI, order, tau, state.peak):
+    tilts = mode.family == Family.TILT
+    # One that rises at the end may have turned twice.
+    if tilts and may_top(a, Row.PHI, Row.OMEGA, order, tau, state.peak):
         top = largest(a, Row.PHI, Row.OMEGA, Row.GUARD, order, tau, run.stack)
         state.peak = max(state.peak, top)
+    falls = tilts and mode.sense * motion.w < 0.0
     if falls and a[Row.OMEGA, 0] >= 0.0 and run.state.control.until_decided:
         state.repeats = swings_again(state, energy_of(block, motion))
     state.peak = max(state.peak, abs(motion.theta))
