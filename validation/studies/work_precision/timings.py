@@ -350,7 +350,7 @@ def _batches(nodes: int) -> Iterator[Pair]:
         ),
     ):
         one, other = dear[1](), cheap[1]()
-        apart = np.abs(one.peak - other.peak)[(one.side == 0) & (other.side == 0)]
+        apart = np.abs(one.runs["peak"] - other.runs["peak"])[(one.side == 0) & (other.side == 0)]
         yield (
             "ebm",
             thing,
