@@ -38,13 +38,11 @@ def events_of(scene: Scene, t: Floats, states: Floats, felt: Floats) -> list[Eve
     found = [event for i in range(len(motion.contacts)) for event in motion.at_contact(i)]
     found += motion.at_floor()
     end = scene.run_times[-1] * (1.0 + 1e-12)  # a step of fixed length may go beyond
-    if abs(states[-1, 2]) >= steps.LYING:
-        before, after = np.abs(states[-2:, 2]).tolist()  # it may begin as good as down
-        part = min((math.pi / 2 - before) / (after - before), 1.0) if after > before else 0.0
-        end = min(end, t[-2] + part * (t[-1] - t[-2]))
+    fall = steps.time_of_fall(t, states)
+    if fall <= end:
         found = [
-            *(event for event in found if event[0] < end),
-            (end, f"overturned {'left' if states[-1, 2] > 0 else 'right'}", len(t) - 1, 0.0),
+            *(event for event in found if event[0] < fall),
+            (fall, f"overturned {'left' if states[-1, 2] > 0 else 'right'}", len(t) - 1, 0.0),
         ]
     found = sorted((event for event in found if event[0] <= end), key=lambda event: event[0])
     before = motion.modes([max(event[2] - 1, 0) for event in found])

@@ -137,6 +137,15 @@ def march_fixed(world: World, scene: Scene, times: Floats, felt: Floats) -> Marc
     return times[: len(marched)], marched, felt
 
 
+def time_of_fall(times: Floats, states: Floats) -> float:
+    """When a block that lies at the last step end was down, s; infinity if it does not lie."""
+    if abs(states[-1, 2]) < LYING:
+        return math.inf
+    before, after = np.abs(states[-2:, 2]).tolist()  # it may begin as good as down
+    part = min((math.pi / 2 - before) / (after - before), 1.0) if after > before else 0.0
+    return float(times[-2] + part * (times[-1] - times[-2]))
+
+
 def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
     """States at the run's times: positions by cubic Hermite interpolation, velocities linear.
 
@@ -150,7 +159,7 @@ def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
         return states[: len(inside)]
     positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
     # A cubic over a long step may show a fall that is none.
-    upright = inside < (times[-2] if abs(states[-1, 2]) >= LYING else math.inf)
+    upright = inside < time_of_fall(times, states)
     positions[upright, 2] = np.clip(positions[upright, 2], -LYING, LYING)
     return np.column_stack(
         [positions, *(np.interp(inside, times, states[:, column]) for column in (3, 4, 5))]

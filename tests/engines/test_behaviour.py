@@ -331,11 +331,18 @@ def test_a_motion_that_cannot_be_is_a_failure(step, answers, words):
 
 
 # Of which a cubic makes 1.6 rad.
-@pytest.mark.parametrize("answers", [{"state": lambda: (0.0, 1.0, 1.5, 0.0, 0.0, 100.0)}])
-def test_between_long_steps_no_block_falls(answers):
+@pytest.mark.parametrize(
+    ("answers", "duration"),
+    [
+        ({"state": lambda: (0.0, 1.0, 1.5, 0.0, 0.0, 100.0)}, 4.0),
+        # Down after the scene's end, in a step that goes beyond it.
+        ({"state": lambda: (0.0, 1.0, 1.6, 0.0, 0.0, 100.0)}, 9.5e-3),
+    ],
+)
+def test_between_long_steps_no_block_falls(answers, duration):
     assert (
         Scripted(time_step=1e-2, answers=answers)
-        .simulate(free_rocking(0.0, output_step=1e-3))
+        .simulate(free_rocking(0.0, output_step=1e-3, duration=duration))
         .outcome
         == "moving"
     )
