@@ -118,7 +118,7 @@ class _Motion:
         flat, flight = left & right, ~(left | right)
         noise = GAP_NOISE * self.near
         lowest, highest = np.sort(self.gap[:2], axis=0)
-        speed = np.abs(self.slip_rate)
+        speed = np.where(flight, math.inf, np.abs(self.slip_rate))  # no slip begins in flight
         slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
         still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
         # Where each kind began, and where it is told.

@@ -282,14 +282,31 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine):
     assert (hit.mode_before, hit.mode_after, hit.impulse) == ("rock", "flight", impulse)
 
 
-def test_slip_and_stick_events(varying_engine):
+@pytest.mark.parametrize(
+    ("scene", "step", "times"),
+    [
+        (
+            pulse_scene(4.5, 4.0, 0.3, duration=1.6),
+            "adaptive",
+            {
+                "slip": pytest.approx(1.057406, abs=1.1e-3),
+                "stick": pytest.approx(1.366917, abs=1e-4),
+            },
+        ),
+        # In flight it moves against the floor, but slips from its landing on.
+        (
+            ICE.replace(initial_height=0.2, excitation=Sine(amplitude=2.0, period=1.2)),
+            "adaptive",
+            {"slip": pytest.approx(math.sqrt(0.4 / 9.81), abs=1e-6)},
+        ),
+    ],
+    ids=["rocks", "lands"],
+)
+def test_slip_and_stick_events(varying_engine, scene, step, times):
     """Times of the unilateral model; that of the slip is known to one step."""
-    scene = pulse_scene(4.5, 4.0, 0.3, duration=1.6)
-    events = varying_engine(time_step="adaptive").simulate(scene).event_list
-    assert {event.kind: event.t for event in events if event.kind in ("slip", "stick")} == {
-        "slip": pytest.approx(1.057406, abs=1.1e-3),
-        "stick": pytest.approx(1.366917, abs=1e-4),
-    }
+    events = varying_engine(time_step=step).simulate(scene).event_list
+    told = ("slip", "stick", "settled")
+    assert {event.kind: event.t for event in events if event.kind in told} == times
 
 
 def test_a_rocking_block_comes_to_rest_once(varying_engine):
