@@ -132,7 +132,7 @@ class _Motion:
             "landing": [(i, i) for i in _rises(~flight)],
             "slip": [(_start(speed, i, SLIP_NOISE * SLIPPING), i) for i in _rises(slipping)],
             "stick": [(i, i) for i in _rises(~slipping) if not flight[i]],
-            "settled": [(i, i) for i in _rises(_held(still, t, REST, value=True))],
+            "settled": [(i, i) for i in _rises(_held(_held(still, t), t, REST, value=True))],
         }
         return [(t[start], kind, i, 0.0) for kind, found in places.items() for start, i in found]
 

@@ -299,8 +299,18 @@ def test_events_of_a_pulse_beside_a_wall(varying_engine):
             "adaptive",
             {"slip": pytest.approx(math.sqrt(0.4 / 9.81), abs=1e-6)},
         ),
+        # It stands all the time.
+        (
+            ICE.replace(
+                block=PAPER_BLOCK,
+                floor=Floor(friction=0.3),
+                excitation=Sine(amplitude=1.0, period=0.5, cycles=4),
+            ),
+            1e-3,
+            {},
+        ),
     ],
-    ids=["rocks", "lands"],
+    ids=["rocks", "lands", "stands"],
 )
 def test_slip_and_stick_events(varying_engine, scene, step, times):
     """Times of the unilateral model; that of the slip is known to one step."""
