@@ -12,7 +12,7 @@ from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
-from rockcheck.reports.view import FALL, SceneView
+from rockcheck.reports.view import FALL, SceneView, fall_to
 from rockcheck.scenes import Side, experience
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy import figures
@@ -411,7 +411,8 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
         f"falling {side}"
         if cell.outcome == "moving"
         and abs(last) > FALL
-        and not run.load_scene(cell.scene).wall(side)
+        and abs(last) > fall_to(side, (scene := run.load_scene(cell.scene)).block)
+        and not scene.wall(side)
         else cell.fate
     )
 

@@ -12,19 +12,33 @@ from typing import Any
 import numpy as np
 
 from rockcheck.reports.style import Look, looks
-from rockcheck.scenes import Floats, History, InputError, Scene, kinematics, reading
+from rockcheck.scenes import (
+    Block,
+    Floats,
+    History,
+    InputError,
+    Scene,
+    Side,
+    kinematics,
+    reading,
+)
 from rockcheck.scenes.history import COLUMNS, events_path
 from rockcheck.validation.discrepancy import compare
 from rockcheck.validation.suite import results
 
-#: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
-#: not come back.
+#: A block that falls is drawn up to this rotation, in alpha of the pivot that it turns about.
+#: Beyond 1 a block in free rocking does not come back.
 FALL = 1.5
 #: The opening window: a model turns or slides by at least this share of the largest motion; the
 #: margin beside it; and the share of the whole time from which on the whole is shown.
 STILL, ROOM, NEARLY_ALL = 0.01, 0.05, 0.85
 #: Settings that only a measured history has (`validation.discrepancy.measured`).
 MEASURED = {"file", "offset"}
+
+
+def fall_to(side: Side, block: Block) -> float:
+    """`FALL` of a block that tilts to a side, in its own alpha, that of the weaker pivot."""
+    return FALL * (block.pivot(side).alpha / block.alpha)
 
 
 @dataclass(frozen=True)
@@ -179,15 +193,17 @@ class SceneView(View):
 
     @cached_property
     def falls(self) -> dict[str, float]:
-        """By model: when the rotation passes `FALL` for good, s; only those that fall.
+        """By model: when the rotation passes `fall_to` for good, s; only those that fall.
 
         One that is beyond it at the end, and may lean on a wall there, does not.
         """
+        left, right = fall_to("left", self.scene.block), fall_to("right", self.scene.block)
         beyond = {
-            model: rows[rows > np.max(np.flatnonzero(turned <= FALL), initial=-1)]
+            model: rows[rows > np.max(np.flatnonzero(turned <= most), initial=-1)]
             for model, columns in self.values.items()
             for turned in (np.abs(columns["theta"]),)
-            for rows in (np.flatnonzero(turned > FALL),)
+            for most in (np.where(columns["theta"] > 0.0, left, right),)
+            for rows in (np.flatnonzero(turned > most),)
         }
         return {
             model: float(self.t[rows[0]])
