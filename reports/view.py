@@ -223,7 +223,8 @@ class SceneView(View):
         near = {
             model: np.searchsorted(
                 self.t,
-                np.asarray(history.channels["t"], dtype=float) - 0.5 * float(self.t[1] - self.t[0]),
+                np.asarray(history.channels["t"], dtype=float)
+                - 0.5 * self.scene.output_step * self.stride,
             )
             for model, history in self.histories.items()
             if set(history.settings) >= MEASURED
@@ -254,7 +255,7 @@ class SceneView(View):
         if not len(rows):
             return whole
         first, last = float(self.t[rows[0]]), float(self.t[rows[-1]])
-        room = ROOM * (last - first) + 10.0 * float(self.t[1] - self.t[0])
+        room = ROOM * (last - first) + 10.0 * self.scene.output_step * self.stride
         first, last = max(whole[0], first - room), min(whole[1], last + room)
         return (first, last) if last - first < NEARLY_ALL * (whole[1] - whole[0]) else whole
 

@@ -21,7 +21,7 @@ model = "faulty:Still"
 offset = {offset}
 [[scene]]
 name = "short"
-duration = 0.2
+duration = 0.004  # one row
 block = {{ half_width = 0.4, half_height = 1.5 }}
 floor = {{ friction = 0.5 }}
 [tolerances.short.near.still]
