@@ -257,8 +257,9 @@ def test_scene_file_plays_the_same_scene(tmp_path, scene):
 
 
 def test_slugs_differ_whatever_the_file_system():
-    slugs = slugs_of(["a b", "a,b", "A b", "a-b-2", "..", "x/../y"])
-    assert len({slug.lower() for slug in slugs.values()}) == 6
+    slugs = slugs_of(["a b", "a,b", "A b", "a-b-small", "x-small", "x", "a-b-2", "..", "x/../y"])
+    # and so do the names of their small figures
+    assert len({f"{slug.lower()}{of}" for slug in slugs.values() for of in ("", "-small")}) == 18
     assert all(
         re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..")
         for slug in slugs.values()
