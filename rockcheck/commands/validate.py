@@ -141,7 +141,7 @@ def run(
         trend = across.trend_of(across.remember(history, moment))
         document.show(trend, console())
         if report:
-            where = document.publish(trend, usable_folder(folder, "trend"))
+            where = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
