@@ -301,7 +301,8 @@ def report(
     from rockcheck.reports import document, site
 
     if output is not None:
-        part = document if (folder / document.FIGURES).is_dir() else site
+        suites_own = (folder / results.SCHEMA_FILE).is_file()
+        part = site if suites_own or not (folder / document.FIGURES).is_dir() else document
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
         check_file(output, "--output")
