@@ -209,11 +209,12 @@ def _left_by_another(folder: Path, hashes: Mapping[str, str]) -> Iterator[str]:
                 yield str(drawn)
 
 
-def publish(found: Finding, folder: Path) -> Path:
+def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
     """Write `run.json`, tables as CSV, `summary.md`, figures and `index.html`; returns the page.
 
     The scenes of failures are written beside them. The folder holds one run: files of another are
     removed. Figures are written as the page shows them, and as the data that `write_figure` draws.
+    The page leads to that of a run in the folder above, if one is there, or is to come (`of_run`).
     """
     plots = list(found.plots())
     data = {
@@ -252,7 +253,7 @@ def publish(found: Finding, folder: Path) -> Path:
         site={
             "name": f"rockcheck: {found.title}",
             "links": [("Report", "../index.html")]
-            if (folder.parent / "index.html").exists()
+            if of_run or (folder.parent / "index.html").exists()
             else [],
         },
         found=found,

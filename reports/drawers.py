@@ -389,6 +389,7 @@ def live_data(plot: Plot) -> dict[str, Any]:
             {
                 "label": series.label,
                 "values": _short(series.y),
+                "fell": np.flatnonzero(np.array(series.y, float) == math.inf).tolist(),
                 "colour": colour,
                 "low": _short(series.low),
                 "high": _short(series.high),

@@ -91,15 +91,15 @@ def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     """Write run.json, its schema and the tables; returns run.json.
 
     The histories are there already. Pages of an earlier run are removed, since they show other
-    numbers: the index, and unless it is to have `pages` all, with the trend. Two runs take turns.
+    numbers: the index, the trend, and unless it is to have `pages` all. Two runs take turns.
     """
     told = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
     told |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
         if not pages:
             _remove(folder)
-            if (folder / "trend/run.json").is_file():
-                document.remove(folder, ["trend/index.html"])
+        if (folder / "trend/run.json").is_file():
+            document.remove(folder, ["trend/index.html"])
         index = document.belongings(folder / INDEX)  # none of a page that is not ours
         document.remove(folder, {name for name in index if "-small." not in name})
         document.remove(folder, [INDEX] * bool(index))
@@ -320,13 +320,15 @@ class _Pages:
                 "run": self.run.model_dump(
                     mode="json",
                     include={
-                        "suite",
-                        "reference",
-                        "model_form",
-                        "models",
-                        "measures",
-                        "versions",
-                        "hardware",
+                        "suite": True,
+                        "reference": True,
+                        "model_form": True,
+                        "models": True,
+                        "measures": True,
+                        "versions": True,
+                        "hardware": True,
+                        "judged": True,
+                        "inputs": {view.name},
                     },
                 ),
                 "links": self.common["site"]["links"],

@@ -12,7 +12,7 @@ from typing import Any
 
 from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
-from rockcheck.reports.view import FALL, SceneView
+from rockcheck.reports.view import FALL, SceneView, fall_to
 from rockcheck.scenes import Side, experience
 from rockcheck.scenes.history import events_path
 from rockcheck.validation.discrepancy import figures
@@ -29,7 +29,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.suite import across, results
-from rockcheck.validation.suite.tables import used
+from rockcheck.validation.suite.tables import nearest, used
 from rockcheck.validation.suite.tolerances import apart, known
 
 #: What a verdict is called and the sign that goes with its colour.
@@ -367,8 +367,8 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     of the peaks. `u_num` is the model's numerical uncertainty of `whole` (alpha), where known.
 
     `apart`: of it and the reference one falls and the other does not, or to another side, and
-    `why_apart`. `nearest` is the check that uses most of its limit, `used` that share; infinite
-    where there is no history.
+    `why_apart`. `nearest` is the check that uses most of its limit, `used` the largest share;
+    infinite where there is no history.
     """
     cell, figures, against = cells[model], cells[model].figures, run.reference
     of = "theta_rms", against
@@ -387,7 +387,7 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
         "outcome": outcome_of(run, cell),
         "apart": len(sides) > 1,
         "why_apart": why_apart(cell) if len(sides) > 1 else "",
-        "nearest": max(cell.checks, key=used, default=None),
+        "nearest": nearest(cell.checks),
         "used": max(map(used, cell.checks), default=0.0) if cell.status == "done" else math.inf,
     }
 
@@ -411,7 +411,8 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
         f"falling {side}"
         if cell.outcome == "moving"
         and abs(last) > FALL
-        and not run.load_scene(cell.scene).wall(side)
+        and abs(last) > fall_to(side, (scene := run.load_scene(cell.scene)).block)
+        and not scene.wall(side)
         else cell.fate
     )
 

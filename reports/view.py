@@ -12,19 +12,33 @@ from typing import Any
 import numpy as np
 
 from rockcheck.reports.style import Look, looks
-from rockcheck.scenes import Floats, History, InputError, Scene, kinematics, reading
+from rockcheck.scenes import (
+    Block,
+    Floats,
+    History,
+    InputError,
+    Scene,
+    Side,
+    kinematics,
+    reading,
+)
 from rockcheck.scenes.history import COLUMNS, events_path
 from rockcheck.validation.discrepancy import compare
 from rockcheck.validation.suite import results
 
-#: A block that falls is drawn up to this rotation (alpha). Beyond 1 a block in free rocking does
-#: not come back.
+#: A block that falls is drawn up to this rotation, in alpha of the pivot that it turns about.
+#: Beyond 1 a block in free rocking does not come back.
 FALL = 1.5
 #: The opening window: a model turns or slides by at least this share of the largest motion; the
 #: margin beside it; and the share of the whole time from which on the whole is shown.
 STILL, ROOM, NEARLY_ALL = 0.01, 0.05, 0.85
 #: Settings that only a measured history has (`validation.discrepancy.measured`).
 MEASURED = {"file", "offset"}
+
+
+def fall_to(side: Side, block: Block) -> float:
+    """`FALL` of a block that tilts to a side, in its own alpha, that of the weaker pivot."""
+    return FALL * (block.pivot(side).alpha / block.alpha)
 
 
 @dataclass(frozen=True)
@@ -179,15 +193,17 @@ class SceneView(View):
 
     @cached_property
     def falls(self) -> dict[str, float]:
-        """By model: when the rotation passes `FALL` for good, s; only those that fall.
+        """By model: when the rotation passes `fall_to` for good, s; only those that fall.
 
         One that is beyond it at the end, and may lean on a wall there, does not.
         """
+        left, right = fall_to("left", self.scene.block), fall_to("right", self.scene.block)
         beyond = {
-            model: rows[rows > np.max(np.flatnonzero(turned <= FALL), initial=-1)]
+            model: rows[rows > np.max(np.flatnonzero(turned <= most), initial=-1)]
             for model, columns in self.values.items()
             for turned in (np.abs(columns["theta"]),)
-            for rows in (np.flatnonzero(turned > FALL),)
+            for most in (np.where(columns["theta"] > 0.0, left, right),)
+            for rows in (np.flatnonzero(turned > most),)
         }
         return {
             model: float(self.t[rows[0]])
@@ -207,7 +223,8 @@ class SceneView(View):
         near = {
             model: np.searchsorted(
                 self.t,
-                np.asarray(history.channels["t"], dtype=float) - 0.5 * float(self.t[1] - self.t[0]),
+                np.asarray(history.channels["t"], dtype=float)
+                - 0.5 * self.scene.output_step * self.stride,
             )
             for model, history in self.histories.items()
             if set(history.settings) >= MEASURED
@@ -238,7 +255,7 @@ class SceneView(View):
         if not len(rows):
             return whole
         first, last = float(self.t[rows[0]]), float(self.t[rows[-1]])
-        room = ROOM * (last - first) + 10.0 * float(self.t[1] - self.t[0])
+        room = ROOM * (last - first) + 10.0 * self.scene.output_step * self.stride
         first, last = max(whole[0], first - room), min(whole[1], last + room)
         return (first, last) if last - first < NEARLY_ALL * (whole[1] - whole[0]) else whole
 
@@ -432,15 +449,20 @@ def scene_views(
     return views
 
 
+#: What the names of a scene's or an ensemble's further figures have besides.
+ADDED = re.compile(r"(-small|-scenes)+$")
+
+
 def slugs_of(names: Collection[str]) -> dict[str, str]:
     """A file name for each scene, safe on any system.
 
-    The names differ for different scenes also where case does not count.
+    The names differ for different scenes also where case does not count, and with what is added to
+    them for a figure (`ADDED`).
     """
     taken: dict[str, str] = {}
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         numbered = chain([base], (f"{base}-{n}" for n in count(2)))
-        slug = next(one for one in numbered if one.lower() not in taken)
-        taken[slug.lower()] = slug
+        slug = next(one for one in numbered if ADDED.sub("", one.lower()) not in taken)
+        taken[ADDED.sub("", slug.lower())] = slug
     return dict(zip(names, taken.values(), strict=True))

@@ -10,7 +10,7 @@ from itertools import chain, repeat, takewhile
 
 import numpy as np
 
-from rockcheck.ebm.spectrum import LEFT, RIGHT, SAFE, Spectrum
+from rockcheck.ebm.spectrum import LEFT, RIGHT, Spectrum
 from rockcheck.reports.style import SUPERSCRIPTS
 from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine, errors
 from rockcheck.validation import Discrepancy
@@ -154,10 +154,8 @@ def discrepancy_html(found: Discrepancy) -> str:
 
 def spectrum_html(spectrum: Spectrum) -> str:
     """The table of a spectrum in a notebook: shares of outcomes, runs and scene."""
-    shares = (
-        f"{number(100.0 * float(np.mean(spectrum.outcomes == side)))} %"
-        for side in (SAFE, LEFT, RIGHT)
-    )
+    falls = (float(np.mean(spectrum.outcomes == side)) for side in (LEFT, RIGHT))
+    shares = (f"{number(100.0 * share)} %" for share in (spectrum.safe_area, *falls))
     facts = [*zip(("safe", "overturned left", "overturned right"), shares, strict=True)]
     facts += [
         ("nodes", f"{spectrum.outcomes.size}, from {spectrum.evaluations} runs"),

@@ -108,7 +108,7 @@ def console() -> Console:
 
     At most as wide as the terminal, 80 columns where there is none; coloured on a terminal only.
     """
-    return _Screen(markup=False, highlight=False, quiet=_voice.get() != "tables")
+    return _Screen(markup=False, emoji=False, highlight=False, quiet=_voice.get() != "tables")
 
 
 def tell_missing() -> None:
@@ -155,7 +155,7 @@ def progress(
     title += ", may compile first" * any(compiles(*one) for one in models)
     screen = Console(stderr=True)
     bar = Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(20),
         TaskProgressColumn(),
         TimeElapsedColumn(),

@@ -141,7 +141,7 @@ def run(
         trend = across.trend_of(across.remember(history, moment))
         document.show(trend, console())
         if report:
-            where = document.publish(trend, usable_folder(folder, "trend"))
+            where = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
             console().print(f"trend: {where}", soft_wrap=True)
     if report:
         with progress("pages") as on_progress:
@@ -301,7 +301,8 @@ def report(
     from rockcheck.reports import document, site
 
     if output is not None:
-        part = document if (folder / document.FIGURES).is_dir() else site
+        suites_own = (folder / results.SCHEMA_FILE).is_file()
+        part = site if suites_own or not (folder / document.FIGURES).is_dir() else document
         if scene is None or len(scene) != 1:
             raise InputError("needs one --scene NAME", "--output")
         check_file(output, "--output")

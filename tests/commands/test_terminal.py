@@ -174,9 +174,13 @@ def test_a_long_work_tells_a_log_how_far_it_is(
 @pytest.mark.parametrize("columns", [60, 80])
 def test_on_a_terminal_colour_progress_and_its_width(mine, columns):
     terminal = {"TTY_COMPATIBLE": "1", "TERM": "xterm-256color", "COLUMNS": str(columns)}
-    words = "simulate mine.toml --model mujoco --set time_step=1e-3 -o a.csv"
+    words = "simulate mine.toml --model mujoco --set time_step=1e-3 -o a:rocket:[b].csv"
     done = rockcheck(*words.split(), **terminal)
-    assert [part for part in ("left", "mine, mujoco", "\x1b[") if part not in done.stderr] == []
+    assert [
+        part
+        for part in ("left", "mine, mujoco", "\x1b[", "a:rocket:[b].csv")
+        if part not in done.stderr + done.stdout
+    ] == []
     assert not list(Path().glob("*--*")), "only what was asked for"
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", rockcheck("scenes", **terminal).stdout)
     assert max(map(len, plain.splitlines())) <= columns

@@ -17,8 +17,9 @@ from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
-from rockcheck.scenes import History, reading
+from rockcheck.scenes import History, reading, writing
 from rockcheck.validation.suite import tables
+from rockcheck.validation.uncertainty import population
 
 
 def addresses(text: str) -> list[str]:
@@ -197,11 +198,24 @@ def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_g
 
     one, *others = finished.cells
     second = again(
-        cells=(one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)}), *others)
+        cells=(one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)}), *others),
+        inputs={
+            "Free": population.Inputs(
+                samples=7,
+                model="ebm",
+                names=("mu",),
+                figures=(),
+                overturns={"name": "overturns", "value": 0.5, "low": 0.2, "high": 0.8, "unit": "1"},
+                sensitivities=(),
+            )
+        },
     )
     changed = {name for name in first | second if second[name][1] != first[name][1]}
-    assert changed == {"free.html"}
-    assert all(second[name] == first[name] for name in first if "beside-a-wall" in name)
+    assert (
+        changed,
+        b"7 draws of mu" in second["Free-2.html"][1],
+        all(second[name] == first[name] for name in first if "beside-a-wall" in name),
+    ) == ({"free.html", "Free-2.html"}, True, True)
 
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
     left = again(
@@ -267,10 +281,10 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
         ("free", ".pdf", b"%PDF"),
         ("crowd", ".svg", b"<?xml"),
     ):
-        path = tmp_path / f"{name}{ending}"
+        path = writing.made(tmp_path, "figures") / f"{name}{ending}"
         typed("report", str(tmp_path), "--scene", name, "-o", str(path))
         assert path.read_bytes().startswith(begins)
-    assert (tmp_path / "free.svg").read_bytes() == drawn
+    assert (tmp_path / "figures" / "free.svg").read_bytes() == drawn
     for asked, said in (
         (
             ["--scene", "nowhere", "-o", "one.pdf"],

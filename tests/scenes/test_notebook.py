@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -53,7 +54,9 @@ def things(scene, history):
         "scene": scene,
         "history": history,
         "discrepancy": compare(history, EventBasedModel().simulate(scene), scene=scene),
-        "spectrum": overturning_spectrum(scene, [2.0, 4.0, 6.0], [2.0, 8.0]),
+        "spectrum": replace(
+            overturning_spectrum(scene, [2.0, 4.0, 6.0], [2.0, 8.0]), undecided=np.array([[0, 1]])
+        ),
     }
 
 
@@ -64,6 +67,7 @@ def things(scene, history):
         ("history", "at rest"),
         ("discrepancy", "RMS difference of rotation"),
         ("spectrum", "6, from 6 runs"),
+        ("spectrum", "safe16.7 %"),  # and an undecided one, which is not safe
     ],
 )
 def test_shows_itself_as_a_table_and_its_plot_as_a_picture(things, name, expected):

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from operator import attrgetter
 from typing import Any
 
@@ -86,7 +86,7 @@ def _verdict_row(cell: results.Cell) -> list[Any]:
         for one in cell.checks
         if one.verdict == "fail" or (one.limit and not tolerances.known(one.figure.measure).yes_no)
     ]
-    near = max(weighed, key=used, default=None)
+    near = nearest(weighed)
     unsure = ", not converged" if cell.converged is False else ""
     judged = near.figure.windowed if near else "as it must be" if cell.checks else "nothing judged"
     idle = cell.status == "done" and not cell.checks
@@ -231,6 +231,11 @@ def used(check: results.Check) -> float:
     return min(tolerances.apart(value, check.ideal, floor) / limit, most)
 
 
+def nearest(checks: Iterable[results.Check]) -> results.Check | None:
+    """The check that uses most of its limit: one that fails before one without a tolerance."""
+    return max(checks, key=lambda check: (check.words == "fail", used(check)), default=None)
+
+
 def share(check: results.Check) -> str:
     """A check in a few words: name, figure, limit."""
     figure = check.figure
@@ -365,7 +370,7 @@ def _entry(cell: results.Cell | None, judged: bool) -> str:
     numerical = [one for one in cell.checks if one.figure.against and one.kind == "numerical"]
     worst = max(
         numerical,
-        key=lambda one: (one.verdict == "fail", one.figure.value is not None, used(one)),
+        key=lambda one: (one.words == "fail", one.figure.value is not None, used(one)),
         default=None,
     )
     said = _plain(share(worst)) if worst else ""

@@ -32,7 +32,7 @@ document.addEventListener("DOMContentLoaded", () => {
       if (index === null || index === undefined) return;
       const shown = chart.single ? chart.curves.filter(curve => curve.width >= 1 || curve === near) : chart.curves;
       const other = chart.per_unit ? ` (${words(chart.intensities[index] * chart.per_unit)} ${chart.other_unit})` : "";
-      output.textContent = `${chart.across} ${words(chart.intensities[index])}${other}: ` + shown.map(curve => `${curve.label} ${chart.single && curve.values[index] === null ? "fell" : words(curve.values[index])}`
+      output.textContent = `${chart.across} ${words(chart.intensities[index])}${other}: ` + shown.map(curve => `${curve.label} ${curve.fell.includes(index) ? "fell" : words(curve.values[index])}`
         + (curve.high.length ? ` (${words(curve.low[index])} to ${words(curve.high[index])})` : "")).join("; ");
     };
     const axis = { stroke: soft, grid: { stroke: grid, width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 18 };

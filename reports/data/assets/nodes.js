@@ -218,7 +218,7 @@
     const all = kept.unpacked ??= floats(kept.rows), first = index ? kept.ends[index - 1] : 0, last = kept.ends[index] - 1;
     const column = n => Array.from({ length: last - first + 1 }, (_, k) => all[4 * (first + k) + n]);
     const t = column(0), channels = { theta: column(1).map(value => value / kept.alpha), x: column(2), y: column(3) };
-    const fallen = channels.theta.findIndex(value => Math.abs(value) > 1.5), until = fallen < 0 ? t.length - 1 : fallen;
+    const until = Math.min(channels.theta.findLastIndex(value => Math.abs(value) <= 1.5) + 1, t.length - 1);  // where it falls for good
     const reach = Math.hypot(...kept.block);
     const xs = channels.x.slice(0, until + 1);
     const listeners = [];

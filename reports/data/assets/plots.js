@@ -200,7 +200,7 @@ const Plots = (() => {
 
   function values(parent, store, channel, first) {
     const falls = channel.name === "theta" && store.data.models.some(model => model.fell !== null);
-    const [box] = host(parent, axisLabel(channel) + (falls ? "; ✕ fell: nothing is drawn beyond 1.5" : ""), false, `${channel.label} of ${store.data.models.length} models over time; the numbers are in the tables of this page`);
+    const [box] = host(parent, axisLabel(channel) + (falls ? "; ✕ fell: nothing is drawn from there on" : ""), false, `${channel.label} of ${store.data.models.length} models over time; the numbers are in the tables of this page`);
     return overTime(box, store, {
       height: first ? 190 : 140,
       data: [store.t, ...store.data.models.map(model => model.drawn[channel.name])],

@@ -7,7 +7,7 @@ from collections import defaultdict
 import numpy as np
 import pytest
 
-from rockcheck import Floor, Spectrum
+from rockcheck import Floor, Record, Spectrum
 from rockcheck.validation.paper import paper_panels
 from rockcheck.validation.studies.spectrum import study as agreement
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
@@ -103,6 +103,15 @@ def test_agreement_counts_equal_outcomes(agree):
     ]
     assert by_spectrum.rows[1] == [panel.name, *table.rows[1]]
     assert json.loads(json.dumps(found)) == found
+    assert [  # whether the axes are a record's
+        list(agreement.agreement_blocks(found, [dataclasses.replace(panel, scene=one)], False))[
+            -1
+        ].data["record"]
+        for one in (
+            panel.scene,
+            panel.scene.replace(excitation=Record.from_samples([0.0, 1.0], 0.1)),
+        )
+    ] == [False, True]
     equal = {"ebm": 25, "ebm-unilateral": 25, "cm": 24}
     assert {one["model"]: one["equal"] for one in found["maps"]} == equal
     assert [(one["row"], len(one["outcomes"])) for one in plot.data["panels"]] == [

@@ -153,13 +153,18 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     near = [cell(f"near {n}", "m", check(0.4)) for n in range(tables.MOST_SHOWN - 1)]
     far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
     drawn = results.EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
-    worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", check(0.75)))
+    worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", WAITS, check(0.75)))
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
     assert tables.shown(run) == tuple(one.scene for one in worst)
     assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
     found = tables.finding_of(run)
     rows, (wrong, better) = found.table("verdicts").rows, found.blocks[2:4]
-    assert (len(rows), rows[0][2]) == (tables.MOST_SHOWN + 1, worst[0].checks[0].figure.windowed)
+    # what fails is worse than what waits for a tolerance
+    assert (len(rows), rows[0][2], rows[-1][3]) == (
+        tables.MOST_SHOWN + 1,
+        worst[0].checks[0].figure.windowed,
+        1.5,
+    )
     assert (wrong.verdict, bool(better.text)) == ("fail", True)
     text = tables.markdown(run)
     # the number of the others is not a row of the table
@@ -262,6 +267,7 @@ ALONE = check(0.9, "x_rms", against="")
             True,
             "| a |  | ❌ outcome_agrees no |",
         ),
+        ((cell("a", "m", WAITS, check(0.75)),), True, "| a |  | ❌ theta_rms 7.50e-01 / 0.5 |"),
         # Outcomes where nothing is judged, but of a cell without a history that it failed.
         (
             (cell("a", "m", outcome="overturned left", overturned_at=3.21), BROKEN),

@@ -278,11 +278,10 @@ def lines_of(
     """
     x = levels.tolist()
     quantiles = np.nanquantile(peaks.reshape(-1, len(x)), list(BAND), axis=0, method="inverted_cdf")
-    known, quantiles = (np.where(np.isinf(some), np.nan, some) for some in (peaks, quantiles))
     lines = [
-        (name, sign, line, fell)
-        for name, *both in zip(motions, known.tolist(), np.isinf(peaks).tolist(), strict=True)
-        for sign, line, fell in zip((1, -1), *both, strict=True)
+        (name, sign, line)
+        for name, both in zip(motions, peaks.tolist(), strict=True)
+        for sign, line in zip((1, -1), both, strict=True)
     ]
     return [
         Plot(
@@ -294,7 +293,7 @@ def lines_of(
                     [
                         *(
                             Series(name if sign > 0 else f"{name}, reversed", x, line, style="thin")
-                            for name, sign, line, _ in lines
+                            for name, sign, line in lines
                         ),
                         *(
                             Series(f"{100.0 * share:g} %", x, line, style=style)
@@ -318,16 +317,19 @@ def lines_of(
                 *map(Column, ("direction", "intensity", "peak_rotation_alpha", "overturned")),
             ],
             [
-                [name, sign, level, peak, int(over)]
-                for name, sign, line, fell in lines
-                for level, peak, over in zip(x, line, fell, strict=True)
+                [name, sign, level, math.nan if peak == math.inf else peak, int(peak == math.inf)]
+                for name, sign, line in lines
+                for level, peak in zip(x, line, strict=True)
             ],
             on="file",
         ),
         Table(
             "quantiles",
             [Column("intensity"), *(Column(f"p{100.0 * share:g}") for share in BAND)],
-            [[level, *row] for level, row in zip(x, quantiles.T.tolist(), strict=True)],
+            [
+                [level, *(math.nan if one == math.inf else one for one in row)]
+                for level, row in zip(x, quantiles.T.tolist(), strict=True)
+            ],
             on="file",
         ),
     ]

@@ -593,7 +593,7 @@ def agreement_blocks(found: Agreement, panels: Sequence[Panel], came: bool) -> I
             data={
                 "frequencies": found["map_frequencies"],
                 "amplitudes": found["map_amplitudes"],
-                "record": False,
+                "record": panels[0].scene.excitation.kind == "record",
                 "panels": [
                     {
                         "title": panel.title.replace(", ", "\n") if row == 0 else "",
