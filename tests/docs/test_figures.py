@@ -15,6 +15,7 @@ from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_sc
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
+from rockcheck.validation.studies.work_precision.runs import LINES
 from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.runner import run_suite
 
@@ -74,35 +75,44 @@ def test_the_tutorials_bookcase(tmp_path, told):
     assert max(error["cm"], error["mujoco"]) < 0.004
 
 
-def settings() -> dict[str, tuple[list[float], float]]:
-    """Errors by kind of scene (alpha) and cost of each setting of the kept benchmark."""
-    table = whole_runs.load("benchmark").table("work-precision")
+def settings() -> dict[str, list[tuple[float, float]]]:
+    """Error (alpha) and cost of each setting of the kept benchmark, by kind of scene."""
+    drawn = [
+        line
+        for plot in whole_runs.load("benchmark").plots()
+        for panel in plot.panels
+        for line in panel.series
+    ]
     return {
-        f"{model} {setting}": ([error for error in errors if error is not None], cost)
-        for model, setting, cost, *errors in table.rows
+        f"{name} {value:g}": [(one.y[k], one.x[k]) for one in drawn if one.label == name]
+        for name, line in LINES.items()
+        for k, value in enumerate(line.values)
     }
 
 
 @pytest.mark.parametrize(
     ("names", "least", "most", "ratios"),
     [
-        (["ebm-unilateral tolerance 1e-10"], 3e-15, 2e-10, [1.4]),
-        (["ebm tolerance 1e-10"], 4e-15, 3e-10, [1.0]),
-        (["ebm-bouc-wen yield_displacement 1e-05"], 3e-5, 3e-2, [130.0]),
-        (["cm penetration 1e-08"], 1e-7, 2e-4, [200.0]),
-        (["{} adaptive largest_step 0.001"], 5e-9, 7e-6, [790.0, 860.0]),
-        (["{} time_step 0.0001"], 2e-5, 3e-3, [5500.0, 6100.0]),
-        (["{} time_step 0.001"], 2e-4, 2e-2, [560.0, 640.0]),
+        (["ebm-unilateral 1e-10"], 3e-15, 2e-10, [1.3]),
+        (["ebm 1e-10"], 3e-15, 3e-10, [1.0]),
+        (["ebm-bouc-wen 1e-05"], 3e-5, 3e-2, [110.0]),
+        (["cm 1e-08"], 2e-7, 2e-4, [98.0]),
+        (["{} adaptive 0.001"], 5e-9, 7e-6, [1100.0, 1200.0]),
+        (["{} 0.0001"], 2e-5, 3e-3, [7300.0, 8800.0]),
+        (["{} 0.001"], 2e-4, 2e-2, [770.0, 890.0]),
     ],
 )
 def test_the_table_of_choices(names, least, most, ratios):
     found = settings()
-    engines = ("mujoco", "pybullet")
-    lines = list(dict.fromkeys(name.format(engine) for name in names for engine in engines))
-    errors = [error for line in lines for error in found[line][0]]
+    lines = {name.format(engine) for name in names for engine in ("mujoco", "pybullet")}
+    errors = [error for line in lines for error, _ in found[line]]
     assert (rounded(min(errors)), rounded(max(errors))) == (least, most)
-    unit = found["ebm tolerance 1e-10"][1]
-    assert sorted(rounded(found[line][1] / unit, 2) for line in lines) == ratios
+    assert sorted(rounded(np.median(ratio(found, one, "ebm 1e-10")), 2) for one in lines) == ratios
+
+
+def ratio(found, line, other) -> list[float]:
+    """Costs of a setting over those of another one."""
+    return [one / two for (_, one), (_, two) in zip(found[line], found[other], strict=True)]
 
 
 def test_the_step_that_an_engine_needs():
@@ -123,21 +133,26 @@ def test_the_step_that_an_engine_needs():
 
 def test_what_the_benchmark_says():
     found = settings()
-    for model in ("ebm", "ebm-unilateral"):
-        assert found[f"{model} tolerance 1e-12"][1] < 1.075 * found[f"{model} tolerance 0.0001"][1]
-    pairs = [
-        (*found[f"{engine} time_step 0.001"], *found[f"{engine} adaptive largest_step 0.004"])
-        for engine in ("mujoco", "pybullet")
+    assert (
+        1.205
+        < max(
+            max(ratio(found, f"{one} 1e-12", f"{one} 0.0001")) for one in ("ebm", "ebm-unilateral")
+        )
+        < 1.215
+    )
+    pairs = [(f"{one} adaptive 0.004", f"{one} 0.001") for one in ("mujoco", "pybullet", "pymunk")]
+    assert all(0.33 < np.median(ratio(found, *pair)) < 0.53 for pair in pairs)
+    gains = [
+        coarse / fine
+        for pair in pairs[:2]
+        for (fine, _), (coarse, _) in zip(*(found[one] for one in pair), strict=True)
     ]
-    assert max(less / cost for _, cost, _, less in pairs) < 0.5
-    gains = [a / b for coarse, _, fine, _ in pairs for a, b in zip(coarse, fine, strict=True)]
-    assert 110 <= min(gains) < 120
-    assert 395 < np.median(gains) < 405
+    assert (110 <= min(gains) < 120, 395 < np.median(gains) < 405) == (True, True)
     bad = [
         error
         for engine in ("mujoco", "pybullet")
         for step in ("0.01", "0.001", "0.0001")
-        for error in found[f"{engine} default time_step {step}"][0]
+        for error, _ in found[f"{engine} default {step}"]
     ]
     assert (rounded(min(bad)), rounded(max(bad))) == (2e-3, 2e-1)
 
