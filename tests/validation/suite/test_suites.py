@@ -94,6 +94,7 @@ walls = [{ restitution = 0.5 }]
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
         ('include = ["papre"]\n', "did you mean 'paper'"),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),
+        ("scene = 3\n" + MODELS, "scene: 3 is not allowed: give a list"),
         (
             MODELS + SHELF + "[tolerances.shelf.ebm.figures]\nhighest_hop = { limit = -1 }\n",
             "highest_hop",
