@@ -131,7 +131,8 @@ def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputEr
             known = re.findall(r"'([^']*)'", str(fault["ctx"]["expected_tags"]))
             message = str(unknown_name("kind", str(fault["ctx"]["tag"]), known))
         case "tuple_type" | "list_type":
-            message = f"{printable(fault['input'], 60)} is not allowed: give a list, [...] or [[...]]"
+            given = printable(fault["input"], 60)
+            message = f"{given} is not allowed: give a list, [...] or [[...]]"
         case _ if isinstance(fault["input"], int | float | str | bool):
             given = printable(fault["input"])
             message = f"{given} is not allowed: {message[0].lower()}{message[1:]}"
