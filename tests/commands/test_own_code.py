@@ -75,7 +75,7 @@ def test_a_suite_or_a_name_alone_runs_nothing(folder, model, command, refused):
     """One line that names the option; exit 2; nothing is imported. Leave for one class is none for
     another of the same module."""
     (folder / "mine.toml").write_text(SUITE.replace("{model}", model) + SCENE)
-    (folder / "outer.toml").write_text('reference = "ebm"\ninclude = ["mine.toml"]\n')
+    (folder / "outer.toml").write_text('include = ["mine.toml"]\n')
     words = {
         "included": ["validate", "outer.toml"],
         "another": ["validate", "mine.toml", "--allow-code", "spy:Plain"],

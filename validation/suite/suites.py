@@ -44,7 +44,7 @@ Scenes under recorded motions are `[[records]]` tables (validation.suite.motions
 `[[ensemble]]` tables (validation.suite.motions), judged by the measures of `require.ensemble`.
 Scenes can also be written out as `[[scene]]` tables. Tolerances (validation.suite.tolerances) are a
 table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. `include = ["smoke",
-"walls"]` joins other suites instead.
+"walls"]` joins other suites instead, which may join others.
 """
 
 from __future__ import annotations
@@ -287,6 +287,8 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
         )
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
+    except RecursionError:
+        raise errors.InputError(f"{printable(path)}: include: the suite joins itself") from None
     except errors.InputError as error:
         # What begins with the name of a file, this one or one beside it, has no key and no quote.
         file, beside = str(error).partition(": ")[0], f"{printable(path.parent)}{os.sep}"
@@ -461,12 +463,23 @@ def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple
 
 
 def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
+    errors.refuse(
+        *(
+            (
+                key,
+                "cannot be given together with include: each suite that is joined has its own",
+                key,
+            )
+            for key in sorted(given.model_fields_set - {"include", "description"})
+        )
+    )
     included = [
-        load_suite(
+        part  # of a suite that joins others, these: only they say what is required
+        for name in given.include
+        for part in load_suite(
             path.parent / name if Path(name).suffix.lower() == ".toml" else name,
             allow_code=allow_code,
-        )
-        for name in given.include
+        ).parts
     ]
     first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))

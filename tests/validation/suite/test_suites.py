@@ -25,7 +25,12 @@ def test_scenes_by_name_by_table_and_by_file_and_models_by_labels_of_their_own(s
         for name in ("fig4a", "own", "shelf")
         for model in (("ebm", "ebm"), ("coarse", "mujoco"))
     ]
-    assert found.scenes["shelf"].block.half_width == 0.1
+    middle = written("middle.toml", 'include = ["smoke"]\n').name
+    joined = suite(f'include = ["{middle}"]\n')  # those that it joins are its own parts
+    assert ([part.name for part in joined.parts], found.scenes["shelf"].block.half_width) == (
+        ["smoke"],
+        0.1,
+    )
 
 
 def test_a_grid_is_every_combination(suite):
@@ -93,6 +98,15 @@ walls = [{ restitution = 0.5 }]
         ),
         ('include = ["paper", "paper"]\n', "is in two of the suites"),
         ('include = ["papre"]\n', "did you mean 'paper'"),
+        ('include = ["mine.toml"]\n', "joins itself"),
+        *(
+            ('include = ["smoke"]\n' + own, f"{key}: cannot be given together with include")
+            for key, own in (
+                ("scene", SHELF),
+                ("models", "[models.ebm]\n"),
+                ("tolerances", "[tolerances]\n"),
+            )
+        ),
         ("unknown = 1\n" + MODELS, "unknown: unknown key"),
         ("scene = 3\n" + MODELS, "scene: 3 is not allowed: give a list"),
         (
