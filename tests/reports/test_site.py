@@ -80,9 +80,8 @@ def test_index_says_how_far_each_model_is(run, index):
     assert "mine:Model" not in rows["free"]
     outcomes = {run.by_scene["Free"][model].outcome for model in ("ebm", "ebm-unilateral")}
     assert (falling["why_apart"], falling["apart"]) == ("", len(outcomes) > 1)
-    worst = dict(re.findall(r'<tr data-scene="(.*?)" data-worst="(.*?)">', index))
-    # Of the last one a model has no history.
-    assert (worst["beside a wall"], worst["Free"]) == ("3", "1e+09")
+    used = re.findall(r'<td data-model="mujoco" data-used="(.*?)"', index)
+    assert used == ["0.15", "0.3", "1e+09"]  # of the last one it has no history
 
 
 def test_index_answers_three_questions_first(run, index):

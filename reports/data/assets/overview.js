@@ -11,17 +11,18 @@ document.addEventListener("DOMContentLoaded", () => {
   const show = () => {
     const { name, verdict, model, order } = controls.elements;
     const words = name.value.trim().toLowerCase();
+    const worst = new Map();
     let shown = 0;
     for (const row of rows) {
       const cells = [...row.cells].slice(1);
       const judged = model.value ? cells.filter(cell => cell.dataset.model === model.value) : cells;
       row.hidden = !row.dataset.scene.toLowerCase().includes(words)
         || (verdict.value && !judged.some(cell => (cell.dataset.verdict || "").split(" ").includes(verdict.value)));
+      worst.set(row, Math.max(0, ...judged.map(cell => Number(cell.dataset.used || 0))));
       shown += !row.hidden;
     }
     for (const cell of table.querySelectorAll("[data-model]")) cell.hidden = Boolean(model.value) && cell.dataset.model !== model.value;
-    const worst = row => Number(row.dataset.worst);
-    body.append(...(order.value === "worst" ? [...rows].sort((a, b) => worst(b) - worst(a)) : rows));
+    body.append(...(order.value === "worst" ? [...rows].sort((a, b) => worst.get(b) - worst.get(a)) : rows));
     count.textContent = `${shown} of ${rows.length} scenes`;
   };
   controls.addEventListener("input", show);
