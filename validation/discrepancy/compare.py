@@ -213,26 +213,26 @@ def evaluate(
 
 
 def gap_of(histories: Sequence[History], until: float | None) -> tuple[str, bool]:
-    """Missing part of the requested time, empty if none; True if one block's fall is the cause.
+    """Missing part of the requested time, empty if none; True if one block's fall is all its cause.
 
-    Nothing is missing where all fell to the same side. Of two that end together the first is named.
+    Nothing is missing after all fell to one side. Of two that end together the first is named.
     """
     starts, ends = ([float(h.channels["t"][k]) for h in histories] for k in (0, -1))
     step = 1.5 * max(map(_step, histories))
-    if max(starts) - min(starts) > step:
-        late = histories[int(np.argmax(starts))]
-        return f"{late.model} starts only at {max(starts):g} s", False
     outcomes = {history.outcome for history in histories}
     fell_alike = len(outcomes) == 1 and outcomes <= {*TURNS}
     asked = max(ends) if until is None else until
-    if fell_alike or asked - min(ends) <= step:
-        return "", False
-    short = histories[int(np.argmin(ends))]
+    late, short = histories[int(np.argmax(starts))], histories[int(np.argmin(ends))]
+    is_late, is_short = max(starts) - min(starts) > step, asked - min(ends) > step
     fall = short.outcome in TURNS
-    return (
-        f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s",
-        fall,
-    )
+    gaps = {
+        f"{late.model} starts only at {max(starts):g} s": is_late,
+        f"{short.model} {'falls' if fall else 'ends'} at {min(ends):g} s, before {asked:g} s": (
+            is_short and not fell_alike
+        ),
+    }
+    found = [gap for gap, there in gaps.items() if there]
+    return " and ".join(found), fall and found == [*gaps][1:]
 
 
 def _step(history: History) -> float:

@@ -171,6 +171,15 @@ def test_nan_in_a_figure_of_the_cell_itself(made, name):
         (SECONDS[:6], "overturned left", None, "other falls at 5 s, before 10 s"),
         (SECONDS[:6], "overturned left", 4.0, ""),
         (SECONDS[5:], "moving", None, "other starts only at 5 s"),
+        *(
+            (
+                SECONDS[2:6],
+                outcome,
+                None,
+                f"other starts only at 2 s and other {verb} at 5 s, before 10 s",
+            )
+            for outcome, verb in (("moving", "ends"), ("overturned left", "falls"))
+        ),
         # a step and a half short is whole: 1.4 s are rounding of the grids, 1.6 s are not
         (np.linspace(0.0, 8.6, 11), "moving", None, ""),
         (np.linspace(0.0, 8.4, 11), "moving", None, "other ends at 8.4 s, before 10 s"),
@@ -182,7 +191,9 @@ def test_what_was_not_compared_is_a_gap(made, times, outcome, until, gap):
     whole = made(0.0 * SECONDS, SECONDS, model="whole")
     other = made(0.0 * times, times, model="other", outcome=outcome)
     found = [compare(*pair, until=until) for pair in ((whole, other), (other, whole))]
-    assert [(one.gap, one.fall) for one in found] == [(gap, "falls" in gap)] * 2
+    assert [(one.gap, one.fall) for one in found] == [
+        (gap, "falls" in gap and "starts" not in gap)
+    ] * 2
 
 
 def test_both_fell_the_same_way_is_whole(made):
