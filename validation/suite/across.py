@@ -274,7 +274,11 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     import pandas as pd
 
     last, number = moments[-1], f"{len(moments)} run{'s' * (len(moments) > 1)}"
-    every = {name: [one.figures.get(name) for one in moments] for name in last.figures}
+    every = {
+        name: [one.figures.get(name) for one in moments]
+        for earlier in reversed(moments)  # a model that fails now may have had figures
+        for name in earlier.figures
+    }
     values = pd.DataFrame(every, dtype=float)
     least, most = values.min(), values.max()
     spread = ((most - least) / values.abs().max()).fillna(0.0)
