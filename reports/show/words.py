@@ -205,7 +205,7 @@ def ratio(value: float | None) -> str:
     """A ratio followed by a multiplication sign; "–" for None."""
     if value is None:
         return "–"
-    return f"{value:,.0f}×".replace(",", "\u202f") if value >= 100.0 else f"{number(value, 2)}×"
+    return f"{value:,.0f}×".replace(",", "\u202f") if value >= 99.5 else f"{number(value, 2)}×"
 
 
 def window(figure: figures.Figure) -> str:

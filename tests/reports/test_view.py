@@ -312,12 +312,12 @@ def test_numbers_for_people_do_not_break_in_sentences():
         "5.3·10³",
     ]
     assert [
-        *(ratio(v) for v in (None, 1.0, 0.054, 5876.0)),
+        *(ratio(v) for v in (None, 1.0, 0.054, 99.4, 99.6, 5876.0)),
         *(
             window(figures.Figure(measure="m", label="m", unit="1", value=None, window=of))
             for of in ("3s", "")
         ),
-    ] == ["–", "1×", "0.054×", "5\u202f876×", "first 3s", "whole run"]
+    ] == ["–", "1×", "0.054×", "99×", "100×", "5\u202f876×", "first 3s", "whole run"]
     said = readable("-1.2e-3 is more than 1e+05; x-2 of run-7 on 2026-01-02 (-0.5)")
     assert said == "−1.2·10⁻³ is more than 1·10⁵; x-2 of run-7 on 2026-01-02 (−0.5)"
 
