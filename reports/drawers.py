@@ -143,7 +143,7 @@ def stable_steps(plot: Plot) -> Figure:
                 ax.text(
                     column,
                     row,
-                    f"{step:g}" if step else "none",
+                    "" if np.isnan(step) else f"{step:g}" if step else "none",
                     ha="center",
                     va="center",
                     fontsize=6,
