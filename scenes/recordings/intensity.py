@@ -49,7 +49,7 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     """Pseudo-spectral acceleration in g of an oscillator of `period` (s).
 
     `damping` is relative to critical, below 1. The response is exact for straight lines between
-    samples, and continues for one period after the last.
+    samples and no acceleration before the first and after the last; it continues for one period.
     """
     from scipy.signal import lfilter
 
@@ -65,5 +65,10 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     gain = np.expm1(pole * step)
     after = (gain / (pole * step) - 1.0) / pole
     before = gain / pole - after
-    response = lfilter([after, before], [1.0, -1.0 - gain], np.append(lines, tail)).imag
+    # No line leads to the first sample, and none from the last.
+    shaken, rest = lfilter(
+        [after, before], [1.0, -1.0 - gain], lines, zi=np.array([-after * lines[0]])
+    )
+    free, _ = lfilter([1.0], [1.0, -1.0 - gain], tail, zi=rest - before * lines[-1])
+    response = np.append(shaken, free).imag
     return float(np.max(np.abs(response))) * rate**2 / pole.imag / GRAVITY_OF_RECORDS
