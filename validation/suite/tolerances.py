@@ -356,7 +356,7 @@ def accepted_in(
             " [scene.model.reference]"
         ) from None
     if write and changes:
-        writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", text))
+        writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", text), named=True)
     return changes, refused
 
 

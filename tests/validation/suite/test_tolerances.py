@@ -78,10 +78,12 @@ NOT_DEFINED = check(None, None, "peak_ratio", "not defined here: the reference d
 @pytest.fixture
 def accepted(written):
     """What `accept` says that it has changed and refused, and the file that had a text before it
-    and has another after it."""
+    and has another after it; a link leads to it."""
 
     def accept_of(text, *checks, reason=None):
-        path = written("mine.tolerances.toml", text)
+        kept = written("kept.toml", text)
+        path = kept.with_name(f"{len(list(kept.parent.iterdir()))}.tolerances.toml")
+        path.symlink_to(kept)
         run = results.Run(
             suite="mine",
             created="",
@@ -93,7 +95,7 @@ def accepted(written):
         part = SimpleNamespace(
             path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
         )
-        return *suites.accept(SimpleNamespace(parts=[part]), run, reason), path.read_text("utf-8")
+        return *suites.accept(SimpleNamespace(parts=[part]), run, reason), kept.read_text("utf-8")
 
     return accept_of
 
