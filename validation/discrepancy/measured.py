@@ -73,6 +73,7 @@ class Measured(Frozen):
             outcome=history.outcome if inside[-1] else outcome_of(channels),
             event_list=tuple(e for e in history.event_list if ends[0] <= e.t <= ends[1]),
             block=scene.block.per_unit_mass,
+            uncertainty=mean_history(tests, ends).uncertainty,
             notes=(*history.notes, *said),
             settings={"file": ", ".join(Path(path).name for path in paths), "offset": self.offset},
         )
@@ -117,10 +118,12 @@ def shifted(history: History, offset: float) -> History:
     )
 
 
-def mean_history(tests: Sequence[History]) -> History:
+def mean_history(
+    tests: Sequence[History], within: tuple[float, float] = (-math.inf, math.inf)
+) -> History:
     """Mean of repeats of one test on the first one's times, with its uncertainty u_D.
 
-    Over their common time. `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by
+    Over their common time `within` a start and an end, s. `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by
     Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
     `InputError` where the tests have no time in common, or do not all overturn to one side or stay.
     """
@@ -137,7 +140,8 @@ def mean_history(tests: Sequence[History]) -> History:
             "files",
         )
     start, end = (
-        pick(test.channels["t"][side] for test in tests) for pick, side in ((max, 0), (min, -1))
+        pick(within[side], *(test.channels["t"][side] for test in tests))
+        for pick, side in ((max, 0), (min, -1))
     )
     t = first.channels["t"]
     t = t[(t >= start) & (t <= end)]

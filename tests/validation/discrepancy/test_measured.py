@@ -48,8 +48,7 @@ def write(path, head, *columns):
 def test_units_of_columns(tmp_path):
     t, head = np.arange(5.0), "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain"
     history = History.load(write(tmp_path / "a.csv", head, *[t] * 6))
-    expected = {"theta": np.deg2rad(t), "x": 1e-3 * t, "slip_rate": 1e-2 * t, "y": t}
-    expected["t"] = 1e-3 * t
+    expected = {"t": 1e-3 * t, "theta": np.deg2rad(t), "x": 1e-3 * t, "slip_rate": 1e-2 * t, "y": t}
     assert (history.model, history.channels) == (
         "measured",
         {name: pytest.approx(values, rel=1e-7, abs=0.0) for name, values in expected.items()},
@@ -136,20 +135,25 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     state = np.zeros((301, 6))
     state[:, 2] = np.linspace(0.0, 1.5, 301)
     told = [Event(t=0.2, kind="uplift"), Event(t=2.995, kind="overturned left")]
-    observation.observe(scene, "measured", state, events=told, cost=Cost(steps=9)).save(
-        tmp_path / "a.csv"
-    )
-    later = measured.shifted(History.load(tmp_path / "a.csv"), -0.5)
-    assert [e.t for e in later.event_list] == [-0.3, 2.495]
+    for name, apart in {"a": 0.0, "b": 0.1}.items():  # from 1.5 s on, by the scene's time
+        state[200:, 2] -= apart
+        observation.observe(scene, "measured", state, events=told, cost=Cost(steps=9)).save(
+            tmp_path / f"{name}.csv"
+        )
+    assert [e.t for e in measured.shifted(History.load(tmp_path / "a.csv"), -0.5).event_list] == [
+        -0.3,
+        2.495,
+    ]
     history = measured.Measured(
-        files={scene.name: (str(tmp_path / "a.csv"),) * repeats}, offset=-0.5
+        files={scene.name: [str(tmp_path / f"{name}.csv") for name in "ab"[:repeats]]}, offset=-0.5
     ).simulate(scene.replace(duration=duration))
     assert (
         history.outcome,
         history.overturned_at,
         [e.t for e in history.event_list],
         history.cost,  # playing a file back costs nothing, whoever wrote it
-    ) == (outcome, fell, events, Cost())
+        any(history.uncertainty.values()),
+    ) == (outcome, fell, events, Cost(), (repeats, duration) == (2, 3.0))
 
 
 # Repeats of a test
