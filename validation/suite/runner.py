@@ -230,7 +230,8 @@ def explanations(
 
     `scatters` is, by model, the scatter of the repeats of a measured history: rotations in rad,
     slips in m. There is no verdict for a model whose numerical error is unknown. Where the outcomes
-    differ and a block falls, the only verdict is on the outcome.
+    differ and a block falls, the only verdict is on the outcome; where both fall alike, there is
+    none on peaks and slips.
     """
     if cell.numerical is None:
         return
@@ -262,7 +263,7 @@ def _difference(name: str, figures: Sequence[Figure], other: results.Cell) -> fl
     mine, theirs = results.value_of(figures, name), results.value_of(other.figures, name)
     if mine is None or theirs is None:  # a figure of both histories
         return results.value_of(figures, name, other.model)
-    return abs(mine - theirs)
+    return None if "overturned" in other.outcome else abs(mine - theirs)
 
 
 def _other_outcome(
