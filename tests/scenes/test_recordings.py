@@ -270,8 +270,18 @@ def test_a_header_says_enough_and_neither_samples_nor_options_overrule_it(
 def test_the_command_shows_and_draws(tmp_path, monkeypatch, typed, refused):
     monkeypatch.chdir(tmp_path)
     Path("a.AT2").write_bytes(at2("N-S"))
-    shown = ("PEER AT2, unit g", "401 every 0.01 s, 4 s", "0.31 g", "Sa(T)", "1 s: ", "█")
-    typed("record", "a.AT2", "--plot", "a.png", holds=(*shown, "figure: a.png"))
+    typed(
+        *("record", "a.AT2", "--plot", "a.png"),
+        holds=[
+            "PEER AT2, unit g",
+            "401 every 0.01 s, 4 s",
+            "0.31 g",
+            "Sa(T)",
+            "1 s: ",
+            "█",
+            "a.png",
+        ],
+    )
     assert Path("a.png").read_bytes().startswith(b"\x89PNG")
     assert ".svg, .png, .pdf" in refused("record", "a.AT2", "--plot", "a.jpg")
 

@@ -86,7 +86,9 @@ def time_shift(reference: History, candidate: History) -> float:
     """Shift (s) of the candidate's times at the peak of the rotations' cross-correlation.
 
     Both are resampled at the finer of their mean steps; the peak is a parabola's through three
-    lags. Raises `InputError` where one does not rotate, so that nothing can be aligned.
+    lags. Where the longer is stronger than the shorter its strength beside it does not count: a
+    history that holds a weak part of a motion belongs there, not beside the strongest. Raises
+    `InputError` where one does not rotate, so that nothing can be aligned.
     """
     both = [history.channels for history in (reference, candidate)]
     for history in (reference, candidate):
@@ -94,16 +96,23 @@ def time_shift(reference: History, candidate: History) -> float:
             raise InputError(f"{history.name}: no rotation by which it could be aligned", "align")
     step = min(float(one["t"][-1] - one["t"][0]) / (len(one["t"]) - 1) for one in both)
     grids = [np.arange(one["t"][0], one["t"][-1] + 0.5 * step, step) for one in both]
-    rotations = [
+    first, second = (
         np.interp(grid, one["t"], one["theta"]) for grid, one in zip(grids, both, strict=True)
+    )
+    product = scipy.signal.correlate(first, second)
+    # The squares of each that lie beside the other, over all squares of the shorter.
+    least = np.sum(min(second, first, key=len) ** 2)
+    beside = [
+        np.maximum(scipy.signal.correlate(*pair) / least, 1e-20)
+        for pair in ((first**2, np.ones_like(second)), (np.ones_like(first), second**2))
     ]
-    product = scipy.signal.correlate(rotations[0], rotations[1])
-    lags = scipy.signal.correlation_lags(len(rotations[0]), len(rotations[1]))
-    top, between = int(np.argmax(product)), 0.0
+    of_longer = np.maximum(beside[len(second) > len(first)], 1.0)
+    lags = scipy.signal.correlation_lags(len(first), len(second))
+    top, between = int(np.argmax(product / np.sqrt(of_longer))), 0.0
     if 0 < top < len(product) - 1:
-        left, middle, right = product[top - 1 : top + 2]
+        left, middle, right = (product / np.sqrt(np.multiply(*beside)))[top - 1 : top + 2]
         bend = left - 2.0 * middle + right
-        between = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+        between = np.clip(0.5 * (left - right) / bend, -0.5, 0.5) if bend < 0.0 else 0.0
     return float((lags[top] + between) * step + grids[0][0] - grids[1][0])
 
 
