@@ -329,7 +329,7 @@ class SceneView(View):
         }
 
     def running_rms(self, band: Band) -> Floats:
-        """The RMS difference from 0 up to each time, to `band.until`.
+        """The RMS difference from the common start up to each time, to `band.until`.
 
         The band's limit applies to the last value. NaN where it is not known.
         """
@@ -340,8 +340,9 @@ class SceneView(View):
         if both[0] is None or both[1] is None or len(t) < 2:
             return np.full(len(t), math.nan)
         square = (both[0][: len(t)] - both[1][: len(t)]) ** 2
-        steps = 0.5 * np.diff(t) * (square[1:] + square[:-1])
-        return np.sqrt(np.r_[square[0], np.cumsum(steps) / (t[1:] - t[0])])
+        late = int(np.argmax(np.isfinite(square)))  # a measured history may start late
+        steps = (0.5 * np.diff(t) * (square[1:] + square[:-1]))[late:]
+        return np.sqrt(np.r_[square[: late + 1], np.cumsum(steps) / (t[late + 1 :] - t[late])])
 
     def bands(self, against: str | None = None) -> tuple[Band, ...]:
         """The tolerances that can be drawn over time; of one reference, or of all."""
