@@ -187,7 +187,7 @@ def unit(name: str) -> str:
 
 def duration(seconds: float) -> str:
     """A time as text: in s from 1 s on, else in ms."""
-    return f"{seconds:.1f} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
+    return f"{seconds:.1f} s" if seconds >= 0.9995 else f"{1e3 * seconds:.3g} ms"
 
 
 def moment(created: str) -> str:
