@@ -67,7 +67,8 @@ class _RigidPymunkWorld(_PymunkWorld):
         self.space.collision_persistence = (
             1  # steps after which a contact that has opened is forgotten
         )
-        self.aloft = (0.0, 10.0 * scene.block.radius, 0.0, 0.0, 0.0, 0.0)
+        # Between the walls, wherever the mass is in the box.
+        self.aloft = (scene.block.offset[0], 10.0 * scene.block.radius, 0.0, 0.0, 0.0, 0.0)
 
     def bounce(self, bouncing: bool) -> None:
         self.box.elasticity = float(bouncing)

@@ -334,6 +334,11 @@ SCENES = {
     "slips": {"floor": Floor(friction=0.3), "excitation": PULSE},
     "left wall": {"walls": [Wall(side="left", gap=0.03, restitution=0.3)], "excitation": PULSE},
     "right wall": {"walls": [Wall(side="right", gap=0.03, restitution=0.3)], "excitation": PULSE},
+    "far off, beside a wall": {
+        "block": RACK.replace(centre_of_mass=(0.2, -0.25)),
+        "walls": [Wall(side="left", gap=0.0)],
+        "excitation": PULSE,
+    },
 }
 ALL = [
     engine
