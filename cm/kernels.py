@@ -66,8 +66,8 @@ COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE, STIFFNESS = 0, 1
 #: Columns of the floor's friction: force, the spring's stretch, whether it slips, whether it
 #: slipped a step ago.
 SHEAR, STRETCH, SLIPS, SLIPPED = 0, 1, 2, 3
-#: A contact that was open for longer than this (s) strikes when it closes, and its impulse is
-#: gathered for as long.
+#: A contact that was open for longer than this (s), and than a contact is young, strikes when it
+#: closes, and its impulse is gathered for as long.
 STRIKE = 2e-3
 #: A new contact is young for this many contact times 1/sqrt(k/m), longer than an undamped one lasts
 #: (pi).
@@ -112,6 +112,8 @@ class Parameters(NamedTuple):
     distance: tuple[float, ...]
     calibrated: bool
     time_step: float
+    #: `STRIKE`, or for as long as a contact is young, s.
+    strike: float
 
 
 class Contacts(NamedTuple):
@@ -236,6 +238,7 @@ def begun(
         distance=(*(b + wall.gap if wall else math.inf for wall in walls), 0.0),
         calibrated=calibrated,
         time_step=time_step,
+        strike=max(STRIKE, YOUNG / math.sqrt(stiffness)),
     )
     x, y, tilt, *rates = scene.initial_state
     memory = np.zeros((2 * len(SURFACES), len(COLUMNS)))
@@ -449,7 +452,7 @@ def closes(
     memory[one, CLOSED] = 1.0
     if comes.rate > -GENTLE * parameters.gravity * contact_time:
         return math.inf
-    if t - memory[one, LAST_CLOSED] > STRIKE:
+    if t - memory[one, LAST_CLOSED] > parameters.strike:
         memory[one, STRUCK] = t
         memory[one, IMPULSE] = 0.0
     if parameters.calibrated:
@@ -784,7 +787,7 @@ def run_to(
             fine = young if settled else min(young, fine)
             calm = middle + YOUNG * contact_time
         if min(first_strike, young) < math.inf:
-            n_events, first_strike = gather(memory, step, t - STRIKE, events, n_events)
+            n_events, first_strike = gather(memory, step, t - parameters.strike, events, n_events)
         work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
         allowed += work
         gross += abs(work)

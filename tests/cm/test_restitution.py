@@ -142,6 +142,12 @@ def test_both_corners_of_a_side_leave_as_asked_wherever_the_mass_lies(e, side):
     model = ContinuousModel(penetration=1e-10)
     assert np.max(np.abs(model.simulate(strikes).channels["theta_dot"])) < 1e-4
     assert restitution_reached(model, strikes) == pytest.approx(e, rel=1e-3, abs=1e-5)
+    # Its whole impulse is told, also of an impact that lasts for 10 ms.
+    assert sum(
+        event.impulse
+        for event in ContinuousModel(penetration=1e-4).simulate(strikes).event_list
+        if event.kind == "wall impact"
+    ) == pytest.approx((1.0 + e) * math.sqrt(0.6**2 - 2.0 * 0.2 * 9.81 * 0.02), rel=0.03)
 
 
 def test_a_loaded_block_moves_beside_a_bouncing_wall_as_the_rigid_one():
