@@ -67,7 +67,7 @@ class _Motion:
         self.contacts = contacts.contacts_of(scene)
         self.near = (
             CLOSED * scene.block.radius
-            + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=1e-3)) ** 2
+            + 2.0 * scene.gravity * float(np.min(np.diff(t), initial=t[-1])) ** 2
         )
         x, y, theta, x_dot, y_dot, theta_dot = states.T
         #: Of each contact: its corner, normal and distance.
@@ -107,7 +107,7 @@ class _Motion:
         if floor:
             return impacts
         return impacts + [
-            (t[end], "release", end, 0.0)
+            (t[_start(self.gap[contact], end, GAP_NOISE * self.near)], "release", end, 0.0)
             for end in _rises(~closed)
             if t[end] - t[max((i for i in strikes if i < end), default=0)] > HOLD
         ]
@@ -120,6 +120,9 @@ class _Motion:
         lowest, highest = np.sort(self.gap[:2], axis=0)
         speed = np.where(flight, math.inf, np.abs(self.slip_rate))  # no slip begins in flight
         slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
+        slow = SLIP_NOISE * SLIPPING
+        for i in _rises(~slipping):  # as long as it slows down
+            slipping[i : len(t) - 1 - _start(speed[::-1], len(t) - i, slow)] = True
         still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
         # Where each kind began, and where it is told.
         places = {
@@ -130,7 +133,7 @@ class _Motion:
             ],
             "lift-off": [(_start(lowest, i, noise), i) for i in _rises(flight)],
             "landing": [(i, i) for i in _rises(~flight)],
-            "slip": [(_start(speed, i, SLIP_NOISE * SLIPPING), i) for i in _rises(slipping)],
+            "slip": [(_start(speed, i, slow), i) for i in _rises(slipping)],
             "stick": [(i, i) for i in _rises(~slipping) if not flight[i]],
             "settled": [(i, i) for i in _rises(_held(_held(still, t), t, REST, value=True))],
         }

@@ -332,20 +332,24 @@ def test_a_motion_that_cannot_be_is_a_failure(step, answers, words):
 
 # Of which a cubic makes 1.6 rad.
 @pytest.mark.parametrize(
-    ("answers", "duration"),
+    ("state", "duration", "told"),
     [
-        ({"state": lambda: (0.0, 1.0, 1.5, 0.0, 0.0, 100.0)}, 4.0),
+        (lambda: (0.0, 1.0, 1.5, 0.0, 0.0, 100.0), 4.0, ("moving", "lift-off")),
         # Down after the scene's end, in a step that goes beyond it.
-        ({"state": lambda: (0.0, 1.0, 1.6, 0.0, 0.0, 100.0)}, 9.5e-3),
+        (lambda: (0.0, 1.0, 1.6, 0.0, 0.0, 100.0), 9.5e-3, ("moving", "lift-off")),
+        # It comes down within a step, and has not left the floor; heights in R.
+        (
+            ([(0.0, math.cos(PAPER_BLOCK.alpha) + up, *[0.0] * 4) for up in (0.0, 3e-4)] * 200).pop,
+            4.0,
+            ("at rest",),
+        ),
     ],
 )
-def test_between_long_steps_no_block_falls(answers, duration):
-    assert (
-        Scripted(time_step=1e-2, answers=answers)
-        .simulate(free_rocking(0.0, output_step=1e-3, duration=duration))
-        .outcome
-        == "moving"
+def test_between_long_steps_no_block_falls_nor_hops(state, duration, told):
+    history = Scripted(time_step=1e-2, answers={"state": state}).simulate(
+        free_rocking(0.0, output_step=1e-3, duration=duration)
     )
+    assert (history.outcome, *(event.kind for event in history.event_list)) == told
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
