@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress
+from itertools import compress, pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -75,6 +75,9 @@ Value = float | tuple[float, str]
 STANDARD_GRAVITY = 9.81
 #: Impacts of two histories are the same impact if they lie within this time, s.
 SAME_IMPACT = 0.020
+#: Impacts of one kind in one history are one if they lie within this time, s: of corners that
+#: strike together, which models tell as one or one by one, and of a corner that rattles.
+ONE_IMPACT = 2e-3
 #: Impacts weaker than this share of the history's strongest of their kind need no counterpart.
 WEAK_IMPACT = 0.01
 IMPACTS = ("floor impact", "wall impact")
@@ -172,16 +175,17 @@ class WindowedHistory:
 
         A landing with an impulse counts as a floor impact, whatever the model calls it.
         """
-        named = (
+        named = [
             replace(event, kind="floor impact")
             if event.kind == "landing" and event.impulse != 0.0
             else event
-            for event in self.history.event_list
-        )
+            for event in sorted(self.history.event_list, key=lambda event: event.t)
+        ]
         return [
             event
-            for event in named
-            if event.kind in kinds and start - 1e-9 <= event.t <= self.until + 1e-9
+            for kind in kinds
+            for event in _joined([event for event in named if event.kind == kind])
+            if start - 1e-9 <= event.t <= self.until + 1e-9
         ]
 
     @property
@@ -193,6 +197,13 @@ class WindowedHistory:
     def heights(self) -> Floats:
         """Height of the lowest corner above the floor, m."""
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
+
+
+def _joined(events: Sequence[Event]) -> list[Event]:
+    """Of events of one kind, in order of time, the strongest of those within `ONE_IMPACT`."""
+    starts = np.flatnonzero(np.diff([e.t for e in events], prepend=-math.inf) > ONE_IMPACT)
+    parts = pairwise([*starts.tolist(), len(events)])
+    return [max(events[i:j], key=lambda e: abs(e.impulse)) for i, j in parts]
 
 
 class Pair:

@@ -221,7 +221,8 @@ DIFFERENCES = figures.by_name(
         "s",
         "Time up to which each impact (and fall) of either has its counterpart in the other;"
         " the remark says what comes then.\n\nCounterparts are of one kind and within 20 ms;"
-        " impacts below 1 % of the strongest need none. The window's end if all agree.",
+        " impacts below 1 % of the strongest need none, and those within 2 ms are one. The window's"
+        " end if all agree.",
         _agree_until,
         ideal=None,
         sense="at least",

@@ -239,7 +239,8 @@ def test_events_agree_until_the_first_without_counterpart(made, end, said, alone
     # a counterpart may come just after the end of the window
     events = {
         "r": [impact(1.0), impact(2.0), impact(3.0), impact(4.0, 0.001)],
-        "c": [impact(1.004), impact(2.0), impact(3.1), impact(5.0, 0.001)],
+        # another corner strikes at the same moment
+        "c": [impact(1.004), impact(1.0041, 0.1), impact(2.0), impact(3.1), impact(5.0, 0.001)],
     }
     found = compare(
         *(made(WAVE, T, model=name, events=of) for name, of in events.items()), until=end
@@ -265,8 +266,10 @@ def test_matching_takes_the_nearest_and_each_once():
 
 
 def test_figures_of_one_history(made):
-    theta, events = 0.5 * np.sin(np.pi * T), [impact(1.0), impact(2.0, 0.001), impact(3.0)]
-    history = made(theta, T, x=np.linspace(0, 0.1, len(T)), events=events)
+    theta, weak = 0.5 * np.sin(np.pi * T), impact(2.0, 0.001)
+    history = made(
+        theta, T, x=np.linspace(0, 0.1, len(T)), events=[*map(impact, (1.0, 3.0, 3.001)), weak]
+    )
     values, y = figures(history), history.channels["y"]
     assert set(values) == {
         name for name, measure in measures.FIGURES.items() if not measure.on_request
