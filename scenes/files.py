@@ -160,6 +160,13 @@ class Spread(Frozen):
                 "is missing: give value and sd, or low and high",
                 "low" if low is None else "high",
             ),
+            (
+                not normal
+                and "distribution" in self.model_fields_set
+                and self.distribution != "uniform",
+                f"{self.distribution} is not allowed with low and high: such a number is uniform",
+                "distribution",
+            ),
         )
         if not normal and not low < high:
             raise InputError(f"{high:g} is not allowed: must be more than low, {low:g}", "high")

@@ -172,6 +172,8 @@ def test_a_number_within_bounds_is_in_their_middle_unless_it_is_given(given, nom
         ({"value": 0.1, "sd": 0.1, "low": 0.0}, "sd"),
         ({"value": 0.1, "sd": 0.1, "high": 0.0}, "sd"),
         ({"value": 0.0, "sd": 0.1, "distribution": "lognormal"}, "value"),
+        ({"low": 0.1, "high": 0.2, "distribution": "lognormal"}, "distribution"),
+        ({"low": 0.1, "high": 0.2, "distribution": "normal"}, "distribution"),
     ],
 )
 def test_what_is_no_spread(given, key, fault_of):
