@@ -149,7 +149,8 @@ def fit_lognormal(
             "maxiter": 2000,
         },
     ).x
-    return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 0.0 else NO_FIT
+    # below is the search's rounding, of shares that are all the same
+    return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 1e-3 else NO_FIT
 
 
 #: Default number of draws; Sobol's sequence is balanced for powers of two.

@@ -258,7 +258,7 @@ def test_a_curve_is_found_where_few_overturn_and_none_where_shares_do_not_rise()
     intensities = np.linspace(0.02, 2.0, 40)
     found, *none = (
         population.fit_lognormal(intensities, one, np.full(40, 12))
-        for one in (counts, counts[::-1], 0 * counts, np.full(40, 12))
+        for one in (counts, counts[::-1], *(np.full(40, count) for count in (0, 1, 8, 12)))
     )
     assert found == (pytest.approx(2.15, abs=0.25), pytest.approx(0.35, abs=0.15))
     assert np.isnan(none).all()
