@@ -63,6 +63,7 @@ def folder(tmp_path_factory):
         "uncertain": CABINET.replace("friction = 0.4", "friction = { value = 0.4, sd = 0.04 }"),
         "uncertain-pulse": CABINET.replace("= 5.0", "= { value = 5.0, sd = 0.1 }"),
         "bouncy": CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 0.5"),
+        "brief": CABINET.replace("duration = 12.0", "duration = 0.004"),
         "pga": CABINET.partition("kind")[0]
         + 'kind = "record"\nfile = "records/R01.csv"\npga = 0.5\n',
     }.items():
@@ -320,10 +321,16 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
 
 
 @pytest.mark.parametrize(
-    "words", ["--models ebm", "--models ebm-unilateral,ebm", "records/R00.csv --models cm,ebm"]
+    ("words", "code"),
+    [
+        ("bouncy.toml --models ebm", 3),
+        ("bouncy.toml --models ebm-unilateral,ebm", 3),
+        ("bouncy.toml records/R00.csv --models cm,ebm", 3),
+        ("brief.toml", 0),  # of one row
+    ],
 )
-def test_a_model_that_knows_no_floor_that_bounces_ends_with_3(assess, words):
-    assess(f"bouncy.toml {words}", code=3)
+def test_a_model_that_does_not_know_the_floor_ends_with_3(assess, words, code):
+    assess(words, code=code)
 
 
 def test_the_records_are_judged_by_what_the_suites_cover_and_not_what_they_replace(folder):

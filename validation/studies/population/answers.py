@@ -759,7 +759,7 @@ def _models(found: Found) -> Iterator[Block]:
 
 def _histories(found: Found) -> list[Block]:
     rows = {
-        case: np.genfromtxt(io.StringIO(one.history), delimiter=",", names=True)
+        case: np.atleast_1d(np.genfromtxt(io.StringIO(one.history), delimiter=",", names=True))
         for case, one in found.shown.items()
         if one.history
     }
