@@ -63,6 +63,7 @@ def folder(tmp_path_factory):
         "uncertain": CABINET.replace("friction = 0.4", "friction = { value = 0.4, sd = 0.04 }"),
         "uncertain-pulse": CABINET.replace("= 5.0", "= { value = 5.0, sd = 0.1 }"),
         "bouncy": CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 0.5"),
+        "elastic": CABINET.replace("friction = 0.4", "friction = 0.4\nrestitution = 1.0"),
         "brief": CABINET.replace("duration = 12.0", "duration = 0.004"),
         "pga": CABINET.partition("kind")[0]
         + 'kind = "record"\nfile = "records/R01.csv"\npga = 0.5\n',
@@ -326,6 +327,8 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
         ("bouncy.toml --models ebm", 3),
         ("bouncy.toml --models ebm-unilateral,ebm", 3),
         ("bouncy.toml records/R00.csv --models cm,ebm", 3),
+        # one that knows it, where the event-based ones do not
+        ("elastic.toml records/R00.csv --models cm", 0),
         ("brief.toml", 0),  # of one row
     ],
 )

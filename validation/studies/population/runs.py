@@ -594,7 +594,11 @@ class Certainty(OneScene):
 
     def play(self) -> Sure:
         """Plays coarser steps or a finer tolerance, other laws of impacts, and the draws."""
-        landing, own = impact_laws.parting_landing(self.scene), dict(self.settings)
+        landing, own = (
+            # no event-based model plays a floor that loses nothing
+            impact_laws.parting_landing(self.scene) if self.scene.floor.restitution < 1.0 else None,
+            dict(self.settings),
+        )
         model = models.build(self.model, own)
         return Sure(
             numerical=numerical_uncertainty(model, self.scene),
@@ -641,8 +645,13 @@ class Asked(Study):
 
     @property
     def swift(self) -> str:
-        """The event-based model that plays draws and gaps."""
-        return self.model if isinstance(models.build(self.model, {}), EventBasedModel) else SWIFT
+        """The model that plays draws and gaps: an event-based one, if one can."""
+        return (
+            self.model
+            if self.own.scene.floor.restitution == 1.0
+            or isinstance(models.build(self.model, {}), EventBasedModel)
+            else SWIFT
+        )
 
     @cached_property
     def draws(self) -> tuple[Numbers, ...]:
