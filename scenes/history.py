@@ -355,7 +355,7 @@ def _mat(
     said = {
         name: json.dumps(value, default=str) if isinstance(value, dict | list) else value
         for name, value in about.items()
-        if isinstance(value, str | int | float | dict | list)
+        if isinstance(value, str | int | float | dict | list | tuple)
     }
     columns = {
         name: column.astype(object) if column.dtype.kind in "UO" else column

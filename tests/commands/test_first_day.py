@@ -20,6 +20,7 @@ friction = 0.5
 [block]
 half_width = 0.4
 half_height = 1.5
+centre_of_mass = [0.05, -0.25]
 """
 SUITE = """
 reference = "still"
@@ -64,21 +65,21 @@ def test_without_a_model_the_reference_plays(typed):
     assert Path("fig5a--ebm-unilateral.csv").exists()
 
 
-#: Of each format: what reads it, and from that the channels, the outcome and what happened.
+#: Of each format: what reads it, and from that the channels, all about it and what happened.
 FORMATS = {
     "a.json": (
         lambda: json.loads(Path("a.json").read_text()),
-        lambda found: (found["channels"], found["outcome"], found["events"]["kind"]),
+        lambda found: (found["channels"], found, found["events"]["kind"]),
     ),
     "a.mat": (
         lambda: loadmat("a.mat", simplify_cells=True),  # which makes no list of one event
-        lambda found: (found["channels"], found["about"]["outcome"], [found["events"]["kind"]]),
+        lambda found: (found["channels"], found["about"], [found["events"]["kind"]]),
     ),
     "a.parquet": (
         lambda: (pd.read_parquet("a.parquet"), pd.read_parquet("a.events.parquet")),
         lambda found: (
             found[0],
-            found[0].attrs["rockcheck_history"]["outcome"],
+            found[0].attrs["rockcheck_history"],
             list(found[1]["kind"]),
         ),
     ),
@@ -92,9 +93,10 @@ def test_a_history_in_another_format_is_that_of_the_csv(typed, file):
     simulated(typed, "Falls", "a.csv", "-o", file)
     table = History.load("a.csv")
     read, parts = FORMATS[file]
-    channels, outcome, kinds = parts(read())
-    assert (outcome, kinds, list(channels)) == (
+    channels, about, kinds = parts(read())
+    assert (about["outcome"], [*about["centre_of_mass"]], kinds, list(channels)) == (
         table.outcome,
+        [0.05, -0.25],
         [event.kind for event in table.event_list],
         list(table.channels),
     )

@@ -132,9 +132,10 @@ def mean_history(
 ) -> History:
     """Mean of repeats of one test on the first one's times, with its uncertainty u_D.
 
-    Over their common time `within` a start and an end, s. `uncertainty` holds the 95 % interval of the mean, t s/sqrt(n) by
-    Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad) and "last_slip" (m). Raises
-    `InputError` where the tests have no time in common, or do not all overturn to one side or stay.
+    Over their common time `within` a start and an end, s. `uncertainty` holds the 95 % interval of
+    the mean, t s/sqrt(n) by Student: "theta_rms" (rad, the RMS over time), "peak_rotation" (rad)
+    and "last_slip" (m). Raises `InputError` where the tests have no time in common, or do not all
+    overturn to one side or stay.
     """
     first, *others = tests
     if not others:
