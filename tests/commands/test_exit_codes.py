@@ -109,6 +109,7 @@ class Finder:
     def find_spec(name, path=None, target=None):
         if name == "rockcheck.commands.cli":
             signal.raise_signal(signal.SIGINT)
+signal.signal(signal.SIGINT, signal.default_int_handler)  # what runs behind a shell ignores it
 sys.meta_path.insert(0, Finder)
 from rockcheck.__main__ import main
 main()
