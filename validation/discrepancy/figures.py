@@ -323,8 +323,8 @@ MatchedImpacts = tuple[list[tuple[Event, Event]], list[Event], list[Event]]
 def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
     """Match impacts of one kind within `SAME_IMPACT`, nearest first.
 
-    Weak impacts (`WEAK_IMPACT`) need no counterpart. Overturning counts as an event of its own
-    kind.
+    Weak impacts (`WEAK_IMPACT`) need no counterpart, and take none from those that do. Overturning
+    counts as an event of its own kind.
     """
     kinds = IMPACTS + TURNS
     reference, candidate = (
@@ -333,21 +333,26 @@ def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> Mat
     )
     # exactly so far apart: a pair, whichever of the two comes first
     times, within = np.array([e.t for e in candidate]), SAME_IMPACT + 1e-9
+    needs, others_need = strong(reference), strong(candidate)
     near = [
-        (round(abs(times[j] - first.t), 9), i, j)  # of two equally near the first
+        # of two equally near the first
+        (not (needs[i] and others_need[j]), round(abs(times[j] - first.t), 9), i, j)
         for i, first in enumerate(reference)
         for j in range(*np.searchsorted(times, [first.t - within, first.t + within]))
         if candidate[j].kind == first.kind
     ]
     partners: dict[int, int] = {}
     taken: set[int] = set()
-    for _, i, j in sorted(near):
+    for *_, i, j in sorted(near):
         if i not in partners and j not in taken:
             partners[i] = j
             taken.add(j)
     only_reference, only_candidate = (
-        [e for n, e in compress(enumerate(events), strong(events)) if n not in matched]
-        for events, matched in ((reference, partners), (candidate, taken))
+        [e for n, e in compress(enumerate(events), need) if n not in matched]
+        for events, need, matched in (
+            (reference, needs, partners),
+            (candidate, others_need, taken),
+        )
     )
     pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
     return pairs, only_reference, only_candidate

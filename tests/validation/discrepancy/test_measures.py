@@ -255,11 +255,12 @@ def test_events_agree_until_the_first_without_counterpart(made, end, said, alone
 
 def test_matching_takes_the_nearest_and_each_once():
     found = match_impacts(
-        [impact(t) for t in (0.08, 0.12, 1.0, 1.012, 2.0, 3.02)],
-        [impact(1.015, kind="wall impact"), *(impact(t) for t in (0.1, 1.011, 2.02, 3.0))],
+        [impact(4.004, 0.001), *(impact(t) for t in (0.08, 0.12, 1.0, 1.012, 2.0, 3.02, 4.0))],
+        [impact(1.015, kind="wall impact"), *(impact(t) for t in (0.1, 1.011, 2.02, 3.0, 4.003))],
     )
     assert times(found) == (
-        [(0.08, 0.1), (1.012, 1.011), (2.0, 2.02), (3.02, 3.0)],
+        # the weak one needs no counterpart
+        [(0.08, 0.1), (1.012, 1.011), (2.0, 2.02), (3.02, 3.0), (4.0, 4.003)],
         [0.12, 1.0],
         [1.015],
     )
