@@ -115,8 +115,8 @@ def test_the_action_judges_marks_and_keeps(project):
     assert re.match(r"::error title=low\.ebm-unilateral%3A peak_rotation::\S", mark)
     assert summary.startswith("## ❌")
     assert (project / "kept" / "index.html").is_file()
-    none, _ = action(project, suite="nosuch.toml", out="none")
-    assert (none["annotate"], none["verdict"][0]) == ((0, ""), 2)
+    none, summary = action(project, suite="nosuch.toml", out="kept")
+    assert (none["annotate"], none["verdict"][0], summary) == ((0, ""), 2, "")
 
 
 def test_the_hook_holds_a_suite_of_the_user(project, monkeypatch):
