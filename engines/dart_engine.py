@@ -14,8 +14,8 @@ REACH = 100.0  # half their extent
 #: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g
 #: R) is made so many of them.
 NATURAL_SPEED = 30.0
-#: Of its iterative solver, which converges where steps are tiny; its direct one gives way by 3e-4 g
-#: dt in each step.
+#: Of its iterative solver, in so many sweeps at least; its direct one yields by 3e-4 g dt in each
+#: step.
 SWEEPS, TOLERANCE = 100, 1e-8
 
 
@@ -95,7 +95,7 @@ class _RigidDartWorld(_DartWorld):
         solver.setSplitImpulseEnabled(True)
         if iterative:
             options = self.dart.constraint.NsgsFrictionSolver.Options()
-            options.maxSweeps, options.tolerance = SWEEPS, TOLERANCE
+            options.maxSweeps, options.tolerance = contacts.sweeps(scene.block, SWEEPS), TOLERANCE
             solver.setBoxedLcpSolver(self.dart.constraint.NsgsFrictionSolver(options))
         sleep = self.world.getDeactivationOptions()
         sleep.mEnabled = False

@@ -121,7 +121,7 @@ class _RigidPyBulletWorld(_PyBulletWorld):
         self.erp = 0.0 if self.bounces or scene.walls else FLOOR_ERP
         self.bouncing: bool | None = None
         self.bullet.setPhysicsEngineParameter(
-            numSolverIterations=1000,
+            numSolverIterations=contacts.sweeps(scene.block, 1000),
             solverResidualThreshold=1e-20,
             contactSlop=0.0,
             contactERP=0.0,

@@ -11,7 +11,7 @@ from rockcheck.scenes import Scene
 SLAB = 10.0
 REACH = 1000.0  # half their extent
 KEPT = 0.5  # share of a penetration that is left after a second
-ITERATIONS = 200
+ITERATIONS = 200  # at least
 
 
 class _PymunkWorld(steps.World):
@@ -63,7 +63,7 @@ class _RigidPymunkWorld(_PymunkWorld):
         super().__init__(scene)
         self.space.collision_slop = 0.0
         self.space.collision_bias = KEPT
-        self.space.iterations = ITERATIONS
+        self.space.iterations = contacts.sweeps(scene.block, ITERATIONS)
         self.space.collision_persistence = (
             1  # steps after which a contact that has opened is forgotten
         )

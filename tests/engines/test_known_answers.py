@@ -348,6 +348,11 @@ SCENES = {
     "slips": {"floor": Floor(friction=0.3), "excitation": PULSE},
     "left wall": {"walls": [Wall(side="left", gap=0.03, restitution=0.3)], "excitation": PULSE},
     "right wall": {"walls": [Wall(side="right", gap=0.03, restitution=0.3)], "excitation": PULSE},
+    "slender": {
+        "block": Block(half_width=0.08, half_height=1.0),
+        "excitation": Sine(amplitude=1.2, period=0.3, cycles=3),
+        "duration": 1.0,
+    },
     "far off, beside a wall": {
         "block": RACK.replace(centre_of_mass=(0.2, -0.25)),
         "walls": [Wall(side="left", gap=0.0)],
