@@ -121,8 +121,9 @@ class _Motion:
         speed = np.where(flight, math.inf, np.abs(self.slip_rate))  # no slip begins in flight
         slipping = _held(_held(~flight & (speed > SLIPPING), t), t, value=True)
         slow = SLIP_NOISE * SLIPPING
-        for i in _rises(~slipping):  # as long as it slows down
-            slipping[i : len(t) - 1 - _start(speed[::-1], len(t) - i, slow)] = True
+        for i in [i for i in _rises(~slipping) if not flight[i]]:  # it slows down as in this step
+            lasts = (speed[i] - slow) / (speed[i - 1] - speed[i]) * (t[i] - t[i - 1])
+            slipping[i : np.searchsorted(t, t[i] + min(lasts, HOLD))] = True
         still = flat & ~slipping & (np.abs(self.states[:, 5]) < TURNING)
         # Where each kind began, and where it is told.
         places = {
