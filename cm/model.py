@@ -62,9 +62,10 @@ class ContinuousModel(Frozen):
         `kernels.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
-    the spring, decides; up to 0.08 of restitution on floors with restitution), another corner that
-    the impact presses down (a wall hit at more than the slenderness angle, 0.02). A restitution of
-    zero is reached within `kernels.least_restitution`, 7e-5 for the paper's block.
+    the spring, decides; on floors with restitution up to 0.2 of it at a friction of 0.3, 0.5 at 1),
+    another corner that the impact presses down (a wall hit at more than the slenderness angle,
+    0.02). A restitution of zero is reached within `kernels.least_restitution`, 7e-5 for the paper's
+    block.
     """
 
     #: The name by which reports and the command line call this model.
