@@ -40,9 +40,9 @@ def predictability_horizon(
     with 1e-7 and 1e-4 the horizon of El Centro is the same. Deterministic. The model's tolerance
     has to be well below the perturbation. Raises what `simulate` raises.
 
-    Where several contacts are struck at once, as when a block lands flush against a bouncing wall
-    or flat on the floor, the scene is played under the `other_laws` of impacts, too: histories mean
-    the same only as long as they do not depend on the law.
+    Where several contacts are struck at once, as when a block lands flush against a wall or flat on
+    the floor, the scene is played under the `other_laws` of impacts, too: histories mean the same
+    only as long as they do not depend on the law.
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
     played = model.simulate(scene)

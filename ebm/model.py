@@ -26,7 +26,7 @@ class EventBasedModel(Frozen):
     "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's regularisation (9)
     with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is
     the law of impacts at several contacts at once: "moreau" strikes all that touch together,
-    "floor-first" one after another; they differ where a block lands flush against a bouncing wall.
+    "floor-first" one after another; they differ where a block lands flush against a wall.
     ("closed" and "open" are the two branches that "moreau" takes there.) "leading-first" and
     "trailing-first" strike one bottom corner before the other where a block lands flat while it
     slides. `energy_cap` (unilateral) lowers the restitution of an impact that would add kinetic

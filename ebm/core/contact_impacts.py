@@ -20,7 +20,7 @@ the contacts obey
   together only one takes part, the one on the side to which the block slides or the other one. On a
   floor that does not bounce they are the limits of trajectories with a tilt to either side.
 
-The first two differ where a block lands flush against a bouncing wall, the last two from these
+The first two differ where a block lands flush against a wall, the last two from these
 where it lands flat while it slides. Rigid-body mechanics does not say which law is right there.
 """
 

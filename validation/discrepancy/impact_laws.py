@@ -1,4 +1,4 @@
-"""Which law of impacts a model followed where a block landed flush against a bouncing wall or flat.
+"""Which law of impacts a model followed where a block landed flush against a wall or flat.
 
 Rigid-body mechanics leaves several answers there (docs/theory.md, "Several impacts at one
 instant"). This names the one that a history took, without judging it.
@@ -87,10 +87,10 @@ class Landing(figures.Stored):
 def parting_landing(scene: Scene) -> Landing | None:
     """The first landing of a scene at which the laws part; None if there is none.
 
-    Played by the unilateral event-based model at tolerance 1e-13: under the flush laws where a wall
-    bounces, under the flat laws where the block lands flat. Raises what `simulate` raises.
+    Played by the unilateral event-based model at tolerance 1e-13: under the flush laws beside a
+    wall, under the flat laws where the block lands flat. Raises what `simulate` raises.
     """
-    groups = [FLUSH_LAWS] if any(wall.restitution > 0.0 for wall in scene.walls) else []
+    groups = [FLUSH_LAWS] if scene.walls else []
     if may_fly(scene) and LANDS_FLAT in _played(scene, "moreau").cost.rules:
         groups.append(FLAT_LAWS)
     window = max(2, round(WINDOW / scene.output_step))

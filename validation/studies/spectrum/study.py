@@ -47,7 +47,7 @@ ABOUT = (
 LAWS = (
     "Depends on the impact law: so many nodes have another outcome where a block strikes one"
     ' contact after another and not all at once (impacts = "moreau"): as it lands flush against a'
-    ' wall that bounces ("floor-first") or flat on the floor while it slides ("leading-first",'
+    ' wall ("floor-first") or flat on the floor while it slides ("leading-first",'
     ' "trailing-first"). In the figure they have a ring. Rigid-body mechanics does not tell between'
     " these laws."
 )
@@ -173,12 +173,12 @@ class Spectra(Study):
 
     def _spectrum(self, book: tiles.Book, panel: Panel) -> Spectrum | None:
         """The spectrum and, as soon as they are known, its nodes that depend on the impact law."""
-        request, walls = self.request, panel.scene.walls
+        request = self.request
         player = models.build(request.model, request.settings)
         others = (
             horizon.other_laws(
                 player,
-                walls=any(wall.restitution > 0.0 for wall in walls),
+                walls=bool(panel.scene.walls),
                 flat=horizon.may_fly(panel.scene),
             )
             if isinstance(player, EventBasedModel)
