@@ -49,15 +49,14 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     """Pseudo-spectral acceleration in g of an oscillator of `period` (s).
 
     `damping` is relative to critical, below 1. The response is exact for straight lines between
-    samples and no acceleration before the first and after the last; it continues for one period.
+    samples, and continues for one period after the last.
     """
     from scipy.signal import lfilter
 
     count = len(record.samples)
-    parts = math.ceil(_STEPS * record.time_step / period)
-    parts = max(min(parts, _MOST_STEPS // count), 1)
+    parts = max(min(math.ceil(_STEPS * record.time_step / period), _MOST_STEPS // count), 1)
     step, rate = record.time_step / parts, 2.0 * math.pi / period
-    tail = np.zeros(min(math.ceil(period / step), _MOST_STEPS))
+    tail = step * np.arange(1, min(math.ceil(period / step), _MOST_STEPS) + 1)
     lines = np.interp(np.arange((count - 1) * parts + 1) / parts, np.arange(count), record.samples)
     # y'' + 2 D w y' + w^2 y = w^2 a, from rest, is w^2/w_D times the imaginary part of z' = pole z
     # + a. A straight line of a adds to z, in a step, so much for its value before and after it.
@@ -65,10 +64,7 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     gain = np.expm1(pole * step)
     after = (gain / (pole * step) - 1.0) / pole
     before = gain / pole - after
-    # No line leads to the first sample, and none from the last.
-    shaken, rest = lfilter(
-        [after, before], [1.0, -1.0 - gain], lines, zi=np.array([-after * lines[0]])
-    )
-    free, _ = lfilter([1.0], [1.0, -1.0 - gain], tail, zi=rest - before * lines[-1])
-    response = np.append(shaken, free).imag
-    return float(np.max(np.abs(response))) * rate**2 / pole.imag / GRAVITY_OF_RECORDS
+    # the acceleration jumps from 0 to the first sample, and from the last one to 0
+    states, _ = lfilter([after, before], [1.0, -1.0 - gain], lines, zi=[-after * lines[0]])
+    response = np.abs(np.append(states, states[-1] * np.exp(pole * tail)).imag)
+    return float(np.max(response)) * rate**2 / pole.imag / GRAVITY_OF_RECORDS

@@ -91,9 +91,9 @@ def test_intensities_of_a_sine_are_its_closed_forms():
 
 
 def test_intensities_are_those_of_the_straight_lines_between_samples():
-    """Samples four periods apart: as of the same lines with samples
-    4000 times as dense."""
-    samples = np.array([0.0, 1.0, -0.5, 0.0])
+    """Samples four periods apart, or all motion in one: as of the same lines with samples 4000
+    times as dense. Before the first and after the last the base stands."""
+    samples = np.array([0.8, 1.0, -0.5, 0.6])
     lines = np.interp(np.arange(12_001) / 4000, np.arange(4), samples)
     coarse, dense = (
         [
@@ -106,8 +106,8 @@ def test_intensities_are_those_of_the_straight_lines_between_samples():
         )
     )
     assert coarse == pytest.approx(dense, rel=2e-3)
-    # A push of a step's length, before and after which the base is at rest, is, to an oscillator of
-    # a far longer period, an impulse; the peak comes a quarter of a period later.
+    # A push of a step's length is, to an oscillator of a far longer period, an impulse; the peak
+    # comes a quarter of a period later.
     last = Recording(samples=np.ones(2), time_step=1e-2, unit="m/s2", form="CSV")
     rate, damping = 2 * math.pi / 1.0, 0.05
     peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
@@ -124,8 +124,8 @@ def test_a_base_that_is_set_in_motion_overshoots_as_its_damping_lets_it(damping)
 
 @pytest.mark.parametrize("period", [0.05, 0.4, 3.0])
 def test_the_oscillator_is_that_of_scipys_first_order_hold(period):
-    samples = np.pad(np.random.default_rng(3).normal(size=38), 1)
-    rate, parts = math.tau / period, math.ceil(0.8 / period)
+    samples, parts = np.pad(np.random.default_rng(3).normal(size=38), 1), math.ceil(0.8 / period)
+    rate = math.tau / period
     record = Recording(samples=samples, time_step=0.01, unit="m/s2", form="CSV")
     above, below, _ = cont2discrete(([rate**2], [1.0, 0.2 * rate, rate**2]), 0.01 / parts, "foh")
     ground = np.interp(np.arange(39 * parts + 1) / parts, np.arange(40), samples)
