@@ -569,10 +569,13 @@ def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]], folder: Pa
 
 
 def _merged(base: Any, change: Any) -> Any:
-    """`change` over `base`: tables by key, lists of tables one by one, anything else replaced."""
+    """`change` over `base`: tables by key, lists of tables one by one, anything else replaced.
+
+    An empty list leaves none.
+    """
     if isinstance(base, dict) and isinstance(change, dict):
         return {**base, **{key: _merged(base.get(key), value) for key, value in change.items()}}
-    if isinstance(base, list) and isinstance(change, list):
+    if isinstance(base, list) and isinstance(change, list) and change:
         return [
             _merged(a, b) if b is not None else a for a, b in itertools.zip_longest(base, change)
         ]

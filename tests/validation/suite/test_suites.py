@@ -64,7 +64,15 @@ walls = [{ restitution = 0.5 }]
         scene.walls[0].gap,
         scene.walls[0].restitution,
         scene.floor.friction,
-    ) == ("right", 0.1, 0.5, 0.9)
+        suite(
+            MODELS
+            + '[[grid]]\naxes = [[{ name = "free", walls = [] }]]\n'
+            + SHELF.replace("[[scene]]", "[grid.scene]")
+            + "walls = [{ side = 'left', gap = 0.1 }]\n"
+        )
+        .scenes["shelf-free"]
+        .walls,
+    ) == ("right", 0.1, 0.5, 0.9, ())
 
 
 @pytest.mark.parametrize(
