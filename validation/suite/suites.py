@@ -429,6 +429,11 @@ def _check_names(
             (one and one not in models, f"{one!r} is not among the suite's models: {known}", key)
             for key, one in (("reference", given.reference), ("model_form", given.model_form))
         ),
+        (
+            given.require.model_form and not given.model_form,
+            "needs the key model_form, which says against which model",
+            "require.model_form",
+        ),
         (not models, "no model; at least the reference is needed", "models"),
         (not scenes and not ensembles, "no scene; at least one is needed", "scenes"),
         *((n > 1, f"{one!r} is named twice", "ensemble.name") for one, n in count.items()),

@@ -93,6 +93,7 @@ walls = [{ restitution = 0.5 }]
         ),
         (MODELS + "[require]\ndifference = ['theta_rsm']\n" + SHELF, "did you mean 'theta_rms'"),
         (MODELS + "[require]\ndifference = ['peak_rotation']\n" + SHELF, "require.difference"),
+        (MODELS + "[require]\nmodel_form = ['theta_rms']\n" + SHELF, "needs the key model_form"),
         (MODELS + SHELF.replace("0.1", "-0.1"), "block.half_width: -0.1 is not allowed"),
         (
             MODELS + SHELF + "[tolerances.shelf.ebm.nobody]\ntheta_rms = { limit = 1.0 }\n",
