@@ -33,7 +33,7 @@ from rockcheck.scenes import (
 )
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, gap_of
-from rockcheck.validation.discrepancy.figures import Figure, Measure, Stored
+from rockcheck.validation.discrepancy.figures import SAME_IMPACT, Figure, Measure, Stored
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, TABLE, Store, name_of
 from rockcheck.validation.finding import Finding
@@ -230,8 +230,8 @@ def explanations(
 
     `scatters` is, by model, the scatter of the repeats of a measured history: rotations in rad,
     slips in m. There is no verdict for a model whose numerical error is unknown. Where the outcomes
-    differ and a block falls, the only verdict is on the outcome; where both fall alike, there is
-    none on peaks and slips.
+    differ and a block falls, the only verdict is on the outcome; where both fall alike, or one
+    history ends before the other, there is none on peaks and slips.
     """
     if cell.numerical is None:
         return
@@ -263,7 +263,9 @@ def _difference(name: str, figures: Sequence[Figure], other: results.Cell) -> fl
     mine, theirs = results.value_of(figures, name), results.value_of(other.figures, name)
     if mine is None or theirs is None:  # a figure of both histories
         return results.value_of(figures, name, other.model)
-    return None if "overturned" in other.outcome else abs(mine - theirs)
+    end, its = (results.value_of(one, "end_time") or 0.0 for one in (figures, other.figures))
+    alike = "overturned" not in other.outcome and abs(end - its) <= SAME_IMPACT
+    return abs(mine - theirs) if alike else None
 
 
 def _other_outcome(

@@ -271,30 +271,36 @@ FALL_IN_PART = population.Inputs(
 
 
 @pytest.mark.parametrize(
-    ("inputs", "outcome_of_one", "verdicts"),
+    ("inputs", "ends", "verdicts"),
     [
-        (None, "at rest", ["not explained: model form or set-up, another outcome"]),
-        (FALL_IN_PART, "at rest", [numerical.INPUTS]),
+        (
+            None,
+            [("at rest", 6.0), ("overturned left", 3.0)],
+            ["not explained: model form or set-up, another outcome"],
+        ),
+        (FALL_IN_PART, [("at rest", 6.0), ("overturned left", 3.0)], [numerical.INPUTS]),
         # two that fall alike have no peaks whose difference could be explained
-        (None, "overturned left", []),
+        (None, [("overturned left", 3.0)] * 2, []),
+        # nor have two of which one ends early, as a measured one may
+        (None, [("at rest", 6.0), ("at rest", 5.0)], []),
+        (None, [("at rest", 6.0)] * 2, [numerical.NOT_CONVERGED]),
     ],
 )
-def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, outcome_of_one, verdicts):
+def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, ends, verdicts):
     outcome = numerical.Quantity(name="outcome", unit="", value="", verdict="converged")
     own, other = (
         results.Cell(
             scene="s",
             model="ebm",
             status="done",
-            outcome=ends,
+            outcome=end,
             numerical=numerical.Numerical(method="", quantities=(outcome,)),
-            figures=(
-                figures.Figure(
-                    measure="peak_rotation", label="", unit="alpha", value=8.0, note="fell"
-                ),
+            figures=tuple(
+                figures.Figure(measure=name, label="", unit="", value=value)
+                for name, value in (("peak_rotation", 8.0), ("end_time", t))
             ),
         )
-        for ends in (outcome_of_one, "overturned left")
+        for end, t in ends
     )
     assert [
         one.verdict for one in runner.explanations(BOOKCASE, own, [other], {"ebm": {}}, inputs)
