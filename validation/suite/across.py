@@ -276,8 +276,8 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     last, number = moments[-1], f"{len(moments)} run{'s' * (len(moments) > 1)}"
     every = {
         name: [one.figures.get(name) for one in moments]
-        for earlier in reversed(moments)  # a model that fails now may have had figures
-        for name in earlier.figures
+        # of all runs: a model that fails now may have had figures
+        for name in dict.fromkeys(chain.from_iterable(one.figures for one in reversed(moments)))
     }
     values = pd.DataFrame(every, dtype=float)
     least, most = values.min(), values.max()
