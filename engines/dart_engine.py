@@ -10,7 +10,7 @@ from rockcheck.engines.engine import Engine, Worlds
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls
-REACH = 100.0  # half their extent
+REACH = 1000.0  # half their extent
 #: DART drops rebounds slower than 0.1 of its units of length a second, and caps them at 100: sqrt(g
 #: R) is made so many of them.
 NATURAL_SPEED = 30.0

@@ -193,6 +193,12 @@ TURNS = 4 * math.pi  # rad/s
 #: Scenes of a block that nothing holds, a channel, what it is by the time, and how nearly.
 LOOSE = {
     "slides": (ICE.replace(initial_velocity=0.5), "x", lambda t: 0.5 * t, 1e-5),
+    "slides far": (
+        ICE.replace(block=Block(half_width=0.01, half_height=0.005), initial_velocity=2.0),
+        "x",
+        lambda t: 2.0 * t,
+        1e-5,
+    ),
     # It stays in space, so that it moves against the floor.
     "is left behind by its base": (
         ICE.replace(excitation=Sine(amplitude=2.0, period=0.5, cycles=2)),
