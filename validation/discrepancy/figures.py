@@ -202,8 +202,10 @@ class WindowedHistory:
 def _joined(events: Sequence[Event]) -> list[Event]:
     """Of events of one kind, in order of time, the strongest of those within `ONE_IMPACT`."""
     starts = np.flatnonzero(np.diff([e.t for e in events], prepend=-math.inf) > ONE_IMPACT)
-    parts = pairwise([*starts.tolist(), len(events)])
-    return [max(events[i:j], key=lambda e: abs(e.impulse)) for i, j in parts]
+    return [
+        max(events[i:j], key=lambda e: abs(e.impulse))
+        for i, j in pairwise([*starts.tolist(), len(events)])
+    ]
 
 
 class Pair:
