@@ -1,6 +1,8 @@
 """Box2D v3 (pyb2d3) as a model of the rocking block."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
@@ -17,10 +19,13 @@ STIFFNESS, DAMPING, PUSH, THRESHOLD = 0.25, 10.0, 3.0, 1e-3
 class _Box2DWorld(steps.World):
     """A world with a box, floor and walls, and Box2D's default parameters."""
 
+    #: Other values of the world's own parameters.
+    parameters: ClassVar[Mapping[str, float]] = MappingProxyType({})
+
     def __init__(self, scene: Scene) -> None:
         import pyb2d3
 
-        self.world = pyb2d3.World(gravity=(0.0, 0.0))
+        self.world = pyb2d3.World(gravity=(0.0, 0.0), **self.parameters)
         # Of two frictions the geometric mean counts, of two restitutions the larger.
         for face in contacts.surfaces_of(scene):
             slab = self.world.create_static_body(position=face.behind(SLAB))
@@ -58,12 +63,16 @@ class _Box2DWorld(steps.World):
 
 
 class _RigidBox2DWorld(_Box2DWorld):
-    """Contacts as stiff as a step allows, bouncing at any speed; a block that never sleeps."""
+    """Contacts as stiff as a step allows, bouncing at any speed; a block that never sleeps.
+
+    Small blocks are faster than Box2D lets them be, in R a second.
+    """
+
+    parameters = MappingProxyType({"restitution_threshold": THRESHOLD, "maximum_linear_speed": 1e6})
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)
         self.world.sleeping_enabled = False
-        self.world.restitution_threshold = THRESHOLD
 
     def ready(self, dt: float) -> None:
         self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, PUSH)

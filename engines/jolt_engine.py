@@ -5,21 +5,23 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import Engine, Worlds
-from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes import InputError, ModelFailure, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
 #: Of a second's velocity that Jolt takes away, and culverin has no word for.
 DAMPING = 0.05
-#: At its best, units of Jolt in one of the scene: below about 1 a second nothing bounces there.
-SCALE = 100.0
+#: At its best, Jolt's units of length in one of the scene's, and sqrt(g/R) in Jolt, 1/s: nothing
+#: bounces below about 1 unit a second, and nothing is faster than 500, or turns faster than 47/s.
+SCALE, RATE, FASTEST = 50.0, 2.5, 500.0
 ROOM = {"max_bodies": 64, "max_pairs": 256, "max_contact_constraints": 256, "num_threads": 1}
 
 
 class _JoltWorld(steps.World):
     """A box, floor and walls, with Jolt's default parameters; the y axis points up."""
 
-    #: Lengths in this world per length in the scene, and whether the block stays in its plane.
-    scale, planar = 1.0, False
+    #: Lengths and times in this world per length and time in the scene, and whether the block stays
+    #: in its plane.
+    scale, pace, planar = 1.0, 1.0, False
 
     def __init__(self, scene: Scene) -> None:
         import culverin
@@ -48,35 +50,44 @@ class _JoltWorld(steps.World):
         return made
 
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
-        s = self.scale
+        s, pace = self.scale, self.pace
         turn = (0.0, 0.0, math.sin(0.5 * theta), math.cos(0.5 * theta))
         self.world.set_transform(self.body, (s * x, s * y, 0.0), turn)
-        self.world.set_linear_velocity(self.body, s * vx, s * vy, 0.0)
-        self.world.set_angular_velocity(self.body, 0.0, 0.0, w)
+        self.world.set_linear_velocity(self.body, s * vx / pace, s * vy / pace, 0.0)
+        self.world.set_angular_velocity(self.body, 0.0, 0.0, w / pace)
 
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        self.world.set_gravity(self.scale * felt[0], self.scale * felt[1], 0.0)
-        self.world.step(dt)
+        x, y = (self.scale * one / self.pace**2 for one in felt)
+        self.world.set_gravity(x, y, 0.0)
+        self.world.step(dt * self.pace)
 
     def state(self) -> steps.State:
-        world, body, s = self.world, self.body, self.scale
+        world, body, s, pace = self.world, self.body, self.scale, self.pace
         (x, y, _), (_, _, turn, whole) = world.get_position(body), world.get_rotation(body)
         (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)
-        return x / s, y / s, 2.0 * math.atan2(turn, whole), vx / s, vy / s, w
+        angle = 2.0 * math.atan2(turn, whole)
+        return x / s, y / s, angle, vx / s * pace, vy / s * pace, w * pace
 
 
 class _RigidJoltWorld(_JoltWorld):
-    """A block that stays in its plane, in units in which slow contacts bounce.
+    """A block that stays in its plane, in units in which slow contacts bounce, whatever its size.
 
     Jolt's damping is compensated.
     """
 
     scale, planar = SCALE, True
 
+    def __init__(self, scene: Scene) -> None:
+        self.pace = math.sqrt(scene.gravity / scene.block.radius) / RATE
+        super().__init__(scene)
+
     def step(self, felt: tuple[float, float], dt: float) -> None:
-        kept = 1.0 - DAMPING * dt  # Jolt makes (v + g dt) (1 - c dt) of a velocity v
+        kept = 1.0 - DAMPING * dt * self.pace  # Jolt makes (v + g dt) (1 - c dt) of a velocity v
         world, body = self.world, self.body
         (vx, vy, _), (_, _, w) = world.get_velocity(body), world.get_angular_velocity(body)
+        if math.hypot(vx, vy) > 0.999 * FASTEST:
+            most = FASTEST / self.scale * self.pace
+            raise ModelFailure(f"Jolt holds no speed above {most:.3g} R/s")
         world.set_linear_velocity(body, vx / kept, vy / kept, 0.0)
         world.set_angular_velocity(body, 0.0, 0.0, w / kept)
         super().step((felt[0] / kept, felt[1] / kept), dt)
