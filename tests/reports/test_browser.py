@@ -138,13 +138,14 @@ def test_models_and_the_reference_of_differences_with_their_running_rms_are_chos
     assert {running, *page.evaluate(shown)} == {False}
     hidden = page.locator('#block [data-model="cm"], #values tr[data-model="cm"]')
     assert [one.is_visible() for one in hidden.all()] == [False, False]
-    page.get_by_role("checkbox", name="CM").check()
-    assert all(page.evaluate(shown))
     largest = """rockcheckPage.drawn[3].data.slice(1, 3)
         .map(line => Math.max(...line.map(v => Math.abs(v ?? 0))))"""
     assert [size > 0.0 for size in page.evaluate(largest)] == [False, True]  # itself is left out
     page.get_by_label("Differences from").select_option("ebm")
     assert [size > 0.0 for size in page.evaluate(largest)] == [True, False]
+    page.get_by_role("checkbox", name="CM").check()
+    # the reference was chosen while it was off
+    assert all(page.evaluate(f"[...{shown}, rockcheckPage.drawn[3].data[9].some(Boolean)]"))
     said = page.locator("#plots").inner_text()
     assert [words for words in ("difference from EBM;", "RMS so far") if words not in said] == []
 

@@ -154,7 +154,7 @@
     function point(node) {
       store.node = node;
       const [i, j] = node, pulse = data.pulse;
-      output.textContent = `${data.axes[0].replaceAll(" ", "")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
+      output.textContent = `${data.axes[0].replace(" / ", "/")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
         (pulse ? `: a pulse of ${pulseWords(i, j)}` : "");
       for (const panel of panels) panel.said.textContent = spell(at(panel, node), panel);
       drawAll();
@@ -179,7 +179,7 @@
       withHistories(data.stem, all => {
         const [i, j] = kept, index = panels.indexOf(panel), pulse = data.pulse;
         const exact = i === node[0] && j === node[1];
-        play(host, all[index], panel.nodes.indexOf(kept), `${panel.title.textContent}, ${data.axes[0].replaceAll(" ", "")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
+        play(host, all[index], panel.nodes.indexOf(kept), data.record ? xs[j] : 1, `${panel.title.textContent}, ${data.axes[0].replace(" / ", "/")} ${words(xs[j])}, ${data.axes[1]} ${words(ys[i])}` +
           (pulse ? `, ${pulseWords(i, j)}` : "") + `: ${spell(at(panel, kept), panel)}` +
           (exact ? "" : ". The node next to yours whose history is kept."));
       });
@@ -213,18 +213,19 @@
     document.head.append(script);
   }
 
-  function play(host, kept, index, caption) {
+  // `size`: of the node's block, relative to the scene's own.
+  function play(host, kept, index, size, caption) {
     host.querySelector(".played")?.remove();
-    const all = kept.unpacked ??= floats(kept.rows), first = index ? kept.ends[index - 1] : 0, last = kept.ends[index] - 1;
+    const block = kept.block.map(half => half * size), all = kept.unpacked ??= floats(kept.rows), first = index ? kept.ends[index - 1] : 0, last = kept.ends[index] - 1;
     const column = n => Array.from({ length: last - first + 1 }, (_, k) => all[4 * (first + k) + n]);
     const t = column(0), channels = { theta: column(1).map(value => value / kept.alpha), x: column(2), y: column(3) };
     const until = Math.min(channels.theta.findLastIndex(value => Math.abs(value) <= 1.5) + 1, t.length - 1);  // where it falls for good
-    const reach = Math.hypot(...kept.block);
+    const reach = Math.hypot(...block);
     const xs = channels.x.slice(0, until + 1);
     const listeners = [];
     const store = {
-      data: { block: kept.block, walls: kept.walls, alpha: kept.alpha, duration: t[t.length - 1],
-        extent: [Math.min(...xs) - 1.4 * reach, Math.max(...xs) + 1.4 * reach, 0, 2.1 * kept.block[1]],
+      data: { block, walls: kept.walls, alpha: kept.alpha, duration: t[t.length - 1],
+        extent: [Math.min(...xs) - 1.4 * reach, Math.max(...xs) + 1.4 * reach, 0, 2.1 * block[1]],
         models: [{ name: "ebm", look: "ebm", dash: [], end: t[t.length - 1] }] },
       time: t[0], on: new Set(["ebm"]), lead: "ebm",
       listen: listener => listeners.push(listener),
@@ -245,7 +246,7 @@
     view.setAttribute("aria-label", "The block in motion");
     close.setAttribute("role", "img");
     close.setAttribute("aria-label", "Close-up of its lower corner");
-    Animation.build(view, close, store, 0.3 * kept.block[0]);
+    Animation.build(view, close, store, 0.3 * block[0]);
     const box = make("div", { class: "trace", role: "img", "aria-label": "Rotation over time" }, player);
     const axis = { stroke: () => colour("--soft"), grid: { stroke: () => colour("--grid"), width: 1 }, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const plot = new uPlot({

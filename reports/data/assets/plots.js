@@ -309,11 +309,10 @@ const Plots = (() => {
       } },
     });
     store.listen(changed => {
-      if (changed.against) {
-        u.setData(columns(), false);
-        u.setScale("x", { min: store.window[0], max: store.window[1] });
-      }
-      if (changed.against || changed.models) heading.textContent = title();
+      if (!changed.against && !changed.models) return;
+      u.setData(columns(), false);
+      u.setScale("x", { min: store.window[0], max: store.window[1] });
+      heading.textContent = title();
     });
     return u;
   }
