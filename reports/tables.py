@@ -118,21 +118,27 @@ def _check_row(
 def worst_first(run: results.Run) -> list[tuple[results.Cell, results.Check | None]]:
     """What is not within tolerance, the worst first.
 
-    Cells without a history, then checks by how far they are out, then those that changed.
+    Cells whose model failed, checks by how far they are out, those that changed, then cells whose
+    model is not installed; where it has no wheel, that weighs nothing.
 
     A figure that has no tolerance yet is not out of one; the page counts these.
     """
-    failed: list[tuple[results.Cell, results.Check | None]] = [
-        (cell, None) for cell in run.cells if cell.status != "done"
-    ]
-    return failed + sorted(
-        (
-            (cell, check)
-            for cell, check in run.checks()
-            if check.weighs != "pass" and check.words != "no tolerance yet"
-        ),
-        key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])),
+    failed, absent = (
+        [(cell, None) for cell in run.cells if cell.status == status]
+        for status in ("failed", "absent")
     )
+    return [
+        *failed,
+        *sorted(
+            (
+                (cell, check)
+                for cell, check in run.checks()
+                if check.weighs != "pass" and check.words != "no tolerance yet"
+            ),
+            key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])),
+        ),
+        *absent,
+    ]
 
 
 def times_table(run: results.Run) -> Table:

@@ -18,7 +18,7 @@ from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
-from rockcheck.validation.suite import tables
+from rockcheck.validation.suite import results, tables
 from rockcheck.validation.uncertainty import population
 
 
@@ -58,8 +58,17 @@ def test_hostile_text_stays_text(site):
 
 
 def test_index_lists_what_is_wrong_worst_first(run, index):
-    first, second, *rest = worst_first(run)
-    assert [(cell.model, check) for cell, check in (first, second)] == [("mujoco", None)] * 2
+    (first, _), (second, _), *rest, (last, _) = worst_first(
+        run.model_copy(
+            update={
+                "cells": [
+                    *(run.cells[0].model_copy(update={"status": one}) for one in results.MISSING),
+                    *run.cells,
+                ]
+            }
+        )
+    )
+    assert [first.model, second.model, last.status] == ["mujoco", "mujoco", "absent"]
     order = [(check.verdict != "fail", -tables.used(check)) for _, check in rest]
     assert order == sorted(order)
     wrong = [check.verdict for _, check in run.checks() if check.verdict in ("fail", "changed")]
@@ -131,7 +140,19 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
             },
             "cells": (
                 *cells,
-                finished.by_scene["Free"]["ebm"].model_copy(update={"checks": ()}),
+                finished.by_scene["Free"]["ebm"].model_copy(
+                    update={
+                        "checks": (),
+                        "outcome": "moving",
+                        "figures": tuple(
+                            cells[0].figures[0].model_copy(update=figure)
+                            for figure in (
+                                {"measure": "last_rotation", "unit": "alpha", "value": 9.0},
+                                {"measure": "peak_ratio", "against": finished.reference},
+                            )
+                        ),
+                    }
+                ),
             ),
             "ensembles": (),
             "faults": (),
@@ -155,7 +176,7 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
         r"outcome</th><td>(.*?)</td>", (tmp_path / PAGES / "free.html").read_text("utf-8")
     ) + re.findall(
         r"peak .*</th><td>(.*?)</td>", (tmp_path / PAGES / "Free-2.html").read_text("utf-8")
-    ) == [cells[0].fate, "fell"]
+    ) + re.findall("peak ×|falling left", index) == [cells[0].fate, "fell", *["falling left"] * 2]
 
 
 def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path, typed):
