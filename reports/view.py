@@ -116,7 +116,10 @@ class SceneView(View):
 
     @cached_property
     def moved(self) -> list[dict[str, Any]]:
-        """Slip, top displacement, speed at the wall by model: (label, unit, values) where known."""
+        """Slip, top displacement, speed at the wall by model: (label, unit, values) where known.
+
+        Of a block that falls, also beyond the scene's end, only the last.
+        """
         motions = {
             model: compare.motion_of(one, self.scene) for model, one in self.histories.items()
         }
@@ -124,7 +127,11 @@ class SceneView(View):
             {
                 "label": q.label,
                 "unit": q.unit,
-                "by_model": {model: one[q.name] for model, one in motions.items()},
+                "by_model": {
+                    model: one[q.name]
+                    for model, one in motions.items()
+                    if model not in self.falls or q.name == "wall_speed"
+                },
             }
             for q in compare.QUANTITIES[1:]
         ]
