@@ -15,7 +15,7 @@ from rockcheck.reports.drawers import draw_spectrum
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
-from rockcheck.validation import Discrepancy
+from rockcheck.validation import Discrepancy, criteria
 from rockcheck.validation.discrepancy import figures
 
 INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
@@ -42,7 +42,20 @@ def scene_figure(scene: Scene) -> Figure:
     figure = NotebookFigure(figsize=(7.0, 3.0), layout="constrained")
     sketch, base = figure.subplots(1, 2, width_ratios=(1, 2))
     draw_block(sketch, scene)
-    time = np.linspace(0.0, scene.duration, 2001)
+    time = np.unique(  # no peak falls between them
+        np.concatenate(
+            [
+                np.linspace(0.0, scene.duration, 2001),
+                *(
+                    np.clip(one.time_step * np.arange(len(one.samples)), 0.0, scene.duration)
+                    for one in (
+                        criteria.sampled(motion, scene.duration)
+                        for motion in (scene.excitation, scene.vertical)
+                    )
+                ),
+            ]
+        )
+    )
     base.plot(
         time, scene.excitation.acceleration(time), color=INK, linewidth=0.8, label="horizontal"
     )
