@@ -431,8 +431,21 @@ def accuracy(run: results.Run) -> list[Block]:
 
     Nothing where neither is known.
     """
-    pairs, styles = across.pairs_of([run]), looks(run.models)
-    settings = {cell.model: cell.settings for cell in run.cells}
+    # one that was falling at the end does not stand
+    pairs = across.pairs_of(
+        [
+            run.model_copy(
+                update={
+                    "cells": [
+                        cell
+                        for cell in run.cells
+                        if not outcome_of(run, cell).startswith("falling")
+                    ]
+                }
+            )
+        ]
+    )
+    styles, settings = looks(run.models), {cell.model: cell.settings for cell in run.cells}
     trusts = {
         model: (
             across.trust_in(pairs[model]),
