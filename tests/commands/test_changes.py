@@ -157,7 +157,11 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
     ] == [["runs"], ["figures", "runs"]]
     trend, page = (Path(f"a/{of}index.html").read_text("utf-8") for of in ("trend/", ""))
     assert (
-        [p for p in ("mine over 3 runs", name, head, '"../index.html"') if p not in trend],
+        [
+            words
+            for words in ("mine over 3 runs", name, head, '"../index.html"', f"{second:.6g}")
+            if words not in trend
+        ],
         'href="trend/index.html"' in page,
     ) == ([], True)
     os.truncate("runs.jsonl", Path("runs.jsonl").stat().st_size - 1)  # as some editors do

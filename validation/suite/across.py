@@ -295,7 +295,10 @@ def trend_of(moments: Sequence[Moment]) -> Finding:
     ]
     panels = [_panel(name, every[name], moments) for name in found[:DRAWN]]
     rows = [[name, every[name][0], least[name], most[name], *every[name][-2:]] for name in found]
-    columns = [text("figure"), *map(Column, ("first", "least", "most", "before", "now"))]
+    columns = [
+        text("figure"),
+        *(Column(name, digits=6) for name in ("first", "least", "most", "before", "now")),
+    ]
     made = [
         [one.created, one.commit, one.rockcheck, one.verdict, len(one.not_passed)]
         for one in reversed(moments)
