@@ -310,12 +310,12 @@ def belongings(page: Path) -> set[str]:
     if not style.stamp_in(page):
         return set()
     names = re.findall(
-        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.-]*)"',
+        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.~-]*)"',
         reading.head_of(page, reading.MOST_BYTES),
         re.ASCII,
     )
     drawn = [name.removesuffix(".svg") + ".json" for name in names if name.endswith(".svg")]
-    return {*names, *drawn, f"{FIGURES}/{page.stem}-small.svg"}
+    return {*names, *drawn, f"{FIGURES}/{page.stem}~small.svg"}
 
 
 def remove(folder: Path, names: Iterable[str]) -> None:

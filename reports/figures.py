@@ -521,7 +521,7 @@ class EnsembleView(View):
             self.name,
             "",
             [
-                replace(one, name=f"data/{self.slug}-{one.name}".rstrip("-"))
+                replace(one, name=f"data/{self.slug}~{one.name}".rstrip("~"))
                 if isinstance(one, Table)
                 else one
                 for one in blocks
@@ -625,7 +625,7 @@ class EnsembleView(View):
             for of in (known[reference].label, "the model")
         )
         return Plot(
-            f"{self.slug}-scenes",
+            f"{self.slug}~scenes",
             "Scene by scene",
             panels=panels,
             x=x_axis,

@@ -101,7 +101,7 @@ def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
         if (folder / "trend/run.json").is_file():
             document.remove(folder, ["trend/index.html"])
         index = document.belongings(folder / INDEX)  # none of a page that is not ours
-        document.remove(folder, {name for name in index if "-small." not in name})
+        document.remove(folder, {name for name in index if "~small." not in name})
         document.remove(folder, [INDEX] * bool(index))
         writing.write_together({folder / name: content for name, content in told.items()})
         return run.save(folder)
@@ -236,10 +236,10 @@ class _Pages:
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
-        style.save_as(figures.thumbnail(curves), drawn / f"{view.slug}-small.svg", named=False)
+        style.save_as(figures.thumbnail(curves), drawn / f"{view.slug}~small.svg", named=False)
         slugs = slugs_of([str(against) for against in view.figure_references])
         stems = {
-            against: f"{view.slug}-against-{slugs[str(against)]}" if number else view.slug
+            against: f"{view.slug}~against-{slugs[str(against)]}" if number else view.slug
             for number, against in enumerate(view.figure_references)
         }
         for against, stem in stems.items() if view.printed else ():
@@ -271,7 +271,7 @@ class _Pages:
             if model in view.curves
         ]
         style.save_as(
-            figures.thumbnail(curves, step=True), drawn / f"{view.slug}-small.svg", named=False
+            figures.thumbnail(curves, step=True), drawn / f"{view.slug}~small.svg", named=False
         )
         for plot in page.plots():
             style.save(drawers.figure_of(plot), drawn / plot.name)

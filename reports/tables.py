@@ -314,7 +314,7 @@ Entry = Mapping[str, Any]
 #: What is drawn of an expected peak: the bias, and so many standard deviations below and above it.
 DEVIATIONS: dict[float, Style] = {0.0: "smooth", -2.0: "dots", 2.0: "dots"}
 #: The figure of all peaks; no scene's file has such a name.
-PEAKS = "overview-peaks"
+PEAKS = "overview~peaks"
 
 
 def matrix(run: results.Run, scenes: Iterable[str] = ()) -> dict[str, dict[str, Entry]]:

@@ -457,20 +457,16 @@ def scene_views(
     return views
 
 
-#: What the names of a scene's or an ensemble's further figures have besides.
-ADDED = re.compile(r"(-small|-scenes)+$")
-
-
 def slugs_of(names: Collection[str]) -> dict[str, str]:
     """A file name for each scene, safe on any system.
 
-    The names differ for different scenes also where case does not count, and with what is added to
-    them for a figure (`ADDED`).
+    The names differ for different scenes also where case does not count. None has a tilde, with
+    which begins what is added to one for a further file.
     """
     taken: dict[str, str] = {}
     for name in names:
         base = re.sub(r"[^A-Za-z0-9._-]+", "-", name).strip("-.") or "scene"
         numbered = chain([base], (f"{base}-{n}" for n in count(2)))
-        slug = next(one for one in numbered if ADDED.sub("", one.lower()) not in taken)
-        taken[ADDED.sub("", slug.lower())] = slug
+        slug = next(one for one in numbered if one.lower() not in taken)
+        taken[slug.lower()] = slug
     return dict(zip(names, taken.values(), strict=True))

@@ -247,7 +247,7 @@ def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_g
         "data/free.js",
         *(
             f"figures/{name}"
-            for name in ("free-small.svg", "free.pdf", "free.png", "free.svg", "study.svg")
+            for name in ("free.pdf", "free.png", "free.svg", "free~small.svg", "study.svg")
         ),
         "free.html",
         "scene-files/free.toml",
@@ -289,7 +289,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     write_site(tmp_path, afresh=False)
     figures = {path.name for path in (tmp_path / PAGES / "figures").iterdir()}
     assert {name for name in figures if name.startswith(("free", "beside-a-wall."))} == {
-        "free-small.svg",
+        "free~small.svg",
         *(f"beside-a-wall.{kind}" for kind in ("svg", "png", "pdf")),
     }
     assert "rockcheck report DIR --scene free -o free.pdf" in (
@@ -322,7 +322,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
 def test_an_ensemble_is_shown_by_its_distributions(site, run):
     (record,) = run.ensembles
     view = EnsembleView(run, "crowd", "crowd", record)
-    (row,) = view.page().table("data/crowd-against-ebm-unilateral").records()
+    (row,) = view.page().table("data/crowd~against-ebm-unilateral").records()
     reference, other = (np.array(record.peaks[m]) > 1.0 for m in ("ebm-unilateral", "cm"))
     figures = {f.measure: f.value for f in run.by_scene["crowd"]["cm"].figures}
     expected = {

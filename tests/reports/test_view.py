@@ -298,7 +298,7 @@ def test_scene_file_plays_the_same_scene(tmp_path, scene):
 def test_slugs_differ_whatever_the_file_system():
     slugs = slugs_of(["a b", "a,b", "A b", "a-b-small", "x-small", "x", "a-b-2", "..", "x/../y"])
     # and so do the names of their small figures
-    assert len({f"{slug.lower()}{of}" for slug in slugs.values() for of in ("", "-small")}) == 18
+    assert len({f"{slug.lower()}{of}" for slug in slugs.values() for of in ("", "~small")}) == 18
     assert all(
         re.fullmatch(r"[A-Za-z0-9._-]+", slug) and slug not in (".", "..")
         for slug in slugs.values()
@@ -375,7 +375,7 @@ def test_index_shows_peaks_against_the_reference_s(site, run, index):
     (crowd,) = (row for row in table.records() if row["model"] == "cm")
     assert crowd["scatter_here"] == pytest.approx(0.14, abs=0.02)  # 0.2 sin k
     assert (crowd["scenes_here"] > 30, f"{crowd['bias_here']:.4g}" in index) == (True, True)
-    assert (site / "pages" / "figures" / "overview-peaks.svg").stat().st_size > 1000
+    assert (site / "pages" / "figures" / "overview~peaks.svg").stat().st_size > 1000
 
 
 def test_a_flat_landing_is_drawn_as_an_impact_on_the_floor(site):
