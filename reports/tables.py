@@ -432,19 +432,8 @@ def accuracy(run: results.Run) -> list[Block]:
     Nothing where neither is known.
     """
     # one that was falling at the end does not stand
-    pairs = across.pairs_of(
-        [
-            run.model_copy(
-                update={
-                    "cells": [
-                        cell
-                        for cell in run.cells
-                        if not outcome_of(run, cell).startswith("falling")
-                    ]
-                }
-            )
-        ]
-    )
+    stand = [cell for cell in run.cells if not outcome_of(run, cell).startswith("falling")]
+    pairs = across.pairs_of([run.model_copy(update={"cells": stand})])
     styles, settings = looks(run.models), {cell.model: cell.settings for cell in run.cells}
     trusts = {
         model: (

@@ -332,7 +332,7 @@ def test_of_a_run_that_is_not_converged_nothing_is_said_to_change_the_answer_mos
         ("brief.toml", 0),  # of one row
     ],
 )
-def test_a_model_that_does_not_know_the_floor_ends_with_3(assess, words, code):
+def test_it_ends_with_3_only_where_a_model_does_not_know_the_floor(assess, words, code):
     assess(words, code=code)
 
 
