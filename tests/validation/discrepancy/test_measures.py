@@ -95,6 +95,12 @@ WORKED_OUT = {
         {"theta": np.where(T < 5.0, 0.0, 1.0)},
         {"theta_hausdorff": pytest.approx(0.1 * 2.14, rel=0.02)},
     ),
+    # A spike is as far as it is high, but for a line from the start to the end of the jump.
+    "a spike before a jump": (
+        {"theta": 1.0 * (T >= 5.0)},
+        {"theta": (T >= 5.0) + (np.arange(len(T)) == 800)},
+        {"theta_hausdorff": pytest.approx(1.0)},
+    ),
 }
 
 
@@ -126,7 +132,10 @@ def test_the_window_is_the_common_time_and_holds_its_own_ends(made):
         np.linspace(0.0, 1.0, 11), t, events=[impact(4.0), impact(6.0), impact(6.0 + 5e-8)]
     )
     values = figures(struck, until=6.0)
-    assert (values["floor_impacts"], values["peak_rotation"]) == (2, pytest.approx(0.6))
+    assert [values[name] for name in ("floor_impacts", "peak_rotation", "last_rotation")] == [
+        2,
+        *[pytest.approx(0.6)] * 2,
+    ]
     found = Pair(struck, made(np.zeros(11), t, events=[impact(6.0)]), until=6.0).impacts
     assert times(found) == ([(6.0, 6.0)], [4.0], [])
 

@@ -180,7 +180,7 @@ def test_the_rule(measure, line, more, values):
             {0.625: 0.5, 0.375: 0.0, 0.5: 0.0},
         ),
         # Of an "at least" measure the share of the value that is needed.
-        ("events_agree_until", {"limit": 8.0}, {8.0: 1.0, 16.0: 0.5, 5.0: 1.6, 0.0: math.inf}),
+        ("events_agree_until", {"limit": 8.0}, {16.0: 0.5, 8.0: 1.0, 0.5: 16.0, 0.0: math.inf}),
         ("outcome_agrees", {"expected": 1.0, "limit": 0.0}, {1.0: 0.0, 0.0: math.inf}),
         ("theta_rms", None, {0.125: math.inf}),
         ("theta_rms", {"limit": 0.0}, {0.0: 0.0, 0.125: math.inf}),
