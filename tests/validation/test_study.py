@@ -210,4 +210,3 @@ def test_a_record_of_a_real_study_is_read_back_as_it_was(tmp_path):
     record, store = study.play(task), Store(tmp_path, study.kinds)
     study.keep(store, task, record)
     assert study.find(store, task) == record
-    assert study.gather({task: record}).as_dict()

@@ -30,6 +30,7 @@ from rockcheck.scenes import (
     Scene,
     errors,
     progress,
+    reading,
 )
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, gap_of
@@ -613,9 +614,15 @@ class SuiteStudy(Study):
                 float,
                 partial(predictability_horizon, planned.scene),
             )
-        against = [[name, one.key if one else "", windows] for name, one, windows in asked]
-        # with the code of this module and of `compare`
-        depends = [planned.key, against, sorted(ends.items()), provenance.code_digest(__name__)]
+        folder = self.store.folder / HISTORIES
+        depends = [
+            [  # seals of what was played, not keys: a user's own model need not play alike again
+                [name, one and reading.read_json(folder / f"{one.kept_as}.json")["sha256"], windows]
+                for name, one, windows in (("", planned, {}), *asked)
+            ],
+            sorted(ends.items()),
+            provenance.code_digest(__name__),  # with that of `compare`
+        ]
         name = name_of(planned.place, planned.variant.label, provenance.digest(json.dumps(depends)))
         compute = partial(self._figures, planned, asked, ends)
         return self.store.once(COMPARISONS, name, ComparisonRecord, compute)

@@ -12,7 +12,10 @@ from rockcheck.scenes import Event, Frozen, History, ModelFailure, Scene, observ
 
 
 class Still(Frozen):
-    """A block that stands; `offset` shifts its theta (rad), `files` are its notes."""
+    """A block that stands; `offset` shifts its theta (rad), `files` are its notes.
+
+    STANDS_AT in the environment shifts it, too, as what a model's own files say would.
+    """
 
     offset: float = 0.0
     files: tuple[Any, ...] = ()
@@ -20,7 +23,7 @@ class Still(Frozen):
     def simulate(self, scene: Scene) -> History:
         state = np.zeros((len(scene.output_times), 6))
         state[:, 1] = scene.block.half_height
-        state[:, 2] = self.offset
+        state[:, 2] = self.offset + float(os.environ.get("STANDS_AT", 0.0))
         return observation.observe(scene, "still", state, notes=self.files)
 
 

@@ -126,7 +126,7 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
     assert [int(suite.get(name)) for name in ("skipped", "failures")] == [1 - failed, failed]
 
 
-def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, written):
+def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, written, monkeypatch):
     path = write_suite(
         tmp_path,
         STILL | {"b": 'model = "faulty:Still"\noffset = 1e-12\nfiles = ["other"]'},
@@ -146,7 +146,11 @@ def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, writte
     ):
         file.write_text(file.read_text().replace(old, new))
         assert [cell.model for cell in run(path).cells if not cell.read_back] == played, new
-    assert run(path, force=True).up_to_date == 0
+    monkeypatch.setenv("STANDS_AT", "0.1")  # no key knows of it
+    again = run(path, force=True).cells
+    assert [(one.read_back, results.value_of(one.figures, "peak_rotation")) for one in again] == [
+        (False, pytest.approx(0.1 / math.atan(0.4 / 1.5)))
+    ] * 3
 
 
 def test_the_digest_of_our_code_is_kept_and_a_damaged_one_is_not_believed(tmp_path, monkeypatch):
@@ -237,8 +241,12 @@ def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(
 ):
     done = run(write_suite(tmp_path, models, tolerances))
     assert [check.reason for _, check in done.checks()] == reasons
-    found = (done.faults, done.without_tolerance, done.words, done.exit_code)
-    assert found == (faults, missing, words, 1)
+    assert (done.faults, done.without_tolerance, done.words, done.exit_code) == (
+        faults,
+        missing,
+        words,
+        1,
+    )
 
 
 def test_a_run_is_saved_whole_and_says_what_it_is(tmp_path, run):
