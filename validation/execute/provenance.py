@@ -17,7 +17,7 @@ from functools import cache
 from importlib import metadata, resources
 from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from importlib.util import find_spec
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,8 @@ OWN_PACKAGE = "rockcheck"
 CODE = "code"
 #: Names of the folders that installed packages lie in.
 INSTALLED = ("site-packages", "dist-packages")
+#: What is installed, by the names of the packages that it gives.
+_distributions = cache(metadata.packages_distributions)
 
 
 def cell_key(
@@ -42,12 +44,23 @@ def cell_key(
 
     That is scene, settings, the files of a measured history, the code that the model can reach, the
     versions of its libraries and of Python, and the machine type. `search_path` holds folders in
-    which a user-defined model may lie. Its source is read, not run.
+    which a user-defined model may lie. Its source is read, not run; its libraries are what that
+    code imports.
     """
     given = settings["files"].get(scene.name, []) if name == "measured" else []
-    tables = map(Path, [given] if isinstance(given, str) else given)
-    # of a measured history, and of its events
-    files = [file for table in tables for file in (table, events_path(table)) if file.is_file()]
+    code = reachable(models.home(name), search_path) if models.is_own(name) else {}
+    files = [  # of a measured history, and of its events
+        file
+        for table in map(Path, [given] if isinstance(given, str) else given)
+        for file in (table, events_path(table))
+        if file.is_file()
+    ]
+    imported = [
+        library
+        for module, path in code.items()
+        for one in _imports(path, module, lambda _: False, ())
+        for library in _distributions().get(one.split(".")[0], ())
+    ]
     return digest(
         json.dumps(
             {
@@ -58,7 +71,7 @@ def cell_key(
                 "code": code_digest(models.home(name), search_path),
                 "libraries": {
                     library: version_of(library)
-                    for library in (*models.NUMBERS, *models.family(name).libraries)
+                    for library in (*models.NUMBERS, *models.family(name).libraries, *imported)
                 },
                 "python": platform.python_version(),
                 "machine": platform.machine(),
@@ -98,8 +111,12 @@ def _code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 
 
 def _digest_of(module: str, search_path: tuple[str, ...]) -> str:
-    files = sorted(reachable(module, search_path).items())
-    return digest("".join(f"{name}\n{_source_of(path)[1]}\n" for name, path in files))
+    return digest(
+        "".join(
+            f"{name}\n{_source_of(path)[1]}\n"
+            for name, path in sorted(reachable(module, search_path).items())
+        )
+    )
 
 
 @cache
@@ -195,14 +212,17 @@ def _imports(
 def _source_of(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], str]:
     """What a source file imports, and its syntax tree without docstrings, as text.
 
-    Of a file that is no Python, such as a compiled module, a hash of its content.
+    A package that loads its parts as they are used imports what its stub says. Of a file that is no
+    Python, such as a compiled module, a hash of its content.
     """
-    content, imports = path.read_bytes(), list[ast.Import | ast.ImportFrom]()
+    imports = list[ast.Import | ast.ImportFrom]()
     try:
-        tree = ast.parse(content)
+        tree, *stub = (
+            ast.parse(one.read_bytes()) for one in (path, path.with_suffix(".pyi")) if one.is_file()
+        )
     except (SyntaxError, ValueError):
-        return imports, hashlib.sha256(content).hexdigest()
-    for node in ast.walk(tree):
+        return imports, hashlib.sha256(path.read_bytes()).hexdigest()
+    for node in chain.from_iterable(map(ast.walk, [tree, *stub])):
         if isinstance(node, ast.Import | ast.ImportFrom):
             imports.append(node)
         elif isinstance(
@@ -223,10 +243,9 @@ def version_of(library: str) -> str:
 
 def versions() -> dict[str, str]:
     """Versions of everything installed that a run's figures may depend on."""
-    libraries = {library for known in models.FAMILIES.values() for library in known.libraries}
     return {"rockcheck": version_of("rockcheck"), "python": platform.python_version()} | {
         name: version_of(name)
-        for name in sorted(libraries | {"pandas"})
+        for name in sorted({"pandas"}.union(*(one.libraries for one in models.FAMILIES.values())))
         if version_of(name) != "absent"
     }
 

@@ -212,18 +212,28 @@ def test_what_cannot_be_is_named(fault_of, call, fault):
 
 
 def test_other_events_beside_a_measured_history_and_other_libraries_make_another_cell(
-    tmp_path, monkeypatch
+    tmp_path, monkeypatch, faulty
 ):
     scene = load_scene("bookcase")
     EventBasedModel().simulate(scene).save(tmp_path / "table.csv")
     given = {"files": {scene.name: str(tmp_path / "table.csv")}}
     file = tmp_path / "table.events.csv"
     keys = [
-        (change(), provenance.cell_key(scene, "measured", given))[1]
-        for change in (
-            lambda: None,
-            lambda: file.write_text(file.read_text("utf-8").replace("floor", "wall"), "utf-8"),
-            lambda: monkeypatch.setattr(provenance, "version_of", str.upper),
+        (change(), provenance.cell_key(scene, name, given, (str(tmp_path),)))[1]
+        for name, change in (
+            ("measured", lambda: None),
+            (
+                "measured",
+                lambda: file.write_text(file.read_text("utf-8").replace("floor", "wall"), "utf-8"),
+            ),
+            ("measured", lambda: monkeypatch.setattr(provenance, "version_of", str.upper)),
+            ("faulty:Still", lambda: None),
+            (
+                "faulty:Still",
+                lambda: monkeypatch.setattr(
+                    provenance, "version_of", lambda one: one.upper() + "2" * (one == "rockcheck")
+                ),
+            ),
         )
     ]
     assert len({*keys}) == len(keys)

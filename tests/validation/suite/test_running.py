@@ -143,6 +143,8 @@ def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, writte
         (code, "import time", "import time, beside", ["still", "a", "b"]),
         (written("beside.py", "if 0:\n    import core\n"), "0", "0.0", ["still", "a", "b"]),
         (written(f"core{provenance.EXTENSION_SUFFIXES[0]}", "\0a"), "a", "b", ["still", "a", "b"]),
+        (written("beside.pyi", "import later\n"), "later", "later", []),  # what it loads lazily
+        (written("later.py", "number = 1\n"), "1", "2", ["still", "a", "b"]),
     ):
         file.write_text(file.read_text().replace(old, new))
         assert [cell.model for cell in run(path).cells if not cell.read_back] == played, new
