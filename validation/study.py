@@ -252,7 +252,8 @@ class _Run:
         self.done[task] = result
         if traceback := getattr(result, "traceback", ""):  # a result may have one, too
             writing.write_whole(
-                writing.made(self.folder, FAULTS) / f"{task.kept_as}.txt", traceback
+                writing.made(self.folder, FAULTS) / f"{task.kept_as}.txt",
+                traceback.encode(errors="backslashreplace"),
             )
         if not isinstance(result, pool.Failure):
             self.study.keep(self.store, task, result)

@@ -12,7 +12,7 @@ from rockcheck.validation.study import Study, Task
 
 FAULTS = {
     13.0: ModelFailure("no square of 13"),
-    14.0: ZeroDivisionError("a bug"),
+    14.0: ZeroDivisionError("a bug \udcff"),
     16.0: KeyboardInterrupt(),
 }
 
