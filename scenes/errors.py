@@ -99,7 +99,7 @@ def printable(value: object, limit: int = 80) -> str:
 
 
 #: What pydantic adds to the place of a fault where a value may be of several kinds.
-_KINDS = ("constrained-int", "constrained-str", "str", "tuple[str, ...]")
+_KINDS = ("int", "constrained-int", "constrained-str", "str", "tuple[str, ...]")
 
 
 def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:

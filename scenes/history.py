@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict
 
-from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
+from rockcheck.scenes.base import MOST, Finite, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.experience import Expected, expected, trust_of
@@ -307,7 +307,13 @@ class History(Shown):
                 ).itertuples(index=False)
             )
             np.asarray_chkfinite([(one.t, one.impulse) for one in event_list])
-            cost = Cost(**{k: v for k, v in about.cost.items() if k in Cost.__dataclass_fields__})
+            cost = Cost(
+                **{
+                    key: value
+                    for key, value in dict[str, Any](about.cost).items()
+                    if key in Cost.__dataclass_fields__
+                }
+            )
         except (AttributeError, TypeError, ValueError):
             raise InputError(
                 f"{printable(beside)}: not an events table written by rockcheck"
@@ -415,7 +421,7 @@ class _About(Frozen):
     settings: Mapping[str, Any] = {}
     notes: tuple[Any, ...] = ()
     uncertainty: Mapping[str, NonNegative] = {}
-    cost: Mapping[str, Any] = {}
+    cost: Mapping[str, int | Finite | Mapping[str, Any] | None] = {}
 
 
 def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:

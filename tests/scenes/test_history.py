@@ -189,6 +189,7 @@ HOSTILE = [
     (rows_about("[1, 2]"), "column 'rockcheck_history': not written by rockcheck"),
     (rows_about("[" * 100000), "column 'rockcheck_history': not written by rockcheck"),
     (rows_about('{"cost": 3}'), "column 'rockcheck_history': cost: 3 is not allowed"),
+    (rows_about('{"cost": {"steps": NaN}}'), "column 'rockcheck_history': cost.steps: nan is not"),
     (rows_about('{"settings": []}'), "column 'rockcheck_history': settings: "),
     (rows_about('{"notes": "x"}'), "column 'rockcheck_history': notes: x is not allowed"),
     (rows_about('{"half_width": -1}'), "half_width: -1 is not allowed"),
