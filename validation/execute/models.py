@@ -281,9 +281,9 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
             "outcome": history.outcome,
             "notes": list(history.notes),
             "settings": {  # as plain JSON values, sorted as the store returns them
-                str(key): value
-                if isinstance(value, str | int | float | bool | None)
-                else str(value)
+                errors.inert(str(key)): value
+                if isinstance(value, int | float | bool | None)
+                else errors.inert(str(value))
                 for key, value in sorted(history.settings.items(), key=lambda item: str(item[0]))
             },
             "uncertainty": dict(history.uncertainty),

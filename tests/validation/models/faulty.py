@@ -24,7 +24,7 @@ class Still(Frozen):
         state = np.zeros((len(scene.output_times), 6))
         state[:, 1] = scene.block.half_height
         state[:, 2] = self.offset + float(os.environ.get("STANDS_AT", 0.0))
-        return observation.observe(scene, "still", state, notes=self.files)
+        return observation.observe(scene, "still", state, notes=self.files, settings={"": "a\tb"})
 
 
 class NotFinite(Frozen):
