@@ -288,9 +288,6 @@ class History(Shown):
         # Any text is a kind or a mode, also "None" and "hit #2".
         words = {"dtype": dict.fromkeys(WORDS, str), "keep_default_na": False, "comment": None}
         events = read_table(beside, **words) if beside.exists() else pd.DataFrame()
-        # pandas would take the first column for names of rows.
-        if len(frame) and not isinstance(frame.index, pd.RangeIndex):
-            raise InputError(f"{shown}: rows have more values than the heading has columns")
         about, block = _about_of(frame, shown)
         channels, plain = _channels(frame, shown)
         try:

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import stat
+import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -147,13 +148,20 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
             stream = cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
             _check_lines(stream, shown)
             stream.seek(0)
-            return pd.read_csv(stream, **{"comment": "#", **options})
+            # It would take the first column for names of rows, or leave what is too much out.
+            with warnings.catch_warnings(action="error", category=pd.errors.ParserWarning):
+                return pd.read_csv(stream, **{"comment": "#", "index_col": False, **options})
         except (gzip.BadGzipFile, EOFError, zlib.error):
             raise InputError(f"{shown}: a compressed file that is damaged") from None
         except InputError:
             raise
-        except (ValueError, OverflowError, RecursionError) as error:  # of pandas' parser, too
-            raise InputError(f"{shown}: not a CSV table: {printable(error)}") from None
+        # of pandas' parser, too
+        except (ValueError, OverflowError, RecursionError, pd.errors.ParserWarning) as error:
+            raise InputError(
+                f"{shown}: rows have more values than the heading has columns"
+                if isinstance(error, Warning)
+                else f"{shown}: not a CSV table: {printable(error)}"
+            ) from None
 
 
 def _check_lines(stream: IO[bytes], shown: str) -> None:

@@ -220,6 +220,7 @@ HOSTILE = [
     ("t,theta" + ",x" * 1000 + "\n", "line 1: more than 1000 columns"),
     # Found by fuzzing: rows longer than the heading, and a column that is there twice.
     ("t,theta\n0.0,0.1,7\n0.5,0.2,7\n", "more values"),
+    ("t_ms,theta\n0,1,7\n1,2,7\n", "more values"),  # as if the times were numbers of rows
     ("t,theta, t\n0.0,0.1,nan\n0.5,0.2,nan\n", "gives t a second time"),
     ("t,theta,t\n0.0,0.1,nan\n0.5,0.2,nan\n", "gives t a second time"),
     # Found by fuzzing: control characters in a heading.
