@@ -160,21 +160,16 @@ def _shaken(
 ) -> files.UncertainScene:
     """A scene under one motion, horizontal and perhaps vertical.
 
-    Spreads of the excitation that it replaces are dropped.
+    Spreads of the excitation that it replaces are dropped; the others stay as they are correlated.
     """
-    scene = base.scene
-    if base.spreads and not base.independent:
-        raise errors.InputError(
-            "correlated numbers cannot be given together with [[records]]", "correlation"
-        )
-    spreads = {
-        place: spread
-        for place, spread in base.spreads.items()
-        if place.partition(".")[0] not in change
-    }
-    name = f"{scene.name[: _LONGEST - len(label) - 2]}, {label}"
+    scene, name = base.scene, f"{base.scene.name[: _LONGEST - len(label) - 2]}, {label}"
+    kept = [k for k, place in enumerate(base.names) if place.partition(".")[0] not in change]
     duration = max(scene.duration, change["excitation"].quiet_after)
-    return files.uncertain_scene(scene.replace(name=name, duration=duration, **change), spreads, {})
+    return files.UncertainScene(
+        scene.replace(name=name, duration=duration, **change),
+        {base.names[k]: base.spreads[base.names[k]] for k in kept},
+        base.correlation[np.ix_(kept, kept)],
+    )
 
 
 #: Time step of the generated records, s.

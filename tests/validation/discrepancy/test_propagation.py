@@ -6,6 +6,7 @@ import pytest
 
 from rockcheck import Block, EventBasedModel, Floor, Scene
 from rockcheck.scenes import files
+from rockcheck.validation.suite import motions
 from rockcheck.validation.uncertainty import population
 
 BLOCK = Block(half_width=0.3, half_height=1.0)
@@ -112,10 +113,10 @@ def test_where_the_scenes_own_block_falls_nothing_is_said_of_a_slip(tilt, all_fa
 
 def test_what_the_peak_does_not_depend_on_has_no_index():
     found = population.propagate(tilted(0.5), samples=64)
-    assert found.note == ""
-    assert {one.name: (one.first, one.total) for one in found.sensitivities} == {
+    assert {one.name: (one.first, one.total) for one in found.sensitivities} | {"": found.note} == {
         "initial_rotation": pytest.approx((1.0, 1.0), abs=0.05),
         "floor.friction": pytest.approx((0.0, 0.0), abs=0.02),
+        "": "",
     }
     assert (
         population.sensitivities(tilted(0.5, given=FRICTION), EventBasedModel(), samples=16) == ()
@@ -128,6 +129,20 @@ def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
     )
 
 
-def test_correlated_inputs_have_no_indices_and_a_note_says_so():
-    found = population.propagate(tilted(0.5, {"initial_rotation, floor.friction": 0.5}), samples=64)
+@pytest.mark.parametrize(
+    "moved",
+    [
+        lambda given: given,
+        lambda given: motions.under_records(
+            {"tilted": given},
+            [motions.RecordSet(files=["elcentro_1940_ns.csv"])],
+            files.DATA,
+        )[0].popitem()[1],
+    ],
+    ids=["by itself", "under a record"],
+)
+def test_correlated_inputs_have_no_indices_and_a_note_says_so(moved):
+    found = population.propagate(
+        moved(tilted(0.5, {"initial_rotation, floor.friction": 0.5})), samples=64
+    )
     assert (found.sensitivities, "correlated" in found.note) == ((), True)
