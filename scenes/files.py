@@ -35,7 +35,7 @@ from rockcheck.scenes.scene import Scene
 
 Place = tuple[str | int, ...]
 #: Keys that mark a table of a scene file as an uncertain number.
-_KEYS = {"sd", "low", "high"}
+_KEYS = {"value", "sd", "low", "high"}
 CORRELATION = "correlation"
 
 

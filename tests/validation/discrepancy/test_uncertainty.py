@@ -93,6 +93,7 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
             "valu = 0.5, sd",
             "floor.friction.valu: unknown key; did you mean 'value'?",
         ),
+        ("sd = 0.05", "std = 0.05", "floor.friction.std: unknown key; did you mean 'sd'?"),
         ("value = 0.5, sd", "sd", "floor.friction.value: is missing beside sd"),
         (
             "low = 0.05, high",
