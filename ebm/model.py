@@ -160,8 +160,9 @@ class EventBasedModel(Frozen):
             },
         )
         seen = natural.to_si(scene, out[:rows])
-        # what slides without friction, or rocks, as slowly as in any history at rest (`outcome_of`)
-        slow = np.abs(seen[-1, [2, 3, 5]]) < history.STILL
+        # at the end of the run (the last row may come before): what slides without friction, or
+        # rocks, as slowly as in any history at rest (`outcome_of`)
+        slow = np.abs(natural.to_si(scene, np.array([motion]))[0, 2:]) < history.STILL
         outcome = "at rest" if at_rest or slow.all() else "moving"
         if ending == names.Ending.OVERTURNED:
             outcome = "overturned left" if motion[2] > 0 else "overturned right"

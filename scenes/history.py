@@ -381,12 +381,12 @@ def _mat(
 def outcome_of(channels: Mapping[str, NDArray[Any]]) -> str:
     """The outcome at the end of a table of motion.
 
-    "at rest" means |theta|, |theta_dot| and |x_dot| below `STILL` (rad, rad/s, m/s).
+    "at rest" means |theta| and all velocities that are told below `STILL` (rad, rad/s, m/s).
     """
     theta = channels["theta"][-1]
     if abs(theta) >= LYING:
         return "overturned left" if theta > 0 else "overturned right"
-    told = [channels[c][-1] for c in ("theta", "theta_dot", "x_dot") if c in channels]
+    told = [channels[c][-1] for c in ("theta", "theta_dot", "x_dot", "y_dot") if c in channels]
     return "at rest" if all(abs(value) < STILL for value in told) else "moving"
 
 

@@ -162,6 +162,7 @@ def test_a_plain_table_is_a_measured_history(written):
     for rows, outcome in (
         (text, "at rest"),
         ("t,theta\n0,0\n1,-1.57\n", "overturned right"),
+        ("t,theta,y_dot\n0,0,0\n1,0,-2\n", "moving"),  # it falls
         (rows_about('{"outcome": "<script>"}'), "moving"),  # an unknown one is not believed
     ):
         assert History.load(written("table.csv", rows)).outcome == outcome
