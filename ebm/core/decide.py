@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Shape
@@ -135,11 +133,11 @@ def _falls(block, base, state):
 
     Turning outward, beyond tan(phi - alpha) > mu and > |u| for all time to come, it is accelerated
     outward in every mode: sticking by (3), slipping by (7), by an impulse of the floor, or not at
-    all in flight. Walls it could meet are left out.
+    all in flight. Beside walls nothing is said: that behind it may turn a block back that slips.
     """
     mode, motion, t = state.mode, state.motion, state.t
     side = side_of(block, mode.sense)
-    if mode.family == Family.FLAT or mode.sense * motion.w < 0.0 or side.gap < np.inf:
+    if mode.family == Family.FLAT or mode.sense * motion.w < 0.0 or block.walls:
         return -1.0
     steepness = math.tan(abs(motion.theta) - side.alpha)
     strongest = max(abs(acceleration(base.horizontal, t)), largest_ahead(base.horizontal, t))

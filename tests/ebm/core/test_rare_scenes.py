@@ -298,7 +298,7 @@ def test_inner_kernels_return_no_arrays(monkeypatch):
 @pytest.mark.parametrize(
     "settings", [{}, {"pivot": "unilateral"}, {"friction": "no-slip"}], ids=str
 )
-def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
+def test_a_block_that_falls_is_decided_on_the_way(settings):
     """On a base at rest, as soon as it is steeper than friction: whatever it does then turns it
     farther."""
     model = EventBasedModel(**settings)
@@ -306,7 +306,6 @@ def test_a_block_that_falls_away_from_its_wall_is_decided_on_the_way(settings):
         PAPER_BLOCK,
         0.3,
         10.0,
-        walls=[Wall(side="left", gap=0.003)],
         initial_rotation=-1.05 * PAPER_BLOCK.alpha,
     )
     whole, decided = model.simulate(scene), run_batch(pack([scene], model), model)
