@@ -2,7 +2,7 @@
 
 import math
 
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
 from rockcheck.ebm.core.names import Family, Kind, Pivot, Shape
 from rockcheck.ebm.core.series import NOISE
@@ -37,8 +37,9 @@ def decided(block, base, state):
     ahead = 0.0
     if t < quiet:
         ahead = impulse_ahead(base.horizontal, t) if still else math.inf
-    # At its peak nothing is certain, however little is to come.
-    uncertain = ahead == math.inf or (ahead > 0.0 and abs(theta) >= peak)
+    # At its peak nothing is certain, however little is to come. A floor that bounces adds energy.
+    gains = block.e_floor > 0.0 and block.mu_s > LEAST_FRICTION and not block.energy_cap
+    uncertain = gains or ahead == math.inf or (ahead > 0.0 and abs(theta) >= peak)
     verdict = -1.0 if uncertain else _by_energy(block, state, ahead)
     if verdict <= 0.0 and still and abs(theta) > side_of(block, theta).alpha:
         verdict = _falls(block, base, state)
