@@ -126,9 +126,14 @@ def run(
     outputs = output or [Path(f"{store.name_of(what.name, model)}.csv")]
     figures = [path for path in outputs if path.suffix.lower()[1:] in FORMATS]
     histories = [path for path in outputs if path not in figures]
-    checks = dict.fromkeys(histories, partial(check_format, more=f"; its figure as {ENDINGS}"))
     for path in outputs:
-        check_file(path, "--output", checks.get(path, kind_of))
+        check_file(
+            path,
+            "--output",
+            kind_of
+            if path in figures
+            else partial(check_format, more=f"; its figure as {ENDINGS}"),
+        )
     title = f"{what.name}, {model}"
     with (
         progress(title, [(model, given)]) as on_progress,

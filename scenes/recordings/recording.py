@@ -27,7 +27,7 @@ UNITS: dict[str, float] = {
 
 # All repetitions are possessive: a failed match takes one pass, however long the line.
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
-_NUMBER = re.compile(NUMBER)
+_NUMBER = re.compile(rf"{NUMBER}|[-+]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 _EXPONENT = str.maketrans("dD", "ee")
 _PER_SECOND_SQUARED = r"/s(?:ec)?(?:/s(?:ec)?|(?:\^|\*\*)?2)"
 _SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} | {
@@ -121,7 +121,7 @@ def place_of(kind: str, asked: int | str, names: Sequence[str], listed: str) -> 
 
 
 def is_number(word: str) -> bool:
-    """Whether `word` has the form of a number; its size is not checked."""
+    """Whether `word` has the form of a number, also of one that is not finite."""
     return _NUMBER.fullmatch(word) is not None
 
 

@@ -192,9 +192,11 @@ def _names_of(
         if all(map(is_number, words)):
             names = layout.words(n, above.replace(" [", "[").replace(" (", "("))
             return names if len(names) == len(words) else [], rows[index:]
-    if len(first) > 1 and len(rows) > 1 and len(layout.words(*rows[1])) == len(first):
-        # a column of words beside those of numbers, or a first line of data that is wrong
-        return first, rows[1:]
+    # A column of words, or an empty one, beside those of numbers: names have numbers below them.
+    numeric = [[*map(is_number, layout.words(*row))] for row in rows[:2]]
+    names = first if numeric[0] != numeric[-1] else []
+    if len(first) > 1 and len(rows) > 1 and len(numeric[1]) == len(first):
+        return names, rows[bool(names) :]
     raise fault(
         f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"
         f" {option('header_lines', 3)}",

@@ -192,6 +192,7 @@ G = 9.80665
             1.0,
         ),
         ("time (s);acc [cm/s^2]\n0;1\n1;2\n", {}, [0.01, 0.02], 1.0),
+        ("A;1;\nA;2;\n", {"unit": "m/s2", "column": 2, "time_step": 0.5}, [1.0, 2.0], 0.5),
         *(
             (
                 f"# a remark\nstation,time_s , {column}\n"

@@ -180,6 +180,7 @@ UNKNOWN = [
         {"unit": "gal"},
         "the file states the unit g, not gal",
     ),
+    ("0 NaN\n1 2\n", {"column": 2, "unit": "g", "time_step": 1.0}, "line 1: 'NaN' is not a finite"),
     ("0 1\n0.5\n", {"unit": "g"}, "line 2: 1 fields where the first line has 2"),
     ("0 1\n1 2\n", {"component": 1}, "a table has columns; give the option column"),
 ]

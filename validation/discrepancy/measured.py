@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 import scipy  # it loads its parts as they are used
 
-from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, printable
+from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, errors, printable
 from rockcheck.scenes.history import outcome_of
 from rockcheck.validation.discrepancy.figures import TURNS
 
@@ -91,9 +91,16 @@ def time_shift(reference: History, candidate: History) -> float:
     `InputError` where one does not rotate, so that nothing can be aligned.
     """
     both = [history.channels for history in (reference, candidate)]
-    for history in (reference, candidate):
-        if len(history.channels["t"]) < 3 or not np.any(history.channels["theta"]):
-            raise InputError(f"{history.name}: no rotation by which it could be aligned", "align")
+    errors.refuse(
+        *(
+            (
+                len(one["t"]) < 3 or not np.any(one["theta"]),
+                f"{history.name}: no rotation by which it could be aligned",
+                "align",
+            )
+            for history, one in zip((reference, candidate), both, strict=True)
+        )
+    )
     step = min(float(one["t"][-1] - one["t"][0]) / (len(one["t"]) - 1) for one in both)
     grids = [np.arange(one["t"][0], one["t"][-1] + 0.5 * step, step) for one in both]
     first, second = (
