@@ -181,8 +181,9 @@ class Record(Motion):
                 ),
                 (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
             )
-            scale = pga * GRAVITY_OF_RECORDS / largest
-            data = {name: data[name] for name in data if name != "pga"} | {"scale": scale}
+            data = {name: data[name] for name in data if name != "pga"} | {
+                "scale": pga * GRAVITY_OF_RECORDS / largest
+            }
         return data
 
     @classmethod

@@ -80,8 +80,9 @@ def trust_of(model: str, settings: Mapping[str, Any]) -> Mapping[str, Trust]:
 
 def _within(own: object, value: object) -> bool:
     """Whether a setting is this value, or a number below it."""
-    numbers = isinstance(own, float) and isinstance(value, float)
-    return own <= value * (1.0 + 1e-9) if numbers else own == value  # type: ignore[operator]
+    return own == value or (
+        isinstance(own, float) and isinstance(value, float) and own <= value * (1.0 + 1e-9)
+    )
 
 
 def expected(trust: Trust, value: float) -> Expected:
@@ -96,8 +97,11 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
     alpha (rad), R (m), mu, and for each wall e and gap/R; and the intensity, peak base acceleration
     over g tan alpha. An axis without a value is left out.
     """
-    block = scene.block
-    peak = float(np.max(np.abs(scene.excitation.acceleration(scene.output_times))))
+    block, base = scene.block, scene.excitation
+    # no peak lies between the samples of a record, or 1000 times in a pulse's period
+    step = getattr(base, "time_step", getattr(base, "period", 1.0) / 1000.0)
+    times = np.arange(0.0, min(scene.duration, base.quiet_after) + step, step)
+    peak = np.max(np.abs(base.acceleration(np.minimum(times, scene.duration))))
     found = {
         "alpha": [block.alpha],
         "R": [block.radius],
@@ -105,9 +109,7 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
         "wall restitution": [wall.restitution for wall in scene.walls],
         "gap / R": [wall.gap / block.radius for wall in scene.walls],
         "peak acceleration / (g tan alpha)": (
-            [peak / (scene.gravity * math.tan(block.alpha))]
-            if scene.excitation.kind != "rest"
-            else []
+            [float(peak) / (scene.gravity * math.tan(block.alpha))] if base.kind != "rest" else []
         ),
     }
     return {axis: values for axis, values in found.items() if values}
