@@ -14,6 +14,7 @@ in proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, 
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 from rockcheck.scenes.errors import InputError, printable, refuse
@@ -59,7 +60,7 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     Raises `InputError`, naming the file and the line, where the file is missing, is in no known
     format, has another count than it states, a time step that is not positive or not uniform, or a
     value that is not finite. Where something is not known, the message shows the option that
-    supplies it.
+    supplies it. A component that its file calls "down" is turned: up is positive.
     """
     asked, lines = reading or Reading(), read_text(path, latin=True).split("\n")
     try:
@@ -86,7 +87,12 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
                 if read in _WITH_HEADER
             )
         )
-        found = read(lines, asked)
+        found = [
+            replace(one, samples=0.0 - one.samples, notes=(*one.notes, "turned, up is positive"))
+            if one.component.lower() in ("down", "dwn", "dn")  # what is positive in the file
+            else one
+            for one in read(lines, asked)
+        ]
         if asked.component is None:
             return found
         names = [one.component for one in found]

@@ -62,7 +62,7 @@ _CSMIP_FORMAT = re.compile(_FORMAT.replace(r"\(?", r"\("), re.IGNORECASE)
 _CSMIP_UNIT = re.compile(r"\b(?:in\s++|units\s*+:\s*+)([a-z/0-9^]++)", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGNORECASE)
 _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
-_DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down"}
+_DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down", 402: "vertical"}
 NO_FIELDS = "a format without fields"
 
 

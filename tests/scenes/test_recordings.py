@@ -42,10 +42,10 @@ def at2(component: str, header: str = "NPTS=  {n}, DT= {dt:.4f} SEC,") -> bytes:
     ).encode("latin-1")
 
 
-def _cosmos_channel(component: str) -> str:
-    values = motion(component) * 100
+def _cosmos_channel(component: str, vertical: int) -> str:
+    values = motion(component) * (-100 if (component, vertical) == ("U-D", 401) else 100)
     integers, reals = np.full(100, -999), np.full(100, -999.0)
-    integers[53] = {"N-S": 360, "E-W": 90, "U-D": 400}[component]
+    integers[53] = {"N-S": 360, "E-W": 90, "U-D": vertical}[component]
     # The raw record's step in s, a number that touches its neighbour, these samples' step in ms.
     reals[[33, 41, 61]] = 2 * STEP, 426212.0, 1000 * STEP
     return (
@@ -65,8 +65,8 @@ def _cosmos_channel(component: str) -> str:
     )
 
 
-def cosmos(*components: str) -> bytes:
-    return "".join(map(_cosmos_channel, components)).encode()
+def cosmos(*components: str, vertical: int = 400) -> bytes:
+    return "".join(_cosmos_channel(one, vertical) for one in components).encode()
 
 
 def _csmip_channel(component: str) -> str:
@@ -182,7 +182,12 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path, written, 
 
 @pytest.mark.parametrize(
     ("write", "names"),
-    [(cosmos, ["360 deg", "90 deg", "up"]), (csmip, ["360 Deg", "90 Deg", "Up"])],
+    [
+        (cosmos, ["360 deg", "90 deg", "up"]),
+        (lambda *channels: cosmos(*channels, vertical=401), ["360 deg", "90 deg", "down"]),
+        (lambda *channels: cosmos(*channels, vertical=402), ["360 deg", "90 deg", "vertical"]),
+        (csmip, ["360 Deg", "90 Deg", "Up"]),
+    ],
 )
 def test_several_components_in_one_file(write, names, written, told, fault_of):
     path = written("three.V2", write(*PEAKS))
