@@ -56,7 +56,9 @@ def spectral_acceleration(record: Recording, period: float, damping: float = 0.0
     count = len(record.samples)
     parts = max(min(math.ceil(_STEPS * record.time_step / period), _MOST_STEPS // count), 1)
     step, rate = record.time_step / parts, 2.0 * math.pi / period
-    tail = step * np.arange(1, min(math.ceil(period / step), _MOST_STEPS) + 1)
+    tail = max(step, period / _MOST_STEPS) * np.arange(
+        1, min(math.ceil(period / step), _MOST_STEPS) + 1
+    )
     lines = np.interp(np.arange((count - 1) * parts + 1) / parts, np.arange(count), record.samples)
     # y'' + 2 D w y' + w^2 y = w^2 a, from rest, is w^2/w_D times the imaginary part of z' = pole z
     # + a. A straight line of a adds to z, in a step, so much for its value before and after it.

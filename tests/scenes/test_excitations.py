@@ -108,9 +108,9 @@ def test_intensities_are_those_of_the_straight_lines_between_samples():
     assert coarse == pytest.approx(dense, rel=2e-3)
     # A push of a step's length is, to an oscillator of a far longer period, an impulse; the peak
     # comes a quarter of a period later.
-    last = Recording(samples=np.ones(2), time_step=1e-2, unit="m/s2", form="CSV")
+    last = Recording(samples=np.ones(2), time_step=1e-8, unit="m/s2", form="CSV")
     rate, damping = 2 * math.pi / 1.0, 0.05
-    peak = rate * 1e-2 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
+    peak = rate * 1e-8 * math.exp(-damping / math.sqrt(1 - damping**2) * math.acos(damping))
     assert intensity.spectral_acceleration(last, 1.0) == pytest.approx(peak / G, rel=2e-3)
 
 
