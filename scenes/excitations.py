@@ -171,19 +171,19 @@ class Record(Motion):
                 "notes": found.notes,
             }
         if isinstance(data, dict) and "pga" in data:
-            pga, largest = data["pga"], max(map(abs, data.get("unscaled", ())), default=0.0)
-            number = isinstance(pga, int | float) and not isinstance(pga, bool)
+            pga, rest = data["pga"], {name: data[name] for name in data if name != "pga"}
+            largest = max(map(abs, cls(**rest).unscaled))
             refuse(
                 (
-                    not number or not 0.0 < pga <= MOST_PGA,
+                    not isinstance(pga, int | float)
+                    or isinstance(pga, bool)
+                    or not 0.0 < pga <= MOST_PGA,
                     f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}",
                     "pga",
                 ),
                 (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
             )
-            data = {name: data[name] for name in data if name != "pga"} | {
-                "scale": pga * GRAVITY_OF_RECORDS / largest
-            }
+            data = rest | {"scale": pga * GRAVITY_OF_RECORDS / largest}
         return data
 
     @classmethod

@@ -34,6 +34,8 @@ FILES = {
         f"pga-{n}.toml": SCENE + f'[excitation]\nkind = "record"\nfile = "one.AT2"\npga = {pga}\n'
         for n, pga in enumerate(("0.5\nscale = 2.0", "-1.0", "1e9", '"0.5 g"'))
     },
+    "words.toml": SCENE
+    + '[excitation]\nkind = "record"\nunscaled = ["1"]\ntime_step = 0.1\npga = 0.5\n',
     "engine.toml": 'engine = "mine"\ncolour = "red"\n',
     "run.json": '{"format": 99}',
     "short.AT2": AT2.format(3),
@@ -146,6 +148,7 @@ FILES = {
         (["new", "Möbel.toml"], "name: Möbel is not allowed"),
         (["new", "no/such/mine.toml"], "no/such"),
         *((["simulate", f"pga-{n}.toml"], "excitation.pga") for n in range(4)),
+        (["simulate", "words.toml"], "excitation.unscaled.0"),
         *(
             ([*command.split(), "--scheduler", address], f"rockcheck: --scheduler: {address!r}")
             for command, address in (
