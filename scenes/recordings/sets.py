@@ -9,19 +9,20 @@ from rockcheck.scenes.base import DATA
 from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.recordings import Reading, Recording, read_components
 
-#: How files and networks name the vertical component; K-NET's third and sixth channels (KiK-net)
-#: are vertical, too. No network calls a horizontal component V or Z.
+#: How files and networks name the vertical component. No network calls a horizontal one V or Z.
 _VERTICAL = re.compile(
     r"(?:.*[-_. ])?(?:up|dn|dwn|down|u-?d|ver|vrt|vert|vertical|[HBES][NLGH]Z|[VZ])",
     re.IGNORECASE,
 )
-_KIKNET = ("3", "6")
 #: The part of a file's name that marks a vertical component, with the separator before it.
 _UPWARD = re.compile(
     r"(?:^|[-_. ])(?:up|dn|dwn|down|u-?d|vertical|vert|vrt|ver|[HBES][NLGH]Z|[VZ])"
     r"(?=\d?(?:[-_. ]|$))",
     re.IGNORECASE,
 )
+#: What may stand there in the name of a horizontal one, and is not more of a station's name, as the
+#: 0-NS of S10-NS would be after S1: a number goes on as an azimuth only.
+_ACROSS = re.compile(r"(?:^|[-_. ]).*|(?:(?<!\d)|(?!\d)|(?=\d{3}(?!\d)))[^-_. ]*")
 
 
 #: Components of files, by their names.
@@ -190,7 +191,9 @@ def _agreement(name: str, other: str) -> int:
         (
             len(other) - len(said[0])
             for said in _UPWARD.finditer(other)
-            if name.startswith(other[: said.start()]) and name.endswith(other[said.end() :])
+            if name.startswith(other[: said.start()])
+            and name.endswith(other[said.end() :])
+            and _ACROSS.fullmatch(name, said.start(), len(name) - len(other) + said.end())
         ),
         default=-1,
     )
@@ -198,7 +201,7 @@ def _agreement(name: str, other: str) -> int:
 
 def is_vertical(path: Path, recording: Recording) -> bool:
     """Whether the component is vertical, by its name; of a table, by the file's name."""
-    if recording.form.startswith("K-NET") and recording.component in _KIKNET:
+    if recording.form.startswith("K-NET") and recording.component in ("3", "6"):  # of KiK-net
         return True
     channel = "" if recording.form in ("CSV", "table") else recording.component
     return bool(_VERTICAL.fullmatch(channel or path.stem))

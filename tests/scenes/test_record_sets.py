@@ -159,6 +159,10 @@ def test_which_component_is_vertical(name, form, component, vertical):
         ("ns.csv", ("up.csv",), 0),
         ("ns.csv", ("up.csv", "down.csv"), None),
         ("ns.csv", ("elsewhere/up.csv",), None),
+        ("S1.csv", ("S1-V.csv",), 0),
+        ("S1 NS.csv", ("S1-V.csv", "S10-V.csv"), 0),
+        ("G01000.AT2", ("G01-UP.AT2",), 0),
+        *((f"{name}.csv", ("S1_V.csv",), None) for name in ("S10-NS", "S10", "S1B_EW")),
     ],
 )
 def test_which_file_has_the_vertical_component(name, others, vertical):
