@@ -162,8 +162,8 @@ def _layout_of(rows: NumberedLines, reading: Reading) -> _Layout:
             "." not in with_digits
             and len(words) == 1
             and reading.decimal is None
-            # no line names columns, and every one is two runs of digits with a comma between
-            and all(_DECIMAL_COMMA.fullmatch(line.strip()[:60]) for line in head)
+            # no line names two columns: each with a comma is two runs of digits
+            and all("," not in line or _DECIMAL_COMMA.fullmatch(line.strip()[:60]) for line in head)
         ):
             raise fault(
                 f"a comma between columns or before the decimals? {option('decimal', ',')}, or"

@@ -170,10 +170,13 @@ UNKNOWN = [
         {"unit": "g"},
         "no line of numbers within the first 200; give the lines to leave out: --read header_lines",
     ),
-    (
-        "0,5\n1,5\n",
-        {"unit": "g"},
-        "a comma between columns or before the decimals? --read decimal=,",
+    *(
+        (
+            f"{title}0,5\n1,5\n",
+            {"unit": "g", "column": 1, "time_step": 0.1},
+            "a comma between columns or before the decimals? --read decimal=,",
+        )
+        for title in ("", "the accelerations\n")
     ),
     (
         "time_s,acceleration_g\n0,1\n1,1\n",
