@@ -56,16 +56,25 @@ def judged(model, scene=BOOKCASE):
 
 @pytest.mark.parametrize("order", [0.52, 0.6, 1.0, 2.0, 2.5])
 @pytest.mark.parametrize(
-    ("name", "error"), [("peak_rotation", 0.005), ("theta_rms", 0.005 / math.sqrt(2.0))]
+    ("name", "error", "value"),
+    [
+        ("peak_rotation", 0.005, lambda order: 0.505),
+        (
+            "theta_rms",
+            0.005 / math.sqrt(2.0),
+            lambda order: 0.005 / math.sqrt(2.0) * (2.0**order - 1.0),
+        ),
+    ],
 )
 def test_the_largest_change_bounds_the_error_where_it_falls_like_a_power_of_the_step(
-    order, name, error
+    order, name, error, value
 ):
     found = judged(Made(lambda h: 1.0 + 0.01 * (h / 1e-3) ** order))[name]
-    assert (found.verdict, found.order, found.u_num) == (
+    assert (found.verdict, found.order, found.u_num, found.value) == (
         "converged",
         pytest.approx(order, abs=1e-6),
         pytest.approx(1.25 * error * (4.0**order - 1.0), rel=0.05),
+        pytest.approx(value(order), rel=0.05),
     )
     assert found.u_num > error
 

@@ -112,6 +112,11 @@ def test_a_scene_file_says_what_is_not_known(uncertain):
             'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = 1.5',
             "give a number between -1 and 1",
         ),
+        (
+            "period = 1.0",
+            'period = 1.0\n[correlation]\n"floor.friction, walls.left.gap" = "strong"',
+            "'strong' is not allowed: give a number",
+        ),
     ],
 )
 def test_faults_of_the_file_are_one_line(written, fault_of, old, new, said):
@@ -179,6 +184,7 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
         (0.02, 0.02, (0.0, 0.0), numerical.NUMERICAL),  # at the limit it is within it
         (0.04, 0.0, (0.04, 0.0), numerical.INPUTS),
         (0.03, 0.02, (0.03, 0.03), numerical.INPUTS),
+        (0.10, 0.0, (0.04, 0.0), "not explained: model form or set-up, at least 0.06 alpha"),
     ],
 )
 def test_what_a_difference_says(error, u_num, known, said):
