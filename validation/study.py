@@ -174,6 +174,7 @@ def run(
             if isinstance(one, pool.Failure)
         }
         | {**found.failures},
+        verdict=found.verdict if complete or found.verdict != "pass" else "incomplete",
         exit_code=found.exit_code or ended,
         complete=complete and found.complete,
         made=Made(

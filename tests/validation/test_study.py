@@ -120,7 +120,7 @@ def test_a_script_that_changed_plays_again(tmp_path, written):
 
 def test_an_interrupted_run_gathers_what_there_is_and_goes_on(tmp_path, log):
     late = run(Squares([2.0], log), tmp_path, jobs=0, minutes=1e-9)
-    assert (late.complete, late.exit_code, played(log)) == (False, 0, []), "there was no time"
+    assert (late.verdict, late.exit_code, played(log)) == ("incomplete", 0, []), "there was no time"
     found = run(Squares([2.0, 16.0, 3.0], log), tmp_path, jobs=0)
     assert (found.complete, found.exit_code, found.data) == (False, 130, {"count": 1})
     assert run(Squares([2.0, 3.0], log), tmp_path, jobs=0).data == {"count": 2}

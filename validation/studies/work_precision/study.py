@@ -215,7 +215,7 @@ def _answer(tables: Mapping[str, list[dict[str, Any]]]) -> str:
             f"Beside a wall, median errors against {runs.REFERENCES[0]} at the finest setting,"
             f" alpha: {errors}."
         )
-    return " ".join(said) or "Nothing was measured."
+    return " ".join(said) or "Nothing was measured." * (not tables)
 
 
 def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
