@@ -17,7 +17,6 @@ from rockcheck.scenes import (
     Block,
     Floats,
     History,
-    InputError,
     Scene,
     Shown,
     Side,
@@ -94,21 +93,27 @@ def compare(
     `on_request`. The candidate is interpolated linearly onto the reference's times. Both are
     measured with `scene`, which also gives the gravity (9.81 m/s^2 otherwise). A measure that
     cannot be computed is NaN, and its note says why. Raises `InputError` if a measure is unknown,
-    the histories have no time in common, or, without a `scene`, two different blocks.
+    the histories have no time in common, two different blocks without a `scene`, or others than it.
     """
     for key, history in (("reference", reference), ("candidate", candidate)):
         errors.check_kind(history, History, "simulate or History.load", key)
     blocks = [one.block for one in (reference, candidate) if one.block is not None]
-    if scene is None and len(blocks) == 2 and not _same(*blocks):
-        said = (
-            ", ".join(
-                f"{key} = {value}" for key, value in one.model_dump(exclude_none=True).items()
-            )
-            for one in blocks
-        )
-        raise InputError(
-            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
-        )
+    said = (
+        ", ".join(f"{key} = {value}" for key, value in one.model_dump(exclude_none=True).items())
+        for one in blocks
+    )
+    errors.refuse(
+        (
+            scene is None and len(blocks) == 2 and not _same(*blocks),
+            f"is needed: the histories are of two blocks, {' and '.join(said)}",
+            "scene",
+        ),
+        (
+            scene is not None and blocks and not any(_same(scene.block, one) for one in blocks),
+            "its block is none of the histories'",
+            "scene",
+        ),
+    )
     end = math.inf if until is None else until
     errors.refuse((not end > 0.0, f"{end:g} is not allowed: give a positive time in s", "until"))
     pair = Pair(reference, candidate, scene, end)
@@ -272,7 +277,7 @@ def motion_of(history: History, scene: Scene | None = None) -> dict[str, float |
     """How far a block moves: the four figures of a history, by their names.
 
     None where unknown and, except `wall_speed`, for a fallen block; `wall_speed` is None where the
-    block struck no wall. `scene` gives the walls, and the block where the file has none.
+    block struck no wall. `scene` gives the block and the walls.
     """
     block, channels = scene.block if scene else history.block, history.channels
     stands = not history.outcome.startswith("overturned")

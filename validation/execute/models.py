@@ -343,4 +343,4 @@ def _simulate(work: Work, scene: Scene) -> History:
             raise ModelFailure(f"{name} is {column[row]} at t = {returned.channels['t'][row]:g} s")
     if not len(returned.channels["t"]):
         raise ModelFailure("the history is empty")
-    return replace(returned, model=work.label)
+    return replace(returned, model=work.label, block=scene.block.per_unit_mass)
