@@ -187,15 +187,15 @@ class Record(Motion):
         return data
 
     @classmethod
-    def from_file(cls, path: str | Path, scale: float = 1.0, **reading: Any) -> Self:
+    def from_file(cls, path: str | Path, scale: float | None = None, **reading: Any) -> Self:
         """The record in a file of one of the formats of `rockcheck.scenes.recordings`.
 
-        `reading` supplies what the file does not state, or selects a part of it: the options of
-        `recordings.Reading`, such as `unit="cm/s2"`, `time_step=0.005`, `column=2` or
-        `component="360 Deg"`. Raises `InputError`, naming file and line, where the file is
-        malformed, or something is not known.
+        It is as recorded, unless `scale` or `pga` (g) is given. `reading` supplies what the file
+        does not state, or selects a part of it: the options of `recordings.Reading`, such as
+        `unit="cm/s2"`, `time_step=0.005`, `column=2` or `component="360 Deg"`. Raises `InputError`,
+        naming file and line, where the file is malformed, or something is not known.
         """
-        return cls(**{"file": path, "scale": scale, **reading})
+        return cls(**{"file": path, **({} if scale is None else {"scale": scale}), **reading})
 
     @classmethod
     def from_samples(cls, samples: ArrayLike, time_step: float, scale: float = 1.0) -> Self:

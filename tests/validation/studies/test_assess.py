@@ -367,7 +367,11 @@ def test_a_record_without_all_of_its_draws_is_not_pooled_with_draws(folder, monk
 
 def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
     scaled = load_scene(folder / "pga.toml").excitation
-    assert (scaled.peak, scaled.unscaled) == (pytest.approx(0.5, rel=1e-12), noise(1).unscaled)
+    assert (scaled, scaled.peak, scaled.unscaled) == (
+        Record.from_file(folder / "records" / "R01.csv", pga=0.5),
+        pytest.approx(0.5, rel=1e-12),
+        noise(1).unscaled,
+    )
 
 
 def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):
