@@ -24,9 +24,9 @@ class EventBasedModel(Frozen):
     length in alpha R. `pivot`: "bilateral" is the paper's model, in which the pivot never leaves
     the floor; "unilateral" lets the floor only push, so that the block may hop. `friction`:
     "coulomb" switches exactly between stick and slip, "bouc-wen" is the paper's regularisation (9)
-    with the `yield_displacement` u_y in m, "no-slip" is Housner's block. `impacts` (unilateral) is
-    the law of impacts at several contacts at once: "moreau" strikes all that touch together,
-    "floor-first" one after another; they differ where a block lands flush against a wall.
+    with the `yield_displacement` u_y in m, "no-slip" is Housner's block (both bilateral). `impacts`
+    (unilateral) is the law of impacts at several contacts at once: "moreau" strikes all that touch
+    together, "floor-first" one after another; they differ where a block lands flush against a wall.
     ("closed" and "open" are the two branches that "moreau" takes there.) "leading-first" and
     "trailing-first" strike one bottom corner before the other where a block lands flat while it
     slides. `energy_cap` (unilateral) lowers the restitution of an impact that would add kinetic
@@ -71,8 +71,8 @@ class EventBasedModel(Frozen):
         bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
         errors.refuse(
             (
-                bouc_wen and not bilateral,
-                f'{self.pivot!r} is not allowed with friction="bouc-wen": only "bilateral" is',
+                self.friction != "coulomb" and not bilateral,
+                f'{self.pivot!r} is not allowed with friction="{self.friction}", only "bilateral"',
                 "pivot",
             ),
             (

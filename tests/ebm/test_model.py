@@ -45,6 +45,7 @@ scene_of = Scene(
         ),
         ({"friction": "no-slip"}, {"initial_velocity": 0.1}, "initial_velocity"),
         ({"friction": "bouc-wen", "pivot": "unilateral"}, {}, "pivot: 'unilateral' is not allowed"),
+        ({"friction": "no-slip", "pivot": "unilateral"}, {}, "pivot: 'unilateral' is not allowed"),
         (
             {"friction": "bouc-wen"},
             {"floor": Floor(friction=0.3, static_friction=0.4)},
