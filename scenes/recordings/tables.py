@@ -155,8 +155,17 @@ def _layout_of(rows: NumberedLines, reading: Reading) -> _Layout:
     separator = next((sign for sign in ";\t" if sign in with_digits), None)
     if separator is None and "," in with_digits and reading.decimal != ",":
         words = with_digits.split()
-        # Where each word between blanks has one comma, the commas cannot separate fields.
-        if len(words) > 1 and all(_DECIMAL_COMMA.fullmatch(word) for word in words):
+        # Where each word between blanks is a number with one comma, or has none, the commas cannot
+        # separate fields; that after a blank, in 0 ,1, does.
+        if (
+            len(words) > 1
+            and "." not in with_digits
+            and all(
+                _DECIMAL_COMMA.fullmatch(word) and ("," in words[0] or word[0] != ",")
+                for word in words
+                if "," in word
+            )
+        ):
             return _Layout(None, True)
         if (
             "." not in with_digits
@@ -192,10 +201,11 @@ def _names_of(
         if all(map(is_number, words)):
             names = layout.words(n, above.replace(" [", "[").replace(" (", "("))
             return names if len(names) == len(words) else [], rows[index:]
-    # A column of words, or an empty one, beside those of numbers: names have numbers below them.
+    # A column of words, or an empty one, beside those of numbers: names have numbers below them; of
+    # another line it is not clear whether it is the first of the data.
     numeric = [[*map(is_number, layout.words(*row))] for row in rows[:2]]
     names = first if numeric[0] != numeric[-1] else []
-    if len(first) > 1 and len(rows) > 1 and len(numeric[1]) == len(first):
+    if len(numeric[-1]) == len(first) and (names or reading.header_lines is not None):
         return names, rows[bool(names) :]
     raise fault(
         f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"

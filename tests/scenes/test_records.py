@@ -165,10 +165,13 @@ UNKNOWN = [
         "3 columns; give that of the accelerations: --read column=2 (in a scene file: column = 2)",
     ),
     ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
-    (
-        "words\nand more of them\n",
-        {"unit": "g"},
-        "no line of numbers within the first 200; give the lines to leave out: --read header_lines",
+    *(
+        (
+            text,
+            {"unit": "g", "column": 2, "time_step": 1.0},
+            "no line of numbers within the first 200; give the lines to leave out: --read header",
+        )
+        for text in ("words\nand more of them\n", "A 1\nA 2\n")
     ),
     *(
         (
