@@ -85,13 +85,13 @@ def _finding(
     found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
 ) -> Finding:
     # Whether outcomes agree, and how far rotations differ.
-    reference, candidate = (history.fate for history in found.histories)
+    fates = dict.fromkeys(history.fate for history in reversed(found.histories))
     rms = found.figure("theta_rms")
     headline = (
-        f"same outcome, {candidate}"
-        if found["outcome_agrees"] == 1.0
-        else f"outcomes differ, {candidate} against {reference}"
-    ) + ("" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)")
+        ("same outcome, " if found["outcome_agrees"] == 1.0 else "outcomes differ, ")
+        + " against ".join(fates)
+        + ("" if rms.value is None else f"; rotations {rms.value:.3g} {rms.unit} apart (RMS)")
+    )
     motions = {role: motion_of(history, scene) for role, history in histories.items()}
     rows = [
         [

@@ -122,8 +122,15 @@ def test_compare_says_first_what_matters(typed):
     differ = r"outcomes differ, overturned left at 1\.5.* against at rest; rotations"
     assert re.match(rf"{differ}(?s:.*)\noutcome agrees +no", out)
     assert Path("c.svg").read_bytes().startswith(b"<?xml")
-    out, _ = typed("compare", "a.csv", "a.csv", columns=80)
-    assert out.startswith("same outcome, at rest; rotations 0 alpha apart (RMS)\n")
+    for said, words, columns in (
+        (r"same outcome, at rest; rotations 0 alpha apart \(RMS\)\n", ("a.csv", "a.csv"), 80),
+        (
+            r"same outcome, .* 2\.07 s against .* 1\.57 s; ",
+            ("b.csv", "b.csv", "--align", "0.5"),
+            120,
+        ),
+    ):
+        assert re.match(said, typed("compare", *words, columns=columns)[0])
 
 
 @pytest.mark.parametrize(("first", "history"), [("a.csv", "a.csv"), ("a.svg", None)])
