@@ -148,6 +148,7 @@ def run(
     played is gathered; the exit code is then `INTERRUPTED`, unless the finding has another. Raises
     `InputError` where the folder cannot be used or no cluster answers.
     """
+    provenance.code_digest.cache_clear()
     if scheduler is not None and not pool.local_workers(scheduler):
         with pool.connected(scheduler):  # raises where none answers
             pass

@@ -87,19 +87,16 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+@cache
 def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     """Hash of the code of a module and of all project modules that it imports.
 
     Imports count at its top and inside functions. The hash is that of the syntax trees without
     docstrings: comments, layout and documentation do not count. For rockcheck's own modules it is
     kept for later processes, under a hash of all our sources. A module without a file, as in a
-    notebook, has another one at each call: nobody can say that its code is still the same.
+    notebook, has another one in each run: nobody can say that its code is still the same. A run
+    clears the cache: files may have changed.
     """
-    return _code_digest(module, search_path) if _source(module, search_path) else uuid.uuid4().hex
-
-
-@cache
-def _code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
     with contextlib.suppress(InputError, OSError):  # there may be no folder to keep it in
         if module.split(".")[0] == OWN_PACKAGE:
             user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
@@ -113,9 +110,10 @@ def _code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
 def _digest_of(module: str, search_path: tuple[str, ...]) -> str:
     return digest(
         "".join(
-            f"{name}\n{_source_of(path)[1]}\n"
+            f"{name}\n{_source_of(path, path.stat().st_mtime_ns)[1]}\n"
             for name, path in sorted(reachable(module, search_path).items())
         )
+        or uuid.uuid4().hex
     )
 
 
@@ -197,7 +195,7 @@ def _imports(
     `from base import name` gives the submodule `base.name` of a project package if there is one,
     else `base`.
     """
-    for node in _source_of(path)[0]:
+    for node in _source_of(path, path.stat().st_mtime_ns)[0]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         else:
@@ -209,8 +207,10 @@ def _imports(
 
 
 @cache
-def _source_of(path: Path) -> tuple[list[ast.Import | ast.ImportFrom], str]:
+def _source_of(path: Path, changed: int) -> tuple[list[ast.Import | ast.ImportFrom], str]:
     """What a source file imports, and its syntax tree without docstrings, as text.
+
+    When the file was last `changed` counts for the cache only.
 
     A package that loads its parts as they are used imports what its stub says. Of a file that is no
     Python, such as a compiled module, a hash of its content.

@@ -55,12 +55,10 @@ def write_suite(folder, models, tolerances="", seconds=60.0):
 
 @pytest.fixture
 def run(tmp_path, faulty):
-    """Runs a suite as a new process would, which has not read the code before."""
+    """Runs a suite, in which its models are imported anew."""
 
     def run(path, jobs=0, **options):
         sys.modules.pop("faulty", None)
-        provenance._code_digest.cache_clear()
-        provenance._source_of.cache_clear()
         return run_suite(
             suites.load_suite(path, allow_code=OWN), tmp_path / "out", jobs=jobs, **options
         )
@@ -157,7 +155,7 @@ def test_only_what_changed_runs_again_and_no_remark_counts(tmp_path, run, writte
 
 def test_the_digest_of_our_code_is_kept_and_a_damaged_one_is_not_believed(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    module, digest = "rockcheck.scenes.writing", provenance._code_digest.__wrapped__
+    module, digest = "rockcheck.scenes.writing", provenance.code_digest.__wrapped__
     expected = digest(module)
     (kept,) = (tmp_path / "rockcheck" / "code").iterdir()
     monkeypatch.setattr(provenance, "_digest_of", lambda *_: "other")
