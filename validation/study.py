@@ -37,7 +37,8 @@ class Task:
     The fields of this class do not count for equality: `seconds`, the limit of its wall time;
     `expected`, its usual wall time (s); `compiles`, the code that it may have to compile (see
     `execute.pool.Call`); `where` it is played: in a worker; "here", since it has threads of its own
-    (a cluster takes it all the same); or "timed", in this process with nothing beside it.
+    (a cluster takes it all the same); or "timed", in this process with nothing beside it. What is
+    `clocked`, or timed, has a time in its result that counts.
     """
 
     seconds: float = field(default=math.inf, kw_only=True, compare=False, repr=False)
@@ -46,6 +47,7 @@ class Task:
     where: Literal["worker", "here", "timed"] = field(
         default="worker", kw_only=True, compare=False, repr=False
     )
+    clocked: bool = field(default=False, kw_only=True, compare=False, repr=False)
 
     @property
     def label(self) -> str:
@@ -62,14 +64,14 @@ class Task:
         """All that the result depends on, as JSON.
 
         By default the fields, the code that its module can reach and that of all models, which are
-        imported by their names, all libraries, and, where it is "timed", the machine.
+        imported by their names, all libraries, and, where a time counts, the machine.
         """
         modules = {type(self).__module__, *(kind.module for kind in models.FAMILIES.values())}
         return {
             "task": self.fields(),
             "code": [provenance.code_digest(one) for one in sorted(modules)],
             "versions": provenance.versions(),
-            "machine": provenance.hardware() if self.where == "timed" else None,
+            "machine": provenance.hardware() if self.clocked or self.where == "timed" else None,
         }
 
     @cached_property

@@ -135,6 +135,7 @@ class WorkPrecision(Study):
                     line.label,
                     value,
                     where="worker" if step < runs.SIDE_BY_SIDE else "timed",
+                    clocked=True,
                     expected=_usual(line, value, 3.0),
                 )
 
