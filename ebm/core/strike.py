@@ -56,11 +56,17 @@ def _lands_along(block, state):
     """Whether a block that closes its far gap lands there.
 
     Near phi = 0 the far gap goes with phi^2, so that its root says phi to the square root of
-    rounding only.
+    rounding only. Not where the pivot slips by more than rounding until it has landed.
     """
     mode, motion = state.mode, state.motion
     upright = mode.family == Family.TILT and motion.theta * motion.theta < contacts.CLOSED
-    return upright and mode.sense * motion.w < 0.0 and contacts.closed_floor(block, motion)
+    return (
+        upright
+        and mode.sense * motion.w < 0.0
+        and abs(contacts.slip_velocity(block, motion) * motion.theta)
+        < contacts.CLOSED * abs(motion.w)
+        and contacts.closed_floor(block, motion)
+    )
 
 
 @inner_kernel

@@ -79,7 +79,8 @@ def test_grazing_wall_contact(pivot):
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pivots
 def test_impact_on_floor_and_wall_at_once(pivot, e, side, sign):
-    """A block beside a wall, tilted away and let go, lands flush against it."""
+    """A block beside a wall, tilted away and let go, lands flush against it. One that slides
+    strikes the wall before it lands, if only by 3e-4 s."""
     other = {"left": "right", "right": "left"}[side]
     walls = [Wall(side=other, gap=5.0, restitution=0.9), Wall(side=side, gap=0.0, restitution=e)]
     scene = scene_of(walls=walls, initial_rotation=-0.1 * sign)
@@ -89,7 +90,17 @@ def test_impact_on_floor_and_wall_at_once(pivot, e, side, sign):
     energy = kinematics.energy(
         PAPER_BLOCK, G, *(motion[name] for name in ("y", "theta", "x_dot", "y_dot", "theta_dot"))
     )
-    assert np.max(sign * motion["theta"]) < 1e-9
+    slides = scene_of(
+        walls=[Wall(side=side, gap=2e-4, restitution=e)],
+        duration=1e-3,
+        initial_rotation=-5e-6 * sign,
+        initial_angular_velocity=0.01 * sign,
+        initial_velocity=-sign,
+    )
+    assert (np.max(sign * motion["theta"]) < 1e-9, kinds(play(slides, pivot))[0]) == (
+        True,
+        "wall impact",
+    )
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
         assert history.outcome == "at rest"
@@ -162,8 +173,7 @@ def test_walls_and_floor_are_not_entered(pivot, name, e):
     )
     history = play(scene, pivot)
     assert_contacts_hold(scene, history)
-    assert events <= set(kinds(history))
-    assert len(history.event_list) < 20_000
+    assert (events - set(kinds(history)), len(history.event_list) < 20_000) == (set(), True)
     lift = kinematics.pivot_height(
         PAPER_BLOCK, history.channels["y"], history.channels["theta"]
     ).max()
