@@ -301,7 +301,8 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
     for n, line in enumerate(lines[index : index + about.height], index + 1):
         ends = range(0, min(about.across, count - len(values)) * about.width, about.width)
         words = [line[end : end + about.width].strip() for end in ends]
-        if "" in words:
+        # a field is empty, or lines are shifted: the last one's number goes on behind it
+        if "" in words or line[about.across * about.width :][:1].strip():
             break
         values += [number(n, word) for word in words]
     length = count * seconds

@@ -233,6 +233,7 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
     ("name", "content", "option", "said"),
     [
         ("a.V2", cosmos("N-S").replace(OWN, UNKNOWN), {}, "401 points every 0.02 s are 8.02 s"),
+        ("a.V2", re.sub(rb"(?m)^([- .\d]{80})$", rb" \1", csmip("N-S")), {}, "the block has 0"),
         (
             "a.V2",
             re.sub(RAW + b"|" + OWN, UNKNOWN, cosmos("N-S")),
