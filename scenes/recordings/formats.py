@@ -24,6 +24,7 @@ from rockcheck.scenes.recordings.recording import (
     checked_count,
     checked_step,
     fault,
+    is_number,
     known_unit,
     number,
     numbers,
@@ -288,7 +289,7 @@ def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) ->
 
 
 def _recording(lines: list[str], index: int, about: _Block, reading: Reading) -> Recording:
-    (place, stated), here = about.step, f"line {index}"
+    (place, stated), here, end = about.step, f"line {index}", index + about.height
     refuse(
         (not place, "no real header before this block states the time step", here),
         (about.across < 1 or about.width < 1, NO_FIELDS, here),
@@ -298,9 +299,9 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
     seconds = settled_step(step, reading)
     unit = settled_unit(about.unit, reading)
     values: list[float] = []
-    for n, line in enumerate(lines[index : index + about.height], index + 1):
-        ends = range(0, min(about.across, count - len(values)) * about.width, about.width)
-        words = [line[end : end + about.width].strip() for end in ends]
+    for n, line in enumerate(lines[index:end], index + 1):
+        places = range(0, min(about.across, count - len(values)) * about.width, about.width)
+        words = [line[k : k + about.width].strip() for k in places]
         # a field is empty, or lines are shifted: the last one's number goes on behind it
         if "" in words or line[about.across * about.width :][:1].strip():
             break
@@ -310,6 +311,11 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
         (
             len(values) != count,
             f"the header says {count} points of acceleration, the block has {len(values)}",
+            here,
+        ),
+        (
+            {*map(is_number, "".join(lines[end : end + 1]).split())} == {True},
+            f"the header says {count} points of acceleration, more follow",
             here,
         ),
         # A time step of another record would be a silent fault.

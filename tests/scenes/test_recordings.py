@@ -236,6 +236,12 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
         ("a.V2", re.sub(rb"(?m)^([- .\d]{80})$", rb" \1", csmip("N-S")), {}, "the block has 0"),
         (
             "a.V2",
+            csmip("N-S").replace(b" 401 points of accel", b" 300 points of accel"),
+            {},
+            "more",
+        ),
+        (
+            "a.V2",
             re.sub(RAW + b"|" + OWN, UNKNOWN, cosmos("N-S")),
             {},
             "no real header before this block states the time step",
