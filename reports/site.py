@@ -355,7 +355,12 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
     for key in ("excitation", "vertical"):
         excitation, name = getattr(scene, key), f"{slug}-{key}.csv"
         if isinstance(excitation, Record):
-            tables[key] = {"kind": "record", "file": name, "scale": excitation.scale}
+            tables[key] = {
+                "kind": "record",
+                "file": name,
+                "scale": excitation.scale,
+                "time_step": excitation.time_step,  # all its digits
+            }
             rows = (
                 (f"{excitation.time_step * n:.12g}", value)
                 for n, value in enumerate(excitation.unscaled)

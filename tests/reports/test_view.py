@@ -277,7 +277,7 @@ def test_missing_and_foreign_histories_are_told(site, run):
             block=Block(half_width=0.4, half_height=1.5, mass=12.0),
             floor=Floor(friction=0.3, static_friction=0.4),
             excitation=Record.from_samples([0.0, 1.0 / 3.0, -2e-7], 0.02, scale=1.5),
-            vertical=Record.from_samples([0.1, 0.2], 0.005),
+            vertical=Record.from_samples([0.1, 0.2], 0.01 / 3.0),
             duration=3.0,
             gravity=9.8,
             description='quotes " and \\ and <tags>',
