@@ -21,7 +21,8 @@ figures that agree at h, 2h and 4h by chance seldom agree at 3h. A peak and the 
 read off rows; how far the true ones may lie from the rows is added in quadrature.
 
 An event-based model has a tolerance instead of a step: u_num = 1.25 times the change at a hundredth
-of it. All uncertainties here are expanded ones: intervals that are meant to hold 95 % of the cases.
+of it, and the rows count as well. All uncertainties here are expanded ones: intervals that are
+meant to hold 95 % of the cases.
 """
 
 import math
@@ -123,8 +124,8 @@ def numerical_uncertainty(
         quantities=(
             _quantity("theta_rms", "alpha", rms, SAFETY * rms),
             *(
-                _quantity(name, unit, value, SAFETY * abs(better - value))
-                for (name, unit, value), (_, _, better) in figures
+                _quantity(name, unit, value, math.hypot(SAFETY * abs(better - value), near))
+                for (name, unit, value, near), (_, _, better, _) in figures
             ),
             _quantity("outcome", "", given.outcome),
         ),
@@ -142,8 +143,8 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> Iterator[Quantity]:
     alpha, finest = scene.block.alpha, runs[0]
     units = {"alpha": 1.0, "m": alpha * scene.block.radius, "s": 1.0 / scene.frequency_parameter}
     changes = [_changes(scene, finest, coarser) for coarser in runs[1:]]
-    shown = [("theta_rms", "alpha", changes[0]["theta_rms"]), *_scalars(scene, finest)]
-    apart = [max(one[name] / units[unit] for name, unit, _ in shown) for one in changes]
+    shown = [("theta_rms", "alpha", changes[0]["theta_rms"], 0.0), *_scalars(scene, finest)]
+    apart = [max(one[name] / units[unit] for name, unit, *_ in shown) for one in changes]
     order = _order(apart)
     converge = apart == sorted(apart) and order is not None and order >= LEAST_ORDER
     parted = apart[0] if converge else max(apart)
@@ -153,17 +154,10 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> Iterator[Quantity]:
         unsure = reason = f"the outcome changes with the step: {', '.join(sides)} at h, 2h, 3h, 4h"
     elif parted > LARGE:
         reason = f"the histories part by {parted:.2g} with the step, more than {LARGE:g}"
-    # The peak exceeds the rows at most as the parabola through the top three does.
-    theta, missed = np.abs(finest.channels["theta"]), 0.0
-    top = int(np.argmax(theta))
-    if 0 < top < len(theta) - 1:
-        missed = float(abs(theta[top - 1] - 2.0 * theta[top] + theta[top + 1])) / 8.0
-    between = {"peak_rotation": missed / alpha, "end_time": scene.output_step}
-    for name, unit, value in shown:
+    for name, unit, value, near in shown:
         own = [one[name] for one in changes]
         u = SAFETY * max(own) if converge else POOR_SAFETY * max(apart) * units[unit]
-        u = math.hypot(u, between.get(name, 0.0))
-        yield _quantity(name, unit, value, u, reason, _order(own))
+        yield _quantity(name, unit, value, math.hypot(u, near), reason, _order(own))
     yield _quantity("outcome", "", finest.outcome, reason=unsure)
 
 
@@ -208,14 +202,30 @@ def _quantity(
     )
 
 
-def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
-    """Scalar figures as (name, unit, value): peak rotation and last slip, or time of the fall."""
+def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float, float]]:
+    """Scalar figures: peak rotation and last slip, or time of the fall.
+
+    Name, unit, value, and how far the true one may lie from the rows that it is read from.
+    """
     if _side(history) != "stands":
-        return [("end_time", "s", float(history.channels["t"][-1]))]
-    last_slip = history.channels.get("slip", np.empty(0))[-1:]
+        return [("end_time", "s", float(history.channels["t"][-1]), scene.output_step)]
+    # The peak exceeds the rows at most as the parabola through the top three does, or, where the
+    # block strikes, the point at which the tangents of two rows meet.
+    alpha, theta = scene.block.alpha, history.channels["theta"]
+    height, side = np.abs(theta), np.sign(theta[:-1])
+    bends = np.pad(np.abs(height[:-2] - 2.0 * height[1:-1] + height[2:]), 1)
+    rate, step = history.channels.get("theta_dot", 0.0 * theta), np.diff(history.channels["t"])
+    up, down = side * rate[:-1], side * rate[1:]
+    turns = (up > 0.0) & (down <= 0.0)
+    after = (side * np.diff(theta) - down * step)[turns] / (up - down)[turns]
+    meet = height[:-1][turns] + up[turns] * np.clip(after, 0.0, step[turns])
+    missed = max(bends[np.argmax(height)] / 8.0, np.max(meet, initial=0.0) - np.max(height))
     return [
-        ("peak_rotation", "alpha", history.peak_rotation / scene.block.alpha),
-        *(("last_slip", "m", slip) for slip in last_slip.tolist()),
+        ("peak_rotation", "alpha", float(np.max(height)) / alpha, float(missed) / alpha),
+        *(
+            ("last_slip", "m", slip, 0.0)
+            for slip in history.channels.get("slip", np.empty(0))[-1:].tolist()
+        ),
     ]
 
 
