@@ -225,7 +225,17 @@ CRITERIA = (
         "uplifts",
         "statics",
         "exact for a block at rest that does not slide first, without vertical motion",
-        lambda scene, base: (base.acceleration > scene.gravity * scene.block.slope, None),
+        # a base that moves to the right tips it over its left corner
+        lambda scene, base: (
+            any(
+                np.max(way * base.motion.samples) > scene.gravity * pivot.arm / pivot.height
+                for pivot, way in (
+                    (scene.block.pivot("left"), 1.0),
+                    (scene.block.pivot("right"), -1.0),
+                )
+            ),
+            None,
+        ),
     ),
     Criterion(
         "sliding",

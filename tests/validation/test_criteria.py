@@ -83,9 +83,13 @@ def test_newmarks_sliding_block(a, v, mu):
 
 @pytest.mark.parametrize(("ratio", "moves"), [(1.0 - 1e-6, False), (1.0 + 1e-6, True)])
 @pytest.mark.parametrize(("kind", "friction", "k"), [("uplift", 1.0, 0), ("slip", 0.05, 1)])
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize(
+    "block",
+    # of the last one the weaker pivot is the right one, and the base moves to the right
+    [*BLOCKS, BLOCKS[1].replace(centre_of_mass=(0.1, 0.0), moment_of_inertia=0.3)],
+)
 def test_uplift_and_sliding_begin_where_the_criteria_say(block, kind, friction, k, ratio, moves):
-    uplift, slip = G * block.slope, friction * G
+    uplift, slip = G * block.pivot("left").arm / block.pivot("left").height, friction * G
     scene = shaken(block, Record.from_samples([ratio * min(uplift, slip)] * 2, 0.1), friction)
     assert any(event.kind == kind for event in played(scene).event_list) is moves
     assert criteria.CRITERIA[k].says(scene, criteria.base_of(scene)) == (moves, None)
