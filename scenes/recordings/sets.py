@@ -132,8 +132,8 @@ def read_files(paths: Iterable[Path], reading: Reading) -> tuple[Components, lis
     return read, faults
 
 
-def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording]:
-    """The vertical component of each horizontal motion, by the motion's name (see `motions_of`).
+def verticals_of(paths: Iterable[Path], reading: Reading) -> list[Recording]:
+    """The vertical component of each horizontal motion, in the order of `motions_of`.
 
     It is the one in the same file, else that of the file in the same folder whose name differs only
     in the component, as ELC-UP.AT2 does from ELC180.AT2. Raises `InputError` where there is not
@@ -166,7 +166,7 @@ def verticals_of(paths: Iterable[Path], reading: Reading) -> dict[str, Recording
             for path in alone
         ),
     )
-    return {name: up[0][1] for path, up in ups.items() for name, _ in across[path]}
+    return [up[0][1] for path, up in ups.items() for _ in across[path]]
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:

@@ -33,6 +33,7 @@ def motion(gain: float) -> np.ndarray:
 
 def at2(name: str, gain: float, component: str) -> None:
     values = " ".join(f"{a:.8e}" for a in motion(gain))
+    Path(name).parent.mkdir(parents=True, exist_ok=True)
     Path(name).write_text(
         f"PEER NGA\nSomewhere, 1/1/2000, Station, {component}\n"
         f"ACCELERATION TIME SERIES IN UNITS OF G\nNPTS= 101, DT= .02 SEC\n{values}\n"
@@ -42,11 +43,10 @@ def at2(name: str, gain: float, component: str) -> None:
 @pytest.fixture(autouse=True)
 def files(in_an_empty_folder):
     Path("rack.toml").write_text(SCENE, "utf-8")
-    Path("records/more").mkdir(parents=True)
     for name, gain, component in (
         *(("records/RSN1_H1", 0.1, "180"), ("records/RSN1_H2", 0.2, "270")),
         *(("records/RSN1_V", 0.3, "UP"), ("records/more/RSN1_H1", 0.1, "180"), ("Ä", 0.1, "180")),
-        ("Ö", 0.2, "180"),
+        *(("Ö", 0.2, "180"), ("other/more/RSN1_H1", 0.2, "180")),
     ):
         at2(f"{name}.AT2", gain, component)
     Path("records/README.txt").write_text("where they are from\n", "utf-8")
@@ -69,6 +69,7 @@ def names(left_out: list[str]) -> list[str]:
         (["records"], HORIZONTAL, [VERTICAL, ODD]),
         (["records/RSN1_*.AT2"], HORIZONTAL, [VERTICAL]),
         (["records/RSN1_H1.AT2", "records/more"], ["records-RSN1_H1", "more-RSN1_H1"], []),
+        (["records/more", "other/more"], ["more-RSN1_H1 1", "more-RSN1_H1 2"], []),
         (["?.AT2"], ["- 1", "- 2"], []),  # which no name of a scene can tell apart
         (["elcentro_1940_ns.csv"], ["elcentro_1940_ns"], []),  # one that comes with the package
     ],

@@ -117,14 +117,16 @@ def _motions(
     """The motions of a set by their labels, as what they replace; and what is left out."""
     files = sets.files_of(given.files, folder)
     motions, left_out = sets.motions_of(files, given, paired=given.vertical)
-    upward = sets.verticals_of(files, given) if given.vertical else {}
+    upward = sets.verticals_of(files, given) if given.vertical else [None] * len(motions)
     if given.vertical:
         left_out = [one for one in left_out if isinstance(one, sets.Odd)]
     found = []
-    for label, (name, across) in zip(_labels([name for name, _ in motions]), motions, strict=True):
+    for label, (_, across), up in zip(
+        _labels([name for name, _ in motions]), motions, upward, strict=True
+    ):
         parts = {"excitation": (label, across)}
-        if name in upward:
-            parts["vertical"] = f"{label}, vertical", upward[name]
+        if up is not None:
+            parts["vertical"] = f"{label}, vertical", up
         records = {
             key: Record.from_samples(one.samples, one.time_step, given.scale).model_copy(
                 update={"source": source, "notes": one.notes}
@@ -141,9 +143,9 @@ def _labels(names: Sequence[str]) -> list[str]:
     forms = [
         [
             re.sub(r"[^A-Za-z0-9 _.,+=()-]", "-", word)[-_LONGEST_RECORD:].strip() or "record"
-            for word in (brief, name, f"{brief} {names.index(name) + 1}")
+            for word in (brief, name, f"{brief} {number}")
         ]
-        for brief, name in zip(short, names, strict=True)
+        for number, (brief, name) in enumerate(zip(short, names, strict=True), 1)
     ]
     alike = [*zip(*forms, strict=True)]
     return [
