@@ -115,8 +115,8 @@ def place_of(kind: str, asked: int | str, names: Sequence[str], listed: str) -> 
     """
     if isinstance(asked, int) and asked <= len(names):
         return asked - 1
-    if names.count(asked) == 1:
-        return names.index(asked)
+    if names.count(str(asked)) == 1:  # a name may be a number, such as that of an azimuth
+        return names.index(str(asked))
     raise fault(f"no single {kind} {printable(repr(asked))}; there are {listed}")
 
 

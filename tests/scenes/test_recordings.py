@@ -221,7 +221,9 @@ def test_a_v2_file_has_its_own_time_step_not_that_of_the_raw_record(written, raw
 
 
 def test_k_net_takes_out_the_offset_and_says_so(written):
-    record = recordings.read_record(written("MYG0041103111446.NS", knet("N-S", "4")))
+    record = recordings.read_record(
+        written("MYG0041103111446.NS", knet("N-S", "4")), recordings.Reading(component=4)
+    )
     assert (record.component, record.notes) == (
         "4",
         ("the mean, 2.987 gal, is taken out: the offset of the digitiser",),
