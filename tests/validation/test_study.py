@@ -53,7 +53,8 @@ def test_what_was_played_is_read_back_whatever_plays_it(tmp_path, log, jobs):
 
 
 def test_a_fault_of_one_task_takes_no_other_down(tmp_path, log):
-    found = run(Squares([2.0, 13.0, 14.0, 15.0], log), tmp_path / "out", jobs=1)
+    values = [2.0, 13.0, 14.0, 15.0, 17.0]
+    found = run(Squares(values, log, seconds=20.0), tmp_path / "out", jobs=1)
     assert found.data | {
         where.partition(",")[0]: why.partition(":")[0] for where, why in found.failures.items()
     } == {
@@ -61,10 +62,11 @@ def test_a_fault_of_one_task_takes_no_other_down(tmp_path, log):
         "13": "no square of 13",
         "14": "ZeroDivisionError",
         "15": "the process ended with code 3",
+        "17": "the process ended with code 0",
     }
     assert ["a bug" in one.read_text() for one in (tmp_path / "out" / FAULTS).iterdir()] == [True]
     run(Squares([2.0, 13.0], log), tmp_path / "out", jobs=1)
-    assert played(log) == [2.0, 13.0, 13.0, 14.0, 15.0], "what failed is played again"
+    assert played(log) == [2.0, 13.0, 13.0, *values[2:]], "what failed is played again"
 
 
 #: A study as a script, which imports what lies beside it.

@@ -24,7 +24,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from multiprocessing import resource_tracker, util
+from multiprocessing import context, resource_tracker, util
 from typing import Any, Self
 
 from rockcheck.scenes import InputError, ModelFailure, printable, progress
@@ -39,6 +39,8 @@ AHEAD = 2
 COMPILING = 600.0
 #: How often a pool begins anew with new processes.
 MOST_BREAKS = 10
+#: Exit code of a process that ended by itself, told in place of 0.
+ENDED = 256
 #: Threads that a run allows this process; 0: one a core.
 THREADS: ContextVar[int] = ContextVar("threads", default=0)
 
@@ -117,12 +119,24 @@ class Ended:
                 names = {-one: one.name for one in signal.Signals}
                 reason = f"crashed: {names.get(code, f'signal {-code}')}"
             case ProcessExpired():
-                reason = f"the process ended with code {self.error.exitcode or 0}"
+                reason = f"the process ended with code {(self.error.exitcode or 0) % ENDED}"
             case MemoryError():
                 reason = "out of memory"
             case _:
                 reason = printable(f"{type(self.error).__name__}: {self.error}", 300)
         return Failure(reason)
+
+
+class _Worker(context.SpawnProcess):
+    # Pebble takes one that ended with 0 for idle, and waits for its call for ever. So ends a call
+    # whose code is not Python's, such as Fortran's STOP.
+    @property
+    def exitcode(self) -> int | None:
+        return ENDED if super().exitcode == 0 else super().exitcode
+
+
+class _Workers(context.SpawnContext):
+    Process = _Worker
 
 
 @dataclass(eq=False)
@@ -146,7 +160,7 @@ class Pool:
         os.environ.update(ONE_THREAD)
         self._pool = ProcessPool(
             max_workers=self.jobs,
-            context=multiprocessing.get_context("spawn"),
+            context=_Workers(),
             initializer=prepare,
             initargs=(self.memory_mb, progress.announcer is not None),
         )

@@ -52,8 +52,8 @@ class Squares(Study):
             file.write(f"{task.value:g}\n")
         if task.value in FAULTS:
             raise FAULTS[task.value]
-        if task.value == 15.0:
-            os._exit(3)
+        if task.value in (15.0, 17.0):
+            os._exit({15.0: 3}.get(task.value, 0))
         return Squared(task.value**2, os.getpid())
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
