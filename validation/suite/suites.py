@@ -55,6 +55,7 @@ from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -488,12 +489,35 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     ]
     first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
-    if twice := [name for name, count in names.items() if count > 1]:
-        raise errors.InputError(f"scene {twice[0]!r} is in two of the suites", "include")
-    if others := [one.name for one in included if one.given.reference != first.given.reference]:
-        raise errors.InputError(
-            f"{others[0]} and {first.name} have different references", "include"
-        )
+    own = {
+        (family(model.family).module, folder)
+        for suite in included
+        for model in suite.models.values()
+        for folder in model.search_path
+    }
+    errors.refuse(
+        *(
+            (count > 1, f"scene {name!r} is in two of the suites", "include")
+            for name, count in names.items()
+        ),
+        *(
+            (
+                one.given.reference != first.given.reference,
+                f"{one.name} and {first.name} have different references",
+                "include",
+            )
+            for one in included
+        ),
+        *(  # a process imports one module of a name
+            (
+                one == other and find_spec(one) is None,
+                f"module {one} is in {printable(folder)} and in {printable(place)}: give one of"
+                " them another name",
+                "include",
+            )
+            for (one, folder), (other, place) in itertools.combinations(sorted(own), 2)
+        ),
+    )
     whole: dict[str, Any] = {
         what: {key: one for suite in included for key, one in getattr(suite, what).items()}
         for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
