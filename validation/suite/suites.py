@@ -55,7 +55,6 @@ from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -64,6 +63,7 @@ from pydantic import Field
 from rockcheck.ebm.horizon import may_fly
 from rockcheck.scenes import Frozen, Positive, Scene, errors, files, printable
 from rockcheck.validation.discrepancy import measures
+from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import (
     PAPER_MODEL,
     REFERENCE,
@@ -490,10 +490,11 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
     own = {
-        (family(model.family).module, folder)
+        place
         for suite in included
         for model in suite.models.values()
-        for folder in model.search_path
+        if is_own(model.family)
+        for place in provenance.reachable(family(model.family).module, model.search_path).items()
     }
     errors.refuse(
         *(
@@ -510,12 +511,12 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         ),
         *(  # a process imports one module of a name
             (
-                one == other and find_spec(one) is None,
-                f"module {one} is in {printable(folder)} and in {printable(place)}: give one of"
-                " them another name",
+                one == other,
+                f"module {one} is {printable(path)} and {printable(place)}: give one of them"
+                " another name",
                 "include",
             )
-            for (one, folder), (other, place) in itertools.combinations(sorted(own), 2)
+            for (one, path), (other, place) in itertools.combinations(sorted(own), 2)
         ),
     )
     whole: dict[str, Any] = {

@@ -135,13 +135,25 @@ def test_a_fault_names_one_file_also_in_a_folder_called_like_a_key_and_in_the_wo
     (tmp_path / "scenes").mkdir()
     monkeypatch.chdir(written("scenes/mine.toml", MODELS).parents[1])
     written("mine.toml", 'scenes = ["gone.toml"]\n' + MODELS)
-    parts = [  # a process imports one module of a name
-        str(written(f"{place}.toml", f'{MODELS}[models.a]\nmodel = "beside:A"\n{scene}'))
-        for place, scene in (("scenes/one", SHELF), ("two", SHELF.replace("shelf", "rack")))
-    ]
+    *_, one, _, _, two = (  # a process imports one module of a name
+        str(written(place + file.replace("NAME", name), text.replace("NAME", name)))
+        for place, name in (("scenes/", "one"), ("", "two"))
+        for file, text in (
+            ("helper.py", ""),
+            ("NAME.py", "import helper"),
+            (
+                "NAME.toml",
+                MODELS + '[models.a]\nmodel = "NAME:A"\n' + SHELF.replace("shelf", "NAME"),
+            ),
+        )
+    )
     faults = (
-        str(fault_of(suites.load_suite, name, allow_code=["beside:A"]))
-        for name in ("scenes/mine.toml", "mine.toml", written("outer.toml", f"include = {parts}"))
+        str(fault_of(suites.load_suite, name, allow_code=["one:A", "two:A"]))
+        for name in (
+            "scenes/mine.toml",
+            "mine.toml",
+            written("outer.toml", f"include = {[one, two]}"),
+        )
     )
     assert [said.removeprefix(f"{tmp_path}/").split(": ")[:2] for said in faults] == [
         ["scenes/mine.toml", "scenes"],
