@@ -411,10 +411,14 @@ def stress(
     part: What = errors.one_of("stress", what, get_args(What))
     families = (errors.one_of("model", name, PLAYERS).split()[0] for name in model or ())
     need_installed(families, "--model")
-    if part == "maps" and not places(quick, model or ()):
-        raise errors.InputError(
-            "maps are of engines and cm: an event-based model has no step", "--model"
-        )
+    errors.refuse(
+        (part == "maps" and runs, "is of random scenes, not of maps", "--runs"),
+        (
+            part == "maps" and not places(quick, model or ()),
+            "maps are of engines and cm: an event-based model has no step",
+            "--model",
+        ),
+    )
     tell_missing()
     studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
 

@@ -103,6 +103,7 @@ FILES = {
         ),
         (["conformance", "--export", "x", "--tune", "1"], "--export: does not go with --engine"),
         (["conformance", "--histories", "x", "--tune", "1"], "--tune: does not go with"),
+        (["stress", "maps", "--runs", "5"], "--runs: is of random scenes, not of maps"),
         (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),
         (
             ["simulate", "fig5a", "-o", "x.xlsx"],
