@@ -100,9 +100,9 @@ def test_a_task_that_failed_leaves_its_nodes_undecided():
 def test_a_tile_depends_on_all_that_its_outcomes_do():
     scene, a = PANELS["figure-8-gap-3-e-0"].scene, np.array([1.0, 2.0])
 
-    def key(scene=scene, a=a, f=a, model="ebm", tolerance=1e-8, what="outcomes"):
-        (nodes,) = Request(model=model, settings={"tolerance": tolerance}).nodes(scene, a, f, what)
-        return nodes.key
+    def key(scene=scene, a=a, f=a, model="ebm", what="outcomes", **settings):
+        request = Request(model=model, settings=settings or {"tolerance": 1e-8})
+        return request.nodes(scene, a, f, what)[0].key
 
     assert key() == key(scene.replace(name="other", duration=9.0))
     others = [
@@ -112,9 +112,13 @@ def test_a_tile_depends_on_all_that_its_outcomes_do():
         key(tolerance=1e-9),
         key(model="ebm-unilateral"),
         key(what="motions"),
+        # which has other steps in spectra than by default
+        key(model="mujoco", cone_correction=False),
+        key(model="mujoco", settings="default"),
+        key(model="mujoco", time_step=1e-3),
         key(scene.replace(excitation=Ricker(amplitude=1.0, period=1.0, symmetric=True))),
     ]
-    assert len({key(), *others}) == 8
+    assert len({key(), *others}) == 11
 
 
 def test_another_model_plays_in_processes(tmp_path):

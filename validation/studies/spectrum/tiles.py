@@ -217,7 +217,9 @@ class Request:
             raise InputError(
                 f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis", "--size"
             )
-        settings = {**SETTINGS.get(self.model, {}), **self.settings}
+        usual, asked = SETTINGS.get(self.model, {}), self.settings
+        fixed = "time_step" in asked or asked.get("settings") == "default"
+        settings = {**({} if fixed and "largest_step" in usual else usual), **asked}
         object.__setattr__(self, "settings", settings)
         models.build(self.model, settings)
         for name, (low, high) in (
