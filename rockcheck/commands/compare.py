@@ -9,7 +9,7 @@ from pydantic import FiniteFloat, TypeAdapter
 
 from rockcheck.commands import PlotOption, check_file, scene_names, told
 from rockcheck.reports.style import save_as
-from rockcheck.scenes import History, InputError, Scene, load_scene, printable
+from rockcheck.scenes import History, InputError, Scene, errors, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
 from rockcheck.validation.discrepancy import figures, measured, measures
 from rockcheck.validation.discrepancy.compare import motion_of, motion_words
@@ -59,6 +59,21 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
+    errors.refuse(
+        *(
+            (
+                value is not None and (reference.is_dir() or candidate.is_dir()),
+                "is for histories, not for finished runs",
+                option,
+            )
+            for option, value in (
+                ("--align", align),
+                ("--until", until),
+                ("--scene", scene),
+                ("--plot", plot),
+            )
+        )
+    )
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import study
 

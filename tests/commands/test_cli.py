@@ -76,6 +76,7 @@ FILES = {
         (["compare", "a.csv", "b.csv", "--offset=1"], "--offset: is gone: --align SECONDS"),
         (["conformance", "--settings", "best"], "--settings: is gone: --set settings=best"),
         (["compare", "a", "b", "--all"], "--all: is gone: --json"),
+        (["compare", ".", ".", "--until", "1"], "--until: is for histories, not for finished runs"),
         (["simulate", "fig5a", "--plot=a.png"], "--plot: is gone: -o FILE.png"),
         (["spectrum", "fig8", "--force"], "--force: is gone: "),
         (["report", "out", "--against=ebm"], "--against: is gone: "),
