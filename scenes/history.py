@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict
+from pydantic import ConfigDict, FiniteFloat
 
-from rockcheck.scenes.base import MOST, Finite, Floats, Frozen, NonNegative, Positive, Shown
+from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.experience import Expected, expected, trust_of
@@ -418,7 +418,7 @@ class _About(Frozen):
     settings: Mapping[str, Any] = {}
     notes: tuple[Any, ...] = ()
     uncertainty: Mapping[str, NonNegative] = {}
-    cost: Mapping[str, int | Finite | Mapping[str, Any] | None] = {}
+    cost: Mapping[str, int | FiniteFloat | Mapping[str, Any] | None] = {}
 
 
 def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:
