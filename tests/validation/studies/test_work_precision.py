@@ -293,6 +293,7 @@ def test_the_finding_holds_every_table(tmp_path):
     done: dict[object, object] = {
         **{task: task.play() for task in tasks},
         Play("free", 0, "pybullet", 1e-2): pool.Failure("it blew up <fast>"),
+        **{Play(scene, 0, "cm", 1e-9, 1): pool.Failure("it sank") for scene in TWO_WALLS},
         Measure("batch", "friction"): batch_times("friction", 6),
         Measure("size", "3", 20): [batch_size(20, 3)],
         Measure("saving", "made"): [Saving("cm", "wall", "ms", 2.0, 1.0)],

@@ -415,7 +415,7 @@ def _converged(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
 
 
 def _over_step(frame: pd.DataFrame, levels: pd.DataFrame, form: float) -> Plot:
-    panels = []
+    panels, levels = [], levels[np.isfinite(levels.step)]  # without those of no run
     for reference in runs.REFERENCES:
         good = dict(runs.grouped(frame[np.isfinite(frame[reference])], "line", "family"))
         series = []
