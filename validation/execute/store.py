@@ -28,7 +28,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter
 
-from rockcheck.scenes import History, InputError, printable, reading, writing
+from rockcheck.scenes import History, InputError, errors, printable, reading, writing
 
 T = TypeVar("T")
 HISTORIES = "histories"
@@ -84,7 +84,10 @@ class Store:
         `history` is the content of the files; if given, it stays in memory.
         """
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
-        record = {**content, "files": hashes} if files else content
+        record = writing.mapped(  # as it is read
+            {**content, "files": hashes} if files else content,
+            lambda one: errors.inert(one) if isinstance(one, str) else one,
+        )
         text = json.dumps(
             {"content": record, "sha256": _seal(name, record)},
             sort_keys=True,
