@@ -95,8 +95,12 @@ def compare(
     cannot be computed is NaN, and its note says why. Raises `InputError` if a measure is unknown,
     the histories have no time in common, two different blocks without a `scene`, or others than it.
     """
-    for key, history in (("reference", reference), ("candidate", candidate)):
-        errors.check_kind(history, History, "simulate or History.load", key)
+    for key, value, kind, how in (
+        ("reference", reference, History, "simulate or History.load"),
+        ("candidate", candidate, History, "simulate or History.load"),
+        *([("scene", scene, Scene, "load_scene")] if scene is not None else []),
+    ):
+        errors.check_kind(value, kind, how, key)
     blocks = [one.block for one in (reference, candidate) if one.block is not None]
     said = (
         ", ".join(f"{key} = {value}" for key, value in one.model_dump(exclude_none=True).items())

@@ -315,6 +315,7 @@ def test_a_measured_history_may_lack_columns(made):
         (0.0, {"until": -1.0}, "until"),
         (0.0, {"until": 0.0}, "until"),
         (0.0, {"measures": ["rms"]}, "'rms' is not allowed: theta_rms, "),
+        (0.0, {"scene": "fig5a"}, "scene: 'fig5a' is not allowed: give a Scene"),
     ],
 )
 def test_bad_input_is_named(made, fault_of, late, more, said):
