@@ -616,8 +616,18 @@ class SuiteStudy(Study):
             )
         folder = self.store.folder / HISTORIES
         depends = [
-            [  # seals of what was played, not keys: a user's own model need not play alike again
-                [name, one and reading.read_json(folder / f"{one.kept_as}.json")["sha256"], windows]
+            [
+                [
+                    name,
+                    # a user's own model need not play alike again: the seal of what was played
+                    one
+                    and (
+                        reading.read_json(folder / f"{one.kept_as}.json")["sha256"]
+                        if models.is_own(one.variant.family)
+                        else one.key
+                    ),
+                    windows,
+                ]
                 for name, one, windows in (("", planned, {}), *asked)
             ],
             sorted(ends.items()),
