@@ -137,6 +137,10 @@ class Store:
                 path.touch()
         return content if whole else None
 
+    def seal_of(self, kind: str, name: str) -> str:
+        """The hash of what is kept under a name, with its files."""
+        return str(reading.read_json(self.folder / kind / f"{name}.json")["sha256"])
+
     def once(self, kind: str, name: str, form: Any, compute: Callable[[], T]) -> T:
         """The kept value of type `form`; computed and kept where it is missing or invalid."""
         adapter: TypeAdapter[T] = adapter_of(form)

@@ -30,7 +30,6 @@ from rockcheck.scenes import (
     Scene,
     errors,
     progress,
-    reading,
 )
 from rockcheck.validation.discrepancy import impact_laws, measures
 from rockcheck.validation.discrepancy.compare import compare, describe, evaluate, gap_of
@@ -614,7 +613,6 @@ class SuiteStudy(Study):
                 float,
                 partial(predictability_horizon, planned.scene),
             )
-        folder = self.store.folder / HISTORIES
         depends = [
             [
                 [
@@ -622,7 +620,7 @@ class SuiteStudy(Study):
                     # a user's own model need not play alike again: the seal of what was played
                     one
                     and (
-                        reading.read_json(folder / f"{one.kept_as}.json")["sha256"]
+                        self.store.seal_of(HISTORIES, one.kept_as)
                         if models.is_own(one.variant.family)
                         else one.key
                     ),
