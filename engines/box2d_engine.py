@@ -14,6 +14,9 @@ SUBSTEPS = 4  # of each step, as Box2D's manual has them
 #: At its best: the stiffness of a contact in cycles a step, its damping ratio, and the speed at
 #: which overlap is pushed out; slower approaches than the threshold do not bounce. Lengths in R.
 STIFFNESS, DAMPING, PUSH, THRESHOLD = 0.25, 10.0, 3.0, 1e-3
+#: At its best, Box2D's units of length in a block radius: contacts may overlap by 0.005 of its
+#: units, and what friction holds creeps while they do.
+SCALE = 10.0
 
 
 class _Box2DWorld(steps.World):
@@ -21,6 +24,8 @@ class _Box2DWorld(steps.World):
 
     #: Other values of the world's own parameters.
     parameters: ClassVar[Mapping[str, float]] = MappingProxyType({})
+    #: Half the thickness and half the extent of floor and walls.
+    slab, reach = SLAB, REACH
 
     def __init__(self, scene: Scene) -> None:
         import pyb2d3
@@ -28,8 +33,8 @@ class _Box2DWorld(steps.World):
         self.world = pyb2d3.World(gravity=(0.0, 0.0), **self.parameters)
         # Of two frictions the geometric mean counts, of two restitutions the larger.
         for face in contacts.surfaces_of(scene):
-            slab = self.world.create_static_body(position=face.behind(SLAB))
-            width, _, height = face.extent(SLAB, REACH)
+            slab = self.world.create_static_body(position=face.behind(self.slab))
+            width, _, height = face.extent(self.slab, self.reach)
             stuff = pyb2d3.surface_material(friction=face.friction, restitution=face.restitution)
             slab.create_shape(pyb2d3.shape_def(material=stuff), pyb2d3.box(width, height))
         self.body = self.world.create_dynamic_body(position=(0.0, scene.block.half_height))
@@ -65,17 +70,32 @@ class _Box2DWorld(steps.World):
 class _RigidBox2DWorld(_Box2DWorld):
     """Contacts as stiff as a step allows, bouncing at any speed; a block that never sleeps.
 
+    A state is in block radii, the world `SCALE` times as large.
+
     Small blocks are faster than Box2D lets them be, in R a second.
     """
 
-    parameters = MappingProxyType({"restitution_threshold": THRESHOLD, "maximum_linear_speed": 1e6})
+    parameters = MappingProxyType(
+        {"restitution_threshold": THRESHOLD * SCALE, "maximum_linear_speed": 1e6}
+    )
+    slab, reach = SCALE * SLAB, SCALE * REACH
 
     def __init__(self, scene: Scene) -> None:
-        super().__init__(scene)
+        super().__init__(steps.in_units_of(1.0 / SCALE, scene))
         self.world.sleeping_enabled = False
 
+    def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
+        super().place(SCALE * x, SCALE * y, theta, SCALE * vx, SCALE * vy, w)
+
+    def step(self, felt: tuple[float, float], dt: float) -> None:
+        super().step((SCALE * felt[0], SCALE * felt[1]), dt)
+
+    def state(self) -> steps.State:
+        x, y, theta, vx, vy, w = super().state()
+        return x / SCALE, y / SCALE, theta, vx / SCALE, vy / SCALE, w
+
     def ready(self, dt: float) -> None:
-        self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, PUSH)
+        self.world.set_contact_tuning(STIFFNESS / dt, DAMPING, SCALE * PUSH)
 
 
 class Box2D(Engine):

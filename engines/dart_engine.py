@@ -89,6 +89,8 @@ class _RigidDartWorld(_DartWorld):
     In its units even slow contacts bounce.
     """
 
+    embedding = steps.EMBEDDED
+
     def __init__(self, scene: Scene, iterative: bool = False) -> None:
         super().__init__(scene, NATURAL_SPEED / math.sqrt(scene.gravity * scene.block.radius))
         solver = self.world.getConstraintSolver()

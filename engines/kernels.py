@@ -300,6 +300,7 @@ def step(run: March, course: Course, kicked: Velocity, row: Floats) -> int:
     put_back(run, course)
     if not known and (run.closed[0] or run.closed[1]) and settles(z, course):
         z[Y], z[THETA], z[VY], z[W] = course.standing, 0.0, 0.0, 0.0
+        z[AY] = z[SPIN] = 0.0  # what stopped it in this step does not go on in the next
     z[KNOWN] = run.asked[IMPACT] == 0.0 and z[STOPS] == 0.0
     z[PAST_DT] = dt
     run.before[:] = run.closed

@@ -130,6 +130,7 @@ class _RigidMuJoCoWorld(MuJoCoWorld):
     """
 
     inset = CORNER_RADIUS
+    embedding = steps.EMBEDDED
 
     def __init__(self, scene: Scene, corrected: bool = True) -> None:
         super().__init__(scene)

@@ -155,6 +155,10 @@ class _RigidPyBulletWorld(_PyBulletWorld):
     def ready(self, dt: float) -> None:
         self.bounce(True)
         self.bullet.setPhysicsEngineParameter(contactERP=self.erp, **self.options)
+        # Rounding leaves a resting corner so far up, and it would fall freely for a step.
+        self.bullet.changeDynamics(
+            self.body, -1, contactProcessingThreshold=steps.EMBEDDED, **self.options
+        )
 
     def bounce(self, bouncing: bool) -> None:
         if bouncing is not self.bouncing and (self.bounces or self.bouncing is None):

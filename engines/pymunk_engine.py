@@ -58,6 +58,7 @@ class _RigidPymunkWorld(_PymunkWorld):
     """Contacts without slop, solved to convergence."""
 
     slab = SLAB
+    embedding = steps.EMBEDDED
 
     def __init__(self, scene: Scene) -> None:
         super().__init__(scene)

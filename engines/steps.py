@@ -32,6 +32,8 @@ STEPS_AT_ONCE = 2048
 LYING = math.pi / 2 - 1e-6
 #: Rows of an adaptive march for which there is room at first.
 ROOM = 8192
+#: An `embedding` of a world whose lengths are in block radii.
+EMBEDDED = 1e-9
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 
@@ -41,6 +43,10 @@ class World(ABC):
     A state is x, y, theta of the mass's centre and their rates, x = 0 where the centre of the box
     stands first; theta is counterclockwise positive.
     """
+
+    #: How deep a block that begins on the floor is put at fixed steps, in lengths: an engine that
+    #: sees only contacts that overlap would let it fall freely for its first step.
+    embedding: ClassVar[float] = 0.0
 
     @abstractmethod
     def place(self, x: float, y: float, theta: float, vx: float, vy: float, w: float) -> None:
@@ -108,8 +114,11 @@ def march_fixed(world: World, scene: Scene, times: Floats, felt: Floats) -> Marc
     The first state in which the block lies is the last one returned. Raises `ModelFailure` if the
     motion blows up or the block falls through the floor.
     """
-    pieces = [kinematics.of_mass(scene.block, np.array(scene.initial_state))[None, :]]
-    world.place(*pieces[0][0].tolist())
+    first_state = kinematics.of_mass(scene.block, np.array(scene.initial_state))
+    pieces = [first_state[None, :]]
+    x, y, *rest = first_state.tolist()
+    depth = world.embedding if scene.initial_height == 0.0 else 0.0
+    world.place(x, y - depth, *rest)
     for first in range(0, len(felt), STEPS_AT_ONCE):
         progress.tell(first, len(felt))
         some, dt = felt[first : first + STEPS_AT_ONCE], float(times[1])

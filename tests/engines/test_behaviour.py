@@ -309,6 +309,7 @@ class Scripted(Engine):
     def rigid_world(self, scene):
         return SimpleNamespace(
             **dict.fromkeys(("place", "close", "ready", "step"), lambda *given: None),
+            embedding=0.0,
             **self.answers,
         )
 
@@ -372,3 +373,45 @@ def test_a_march_loads_its_compiled_step_before_its_clock_starts(monkeypatch):
     )
     monkeypatch.delattr(compiled, "for_types_of")
     assert len(march()[0]) > 1
+
+
+@pytest.mark.parametrize("step", [1e-3, "adaptive"])
+def test_a_second_flush_hit_leaves_a_cube_flat(bouncing_engine, step):
+    """Both corners of a side meet the wall at one moment: Newton's law has one answer for both."""
+    if step == "adaptive" and bouncing_engine.fixed_because:
+        return
+    walls = [Wall(side=side, gap=0.1, restitution=1.0) for side in ("left", "right")]
+    scene = Scene(
+        name="to and fro",
+        block=Block(half_width=0.5, half_height=0.5),
+        floor=Floor(friction=0.0),
+        walls=walls,
+        initial_velocity=-1.0,
+        duration=0.45,
+    )
+    motion = bouncing_engine(time_step=step).simulate(scene).channels
+    assert np.max(np.abs(motion["theta"])) < 1e-7
+    assert np.max(motion["y"]) - 0.5 < 1e-8
+    assert motion["x_dot"][-1] == pytest.approx(-1.0, abs=2e-3)
+
+
+def test_what_stands_does_not_fall_in_its_first_step(double_engine):
+    """In one step of a user's engine, 1/240 s, what falls freely falls by 0.17 mm."""
+    scene = free_rocking(0.0, duration=0.5)
+    motion = double_engine(time_step=1.0 / 240.0).simulate(scene).channels
+    assert np.max(scene.block.half_height - motion["y"]) < 8e-5
+
+
+@pytest.mark.needs("pybullet")
+def test_pybullets_friction_holds_at_a_users_step():
+    """A corner that rounding lifts by 1e-13 m touches all the same."""
+    push = Record.from_samples([-0.36 * 9.81] * 2, time_step=5.0)
+    scene = Scene(
+        name="held",
+        block=Block(half_width=1.0, half_height=0.5),
+        floor=Floor(friction=0.4),
+        excitation=push,
+        duration=5.0,
+    )
+    x = PyBullet(time_step=1.0 / 240.0).simulate(scene).channels["x"]
+    assert np.max(np.abs(x)) < 1e-10
