@@ -10,9 +10,11 @@ from rockcheck.scenes.base import (
 )
 from rockcheck.scenes.block import Block, Pivot as Pivot, Side as Side
 from rockcheck.scenes.errors import InputError, ModelFailure, printable as printable
+from rockcheck.scenes.events import Event
 from rockcheck.scenes.excitations import Excitation as Excitation, Record, Rest, Ricker, Sine
+from rockcheck.scenes.extremes import Extremes as Extremes, WallExtremes as WallExtremes
 from rockcheck.scenes.files import load_scene, named_scenes
-from rockcheck.scenes.history import Cost, Event, History
+from rockcheck.scenes.history import Cost, History
 from rockcheck.scenes.scene import PAPER_BLOCK as PAPER_BLOCK, Floor, Scene, Wall
 
 # Public names; the others are for the packages above.

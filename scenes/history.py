@@ -21,7 +21,10 @@ from pydantic import ConfigDict, FiniteFloat
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.errors import InputError, printable, refuse
+from rockcheck.scenes.events import Event
 from rockcheck.scenes.experience import Expected, expected, trust_of
+from rockcheck.scenes.extremes import Extremes
+from rockcheck.scenes.interpolation import from_rows
 from rockcheck.scenes.reading import read_table
 from rockcheck.scenes.writing import columns_text, json_text, write_together
 
@@ -64,20 +67,6 @@ MEANINGS = {name: (name, 1.0) for name in COLUMNS} | {
 }
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Event:
-    """One change of contact or mode at time `t` (s).
-
-    `impulse` is per unit mass in m/s; 0 without an impact.
-    """
-
-    t: float
-    kind: str
-    mode_before: str = ""
-    mode_after: str = ""
-    impulse: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +117,8 @@ class History(Shown):
     #: Half width of the 95 % interval by measure (SI), of figures with an uncertain source, such as
     #: a mean of tests.
     uncertainty: Mapping[str, float] = field(default_factory=dict)
+    #: The extremes that the model kept while it played; None for a measured or loaded history.
+    model_extremes: Extremes | None = field(default=None, repr=False)
 
     @cached_property
     def frame(self) -> pd.DataFrame:
@@ -144,6 +135,17 @@ class History(Shown):
         import pandas as pd
 
         return pd.DataFrame(self._event_columns())
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """The extremes of the whole run: from the model, or between the rows of a table.
+
+        Of a history that was measured or loaded they know no walls: `extremes.from_rows` takes
+        these from a scene.
+        """
+        if self.model_extremes is not None:
+            return self.model_extremes
+        return from_rows(self.channels, self.event_list, self.block, self.outcome)
 
     @property
     def alpha(self) -> float | None:
