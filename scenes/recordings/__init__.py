@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from rockcheck.scenes.errors import InputError, printable, refuse
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.formats import (
     AT2_HEADER,
@@ -31,11 +31,13 @@ from rockcheck.scenes.recordings.formats import (
 from rockcheck.scenes.recordings.recording import (
     GRAVITY_OF_RECORDS,
     UNITS,
+    Contradiction,
     Reading,
     Recording,
     option,
     place_of,
 )
+from rockcheck.scenes.recordings.stated import size_notes
 from rockcheck.scenes.recordings.tables import read_table
 
 __all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_components", "read_record"]
@@ -75,30 +77,43 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
         }
         fits = next((reader for reader, fit in by_content.items() if fit), read_table)
         read = _BY_NAME.get(path.suffix.lower(), fits)
-        refuse(
-            *(
-                (
-                    getattr(asked, name) is not None,
-                    f"is {_WITH_HEADER[read]}, which says by itself where its numbers stand; leave"
-                    f" the option {name} out",
-                    "",
-                )
-                for name in ("column", "header_lines", "decimal")
-                if read in _WITH_HEADER
-            )
-        )
-        found = [
-            replace(one, samples=0.0 - one.samples, notes=(*one.notes, "turned, up is positive"))
-            if one.component.lower() in ("down", "dwn", "dn")  # what is positive in the file
-            else one
-            for one in read(lines, asked)
-        ]
+        if read in _WITH_HEADER:
+            _check_options(_WITH_HEADER[read], asked)
+        found = [_finished(recording, asked) for recording in read(lines, asked)]
         if asked.component is None:
             return found
         names = [one.component for one in found]
         return [found[place_of("component", asked.component, names, _listed(found))]]
+    except Contradiction as error:
+        raise Contradiction(_placed(path, error), error.option) from None
     except InputError as error:
-        raise InputError(f"{printable(path)}{', ' if error.key else ': '}{error}") from None
+        raise InputError(_placed(path, error)) from None
+
+
+def _placed(path: Path, error: InputError) -> str:
+    """The message of `error` with its file, before the line where it names one."""
+    return f"{printable(path)}{', ' if error.key else ': '}{error}"
+
+
+def _check_options(form: str, reading: Reading) -> None:
+    """Raise `InputError` for options of tables, where the format has a header."""
+    for name in ("column", "header_lines", "decimal", "order"):
+        if getattr(reading, name) is not None:
+            raise Contradiction(
+                f"is {form}, which says by itself where its numbers stand; leave the option {name}"
+                " out",
+                name,
+            )
+
+
+def _finished(recording: Recording, reading: Reading) -> Recording:
+    """The recording with its vertical component upwards, and its peak judged."""
+    notes = (*recording.notes, *size_notes(recording, reading))
+    if recording.component.lower() not in ("down", "dwn", "dn"):  # what is positive in the file
+        return replace(recording, notes=notes)
+    return replace(
+        recording, samples=0.0 - recording.samples, notes=(*notes, "turned, up is positive")
+    )
 
 
 def read_record(path: Path, reading: Reading | None = None) -> Recording:

@@ -4,12 +4,12 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, StringConstraints
+from pydantic import Field, Strict, StringConstraints, model_validator
 
 from rockcheck.scenes.base import LEAST, MOST, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, printable, refuse
+from rockcheck.scenes.errors import InputError, printable
 
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000
@@ -36,6 +36,8 @@ _SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} 
 }
 _SPELT = {unit: re.compile(pattern, re.IGNORECASE) for unit, pattern in _SPELLINGS.items()}
 
+#: Options that may overrule what a file states.
+OVERRIDABLE = ("unit", "time_step", "order")
 Word = Annotated[str, StringConstraints(min_length=1, max_length=100)]
 Place = Annotated[int, Strict(), Field(ge=1, le=1000)]
 
@@ -43,7 +45,8 @@ Place = Annotated[int, Strict(), Field(ge=1, le=1000)]
 class Reading(Frozen):
     """Options of a reader: values that a record file does not state, and the part to read.
 
-    None: as the file says.
+    None: as the file says. A value that differs from what the file states is an error, unless an
+    exclamation mark follows it, as in `unit="g!"`: then it holds, and a note says so.
 
     | option | meaning |
     |---|---|
@@ -52,7 +55,9 @@ class Reading(Frozen):
     | `column` | of a table: the column of accelerations, its number from 1 or its name |
     | `header_lines` | of a table: number of first lines without data |
     | `decimal` | of a table: the decimal separator |
+    | `order` | of a table without times: whether numbers run along the lines, or down the columns |
     | `component` | of a file with several: its number from 1 or its name |
+    | `overriding` | names of the options that were given with an exclamation mark |
     """
 
     unit: Unit | None = None
@@ -60,7 +65,27 @@ class Reading(Frozen):
     column: Place | Word | None = None
     header_lines: Annotated[int, Strict(), Field(ge=0, le=10_000)] | None = None
     decimal: Literal[".", ","] | None = None
+    order: Literal["rows", "columns"] | None = None
     component: Place | Word | None = None
+    overriding: tuple[Literal["unit", "time_step", "order"], ...] = ()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _take_marks(cls, data: Any) -> Any:
+        """Turn the mark of `unit="g!"` into an entry of `overriding`."""
+        if not isinstance(data, dict):
+            return data
+        marked = {
+            name: data[name].removesuffix("!").strip()
+            for name in OVERRIDABLE
+            if isinstance(data.get(name), str) and data[name].endswith("!")
+        }
+        if not marked:
+            return data
+        if "time_step" in marked and is_number(marked["time_step"]):
+            marked["time_step"] = float(marked["time_step"].translate(_EXPONENT))
+        overriding = (*data.get("overriding", ()), *marked)
+        return {**data, **marked, "overriding": tuple(dict.fromkeys(overriding))}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,6 +103,14 @@ class Recording:
     form: str
     component: str = ""
     notes: tuple[str, ...] = ()
+
+
+class Contradiction(InputError):
+    """An option that contradicts what the file states; `option` is its name."""
+
+    def __init__(self, message: str, option: str, key: str = "") -> None:
+        self.option = option
+        super().__init__(message, key)
 
 
 def fault(said: str, line: int | None = None) -> InputError:
@@ -160,35 +193,42 @@ def known_unit(text: str) -> str:
 def settled_unit(stated: str, reading: Reading) -> str:
     """The unit of the file: stated in it, or given by `reading`.
 
-    Raises `InputError` where it is neither, and where the two differ.
+    Raises `InputError` where it is neither, and where the two differ, unless that of `reading` is
+    to override the file's.
     """
-    refuse(
-        (
-            not stated and reading.unit is None,
+    if reading.unit is None:
+        if stated:
+            return stated
+        raise fault(
             f"the unit of acceleration is not stated; give it: {option('unit', 'g')}, or one of"
-            f" {', '.join(UNITS)}",
-            "",
-        ),
-        (
-            stated and reading.unit and UNITS[stated] != UNITS[reading.unit],
-            f"the file states the unit {stated}, not {reading.unit}; leave the option unit out",
-            "",
-        ),
-    )
-    return stated or str(reading.unit)
+            f" {', '.join(UNITS)}"
+        )
+    if not stated or "unit" in reading.overriding:
+        return reading.unit
+    if UNITS[stated] != UNITS[reading.unit]:
+        raise Contradiction(
+            f"the file states the unit {stated}, not {reading.unit}; leave the option unit out, or"
+            f" override the file: {option('unit', f'{reading.unit}!')}",
+            "unit",
+        )
+    return stated
 
 
 def settled_step(stated: float, reading: Reading) -> float:
     """The time step in s that a header states.
 
-    Raises `InputError` where `reading` gives another.
+    Raises `InputError` where `reading` gives another that is not to override it.
     """
-    if reading.time_step is not None and abs(stated - reading.time_step) > 1e-6 * stated:
-        raise fault(
-            f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the"
-            " option time_step out",
-        )
-    return stated
+    if reading.time_step is None or abs(stated - reading.time_step) <= 1e-6 * stated:
+        return stated
+    if "time_step" in reading.overriding:
+        return reading.time_step
+    override = option("time_step", f"{reading.time_step:g}!")
+    raise Contradiction(
+        f"the file states a time step of {stated:g} s, not {reading.time_step:g} s; leave the"
+        f" option time_step out, or override the file: {override}",
+        "time_step",
+    )
 
 
 def checked_count(line: int, name: str, count: str) -> int:
