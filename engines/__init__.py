@@ -1,5 +1,9 @@
 """Physics engines as models of a rocking block: each plays a scene with box, floor and walls."""
 
+if __name__ == "engines":  # found in the folder of the sources: it would be a second copy
+    raise ImportError("engines is a part of rockcheck: import rockcheck.engines")
+
+
 from rockcheck.engines.box2d_engine import Box2D
 from rockcheck.engines.dart_engine import Dart
 from rockcheck.engines.drake_engine import Drake

@@ -1,5 +1,9 @@
 """The contract that every model signs: a Scene goes in, a History comes out."""
 
+if __name__ == "scenes":  # found in the folder of the sources: it would be a second copy
+    raise ImportError("scenes is a part of rockcheck: import rockcheck.scenes")
+
+
 from rockcheck.scenes.base import (
     Finite as Finite,
     Floats as Floats,
