@@ -17,7 +17,7 @@ from rockcheck.validation.finding import Column, Finding, Made, Table, text
 UNITS = (("wall", "wall clock"), ("cpu", "CPU"))
 COMMANDS = {
     "simulate fig5a --model ebm-unilateral": "one history of 36 s",
-    "validate smoke --out smoke": "five scenes, five models",
+    "validate smoke --out smoke": "six scenes, five models",
     "validate smoke --out smoke --quiet": "the same, read back",
     "validate paper --out paper": "the paper's scenes",
     "assess fig5a --out assess": "one scene, how sure and by hand methods",

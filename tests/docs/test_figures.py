@@ -8,6 +8,7 @@ import experience
 import gallery
 import hostile
 import numpy as np
+import planted
 import pytest
 import whole_runs
 
@@ -219,6 +220,7 @@ def test_the_models_bias_and_scatter():
 
 def test_counts_that_are_stated():
     assert sum(1 for _ in hostile.cases()) == 211
+    assert len(planted.FAULTS) == 37
 
 
 def test_experience_is_learnt_from_a_run(tmp_path):

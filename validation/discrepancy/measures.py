@@ -17,7 +17,7 @@ import numpy as np
 import scipy  # it loads its parts as they are used
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Floats, Pivot, Scene, kinematics
+from rockcheck.scenes import Event, Floats, Pivot, Scene, kinematics
 from rockcheck.validation.criteria import quarter_period
 from rockcheck.validation.discrepancy import figures
 
@@ -80,6 +80,39 @@ def _impact_time(pair: figures.Pair) -> tuple[float, str]:
     return abs(second.t - first.t), f"{first.kind} at {first.t:.3f} s"
 
 
+def _impulse(pair: figures.Pair) -> figures.Value:
+    pairs, *_ = pair.impacts
+    of_reference, of_candidate = (
+        figures.WindowedHistory(history).events(*figures.IMPACTS)
+        for history in (pair.reference, pair.candidate)
+    )
+    strongest = dict.fromkeys(figures.IMPACTS, 0.0)
+    for impact, _ in pairs:
+        strongest[impact.kind] = max(strongest.get(impact.kind, 0.0), abs(impact.impulse))
+    errors = [
+        (abs(other.impulse - impact.impulse) / strongest[impact.kind], impact)
+        for impact, other in pairs
+        if strongest[impact.kind] > 0.0
+        and _strikes_alone(impact, of_reference)
+        and _strikes_alone(other, of_candidate)
+    ]
+    if not errors:
+        return 0.0, "no impact of one contact alone has a counterpart"
+    largest, impact = max(errors, key=lambda error: error[0])
+    return largest, f"{impact.kind} at {impact.t:.3f} s"
+
+
+def _strikes_alone(impact: Event, impacts: Sequence[Event]) -> bool:
+    """Whether no contact of another kind is struck at that instant.
+
+    How several contacts share an impulse the motion does not say.
+    """
+    return not any(
+        other.kind != impact.kind and abs(other.t - impact.t) <= figures.ONE_IMPACT
+        for other in impacts
+    )
+
+
 def _overturning_time(pair: figures.Pair) -> float:
     first, second = (
         math.inf if one.overturned_at is None else one.overturned_at
@@ -112,6 +145,18 @@ def _iso_18571(pair: figures.Pair) -> float:
     )
     return float(
         ISO18571(reference, candidate, dt=float(grid[1] - grid[0])).overall_rating(ndigits=-1)
+    )
+
+
+def _column_rms(name: str, label: str, column: str, unit: str, formula: str) -> figures.Measure:
+    """The RMS difference of a column; computed where a suite asks for it."""
+    return figures.Measure(
+        name,
+        f"RMS difference of {label}",
+        unit,
+        f"sqrt <d^2> of {formula}, {unit}.",
+        lambda pair: pair.rms(pair.channels(column)),
+        on_request=True,
     )
 
 
@@ -159,6 +204,19 @@ DIFFERENCES = figures.by_name(
         " jumps, see `theta_hausdorff`.",
         lambda pair: _peak(pair.channels("slip_rate")),
     ),
+    _column_rms("rotation_rate_rms", "rotation rate", "theta_dot", "rad/s", "the rate of rotation"),
+    _column_rms(
+        "x_velocity_rms",
+        "horizontal velocity",
+        "x_dot",
+        "m/s",
+        "the centroid's horizontal velocity",
+    ),
+    _column_rms(
+        "y_velocity_rms", "vertical velocity", "y_dot", "m/s", "the centroid's vertical velocity"
+    ),
+    _column_rms("y_rms", "y", "y", "m", "the centroid's y"),
+    _column_rms("slip_rms", "slip", "slip", "m", "the pivot corner's place along the floor"),
     figures.Measure(
         "energy_rms",
         "RMS difference of energy",
@@ -246,6 +304,16 @@ DIFFERENCES = figures.by_name(
         "max |t_c - t_r| over the impacts that have a counterpart, matched as in"
         " `events_agree_until`, s.",
         _impact_time,
+    ),
+    figures.Measure(
+        "impulse_error",
+        "largest error of impulse",
+        "1",
+        "max |J_c - J_r| over the impacts that have a counterpart, over the strongest of them of"
+        " its kind; matched as in `events_agree_until`.\n\nWithout those at which floor and wall"
+        " are struck within 2 ms: how the two share an impulse the motion does not say.",
+        _impulse,
+        on_request=True,
     ),
     figures.Measure(
         "overturning_time",

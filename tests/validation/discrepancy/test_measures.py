@@ -262,6 +262,51 @@ def test_events_agree_until_the_first_without_counterpart(made, end, said, alone
     )
 
 
+@pytest.mark.parametrize(
+    ("measure", "column"),
+    [
+        ("rotation_rate_rms", "theta_dot"),
+        ("x_velocity_rms", "x_dot"),
+        ("y_velocity_rms", "y_dot"),
+        ("y_rms", "y"),
+        ("slip_rms", "slip"),
+    ],
+)
+def test_a_suite_may_ask_for_each_column(made, measure, column):
+    reference = made(WAVE, T)
+    channels = reference.channels | {column: reference.channels[column] + 0.02}
+    candidate = dataclasses.replace(reference, channels=channels)
+    found = compare(reference, candidate, measures=[measure])
+    assert found[measure] == pytest.approx(0.02, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("candidate", "error"),
+    [
+        ([impact(1.0, 2.0), impact(2.0, 0.5)], 0.0),
+        ([impact(1.0, 1.0), impact(2.0, 0.25)], 0.5),  # halved
+        ([impact(1.0, -2.0), impact(2.0, -0.5)], 2.0),  # of the other sign
+        ([impact(1.0, 2.0), impact(2.0, 0.7)], 0.1),  # of the strongest, not of its counterpart
+        ([impact(1.0, 2.0)], 0.0),  # without a counterpart: of `unmatched_impacts`
+        ([], math.nan),
+    ],
+)
+def test_errors_of_impulses_count_against_the_strongest(made, candidate, error):
+    reference = [impact(1.0, 2.0), impact(2.0, 0.5)]
+    histories = (made(WAVE, T, events=events) for events in (reference, candidate))
+    found = compare(*histories, measures=["impulse_error"])
+    assert found["impulse_error"] == pytest.approx(error, nan_ok=True)
+
+
+@pytest.mark.parametrize(("apart", "error"), [(0.001, 0.0), (0.003, 0.5)])
+def test_an_impulse_that_floor_and_wall_share_is_not_compared(made, apart, error):
+    reference = [impact(1.0, 2.0), impact(2.0, 1.0)]
+    candidate = [impact(1.0, 2.0), impact(2.0, 0.0), impact(2.0 + apart, 1.0, "wall impact")]
+    histories = (made(WAVE, T, events=events) for events in (reference, candidate))
+    found = compare(*histories, measures=["impulse_error"])
+    assert found["impulse_error"] == pytest.approx(error)
+
+
 def test_matching_takes_the_nearest_and_each_once():
     found = match_impacts(
         [impact(4.004, 0.001), *(impact(t) for t in (0.08, 0.12, 1.0, 1.012, 2.0, 3.02, 4.0))],
