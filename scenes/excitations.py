@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import refuse
+from rockcheck.scenes.errors import InputError, refuse
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 #: Largest peak acceleration that a record may be scaled to, g.
@@ -162,6 +162,8 @@ class Record(Motion):
                     "file",
                 ),
             )
+            if data.get("scale") == 0:
+                raise InputError("0 leaves nothing of the record: give another scale", "scale")
             options = data.keys() & Reading.model_fields
             found = read_record(Path(path), Reading(**{name: data[name] for name in options}))
             data = {key: data[key] for key in data if key not in (*options, "file")} | {

@@ -125,7 +125,8 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
     """
     vertical = [name for name in names if not isinstance(name, sets.Odd)]
     said = f"{', '.join(vertical)} ({'; '.join(filter(None, ['vertical', hint]))})"
-    for line in [*([said] if vertical else []), *(n for n in names if isinstance(n, sets.Odd))]:
+    odd = sets.grouped(name for name in names if isinstance(name, sets.Odd))
+    for line in [*([said] if vertical else []), *odd]:
         console().print(f"left out: {line}", style="yellow", soft_wrap=True)
 
 

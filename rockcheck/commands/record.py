@@ -1,6 +1,6 @@
 """`rockcheck record`: how a file of a recorded ground motion was read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,7 +18,7 @@ from rockcheck.commands import (
 from rockcheck.reports.style import save_as
 from rockcheck.scenes import InputError, printable, recordings
 from rockcheck.scenes.recordings import sets
-from rockcheck.validation.finding import Finding, Table, Text, text
+from rockcheck.validation.finding import Column, Finding, Table, Text, text
 from rockcheck.validation.suite import motions
 
 ReadOption = Annotated[
@@ -28,8 +28,9 @@ ReadOption = Annotated[
         metavar="KEY=VALUE",
         help="What a file does not say of itself, or which part of it is wanted; repeatable. unit:"
         f" {', '.join(recordings.UNITS)}; time_step, s; column: that of the accelerations, its"
-        " number from 1, or its name; header_lines to skip; decimal: . or ,; component: its number"
-        " from 1, or its name.",
+        " number from 1, or its name; order: rows where numbers run along the lines; header_lines"
+        " to skip; decimal: . or ,; component: its number from 1, or its name. unit=g! overrides"
+        " what the file states.",
     ),
 ]
 
@@ -49,39 +50,64 @@ def run(
     """Show what files of recorded ground motions hold.
 
     Reads PEER AT2, COSMOS and CSMIP V2, ESM, K-NET and KiK-net, CSV and columns of text; what a
-    file does not say is given by --read. --plot draws acceleration, velocity and Sa(T).
+    file does not say is given by --read. --plot draws acceleration, velocity and Sa(T). Of several
+    files a line each; files of a folder that are no records are left out.
     """
     from rockcheck.reports import document
 
     if plot is not None:
         check_file(plot, "--plot")
     reading = recordings.Reading(**settings_of(read or (), "--read"))
-    asked = sets.files_of(files)
-    known, faults = sets.read_files(dict.fromkeys(asked, False), reading)
-    found = [(path, *one) for path, components in known.items() for one in components]
-    told = [_finding(path, record) for path, _, record in found]
-    for one in told:
-        document.show(one, console())
-    if plot is not None and found:
+    paths = sets.files_of(files)
+    components, faults = sets.read_files(paths, reading, keep_going=True)
+    motions = [
+        (path, name, recording) for path, pairs in components.items() for name, recording in pairs
+    ]
+    values = [_value(path, recording) for path, _, recording in motions]
+    findings = [_overview([name for _, name, _ in motions], values)]
+    if len(components) < 2:
+        findings = [
+            _details(path, recording, value)
+            for (path, _, recording), value in zip(motions, values, strict=True)
+        ]
+    for finding in findings:
+        document.show(finding, console())
+    if plot is not None and motions:
         from rockcheck.reports.show.drawing import recordings_figure
 
-        figure = recordings_figure([(name, one) for _, name, one in found[:12]])
+        figure = recordings_figure([(name, recording) for _, name, recording in motions[:12]])
         console().print(f"figure: {save_as(figure, plot)}", soft_wrap=True)
-    if found:
-        values = [one.data for one in told]
-        answer(values[0] if len(values) == 1 else {"records": values})
-    if faults:
-        tell_left_out([*map(sets.Odd, faults[1:])])
-        more = f"; {len(faults)} files of {len(asked)} are not read" * (len(faults) > 1)
-        raise InputError(f"{faults[0]}{more}")
+    if motions:
+        answer(_result(values, faults))
+    _tell_faults(paths, faults, is_empty=not motions)
 
 
-def _finding(path: Path, record: recordings.Recording) -> Finding:
-    # The largest acceleration in each part of the motion, as bars.
-    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
-    peaks = np.array([np.max(part) for part in parts])
-    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
-    value: dict[str, Any] = {
+def _result(values: Sequence[dict[str, Any]], faults: Sequence[InputError]) -> dict[str, Any]:
+    """The records as JSON, and the faults of files that are no records."""
+    result: dict[str, Any] = values[0] if len(values) == 1 else {"records": values}
+    return result | ({"left_out": [*map(str, faults)]} if faults else {})
+
+
+def _tell_faults(
+    paths: Mapping[Path, bool], faults: Sequence[InputError], *, is_empty: bool
+) -> None:
+    """Print what is left out.
+
+    Raises the fault of a file that was named itself, and where no record was read.
+    """
+    named = {f"{printable(path)}" for path, is_named in paths.items() if is_named}
+    bad = [fault for fault in faults if str(fault).startswith(tuple(named))] if named else []
+    raised = [*bad, *faults][:1] if bad or is_empty else []
+    tell_left_out([sets.Odd(fault) for fault in faults if fault not in raised])
+    if raised:
+        more = f"; {len(faults)} files of {len(paths)} are not read" * (len(faults) > 1)
+        raise InputError(f"{raised[0]}{more}")
+
+
+def _value(path: Path, record: recordings.Recording) -> dict[str, Any]:
+    """What is known of a record, as JSON."""
+    intensity = recordings.intensity
+    return {
         "file": path,
         "format": record.form,
         "component": record.component,
@@ -89,16 +115,48 @@ def _finding(path: Path, record: recordings.Recording) -> Finding:
         "step_s": record.time_step,
         "duration_s": record.time_step * (len(record.samples) - 1),
         "unit": record.unit,
-        "pga_g": recordings.intensity.peak_acceleration(record),
-        "pgv_m_s": recordings.intensity.peak_velocity(record),
-        "arias_m_s": recordings.intensity.arias(record),
+        "pga_g": intensity.peak_acceleration(record),
+        "pgv_m_s": intensity.peak_velocity(record),
+        "arias_m_s": intensity.arias(record),
         "sa_g": {
-            f"{period:g}": recordings.intensity.spectral_acceleration(record, period)
-            for period in recordings.intensity.PERIODS
+            f"{period:g}": intensity.spectral_acceleration(record, period)
+            for period in intensity.PERIODS
         },
         "notes": record.notes,
     }
 
+
+def _overview(names: Sequence[str], values: Sequence[Mapping[str, Any]]) -> Finding:
+    """A row for each record, and each note once."""
+    columns = [
+        text("record"),
+        Column("samples", digits=8),
+        Column("step", unit="s", digits=6),
+        Column("duration", unit="s", digits=6),
+        text("unit"),
+        Column("PGA", unit="g", digits=4),
+        Column("PGV", unit="m/s", digits=3),
+    ]
+    keys = ("samples", "step_s", "duration_s", "unit", "pga_g", "pgv_m_s")
+    rows = [
+        [printable(name), *(value[key] for key in keys)]
+        for name, value in zip(names, values, strict=True)
+    ]
+    notes = sets.grouped(
+        f"{name}: {printable(note, 200)}"
+        for name, value in zip(names, values, strict=True)
+        for note in value["notes"]
+    )
+    table = Table("records", columns, rows, most=len(rows))
+    lines = Text("", items=[f"note: {note}" for note in notes])
+    return Finding("record", "records", "", [table, lines], {"records": values})
+
+
+def _details(path: Path, record: recordings.Recording, value: Mapping[str, Any]) -> Finding:
+    """All that is known of one record, with a line that pictures its accelerations."""
+    parts = np.array_split(np.abs(record.samples), min(_PARTS, len(record.samples)))
+    peaks = np.array([np.max(part) for part in parts])
+    levels = np.ceil(peaks / (np.max(peaks) or 1.0) * (len(_MARKS) - 1)).astype(int)
     rows = [
         ("format", f"{value['format']}, unit {value['unit']}"),
         (
@@ -119,11 +177,11 @@ def _finding(path: Path, record: recordings.Recording) -> Finding:
 
 def record_sets(records: Sequence[str], read: Sequence[str]) -> list[motions.RecordSet]:
     """The records, and how they are read. Raises `InputError`."""
-    given = settings_of(read, "--read")
-    if given and not records:
+    config = settings_of(read, "--read")
+    if config and not records:
         raise InputError("needs records", "--read")
-    scale, vertical = given.pop("scale", 1.0), given.pop("vertical", False)
-    reading = {name: value for name, value in recordings.Reading(**given) if value is not None}
+    scale, vertical = config.pop("scale", 1.0), config.pop("vertical", False)
+    reading = {name: value for name, value in recordings.Reading(**config) if value is not None}
     files = tuple(str(sets.record_path(word, Path()).absolute()) for word in records)
     return (
         [motions.RecordSet(files=files, scale=scale, vertical=vertical, **reading)] if files else []

@@ -40,7 +40,15 @@ from rockcheck.scenes.recordings.recording import (
 from rockcheck.scenes.recordings.stated import size_notes
 from rockcheck.scenes.recordings.tables import read_table
 
-__all__ = ["GRAVITY_OF_RECORDS", "UNITS", "Reading", "Recording", "read_components", "read_record"]
+__all__ = [
+    "GRAVITY_OF_RECORDS",
+    "UNITS",
+    "Contradiction",
+    "Reading",
+    "Recording",
+    "read_components",
+    "read_record",
+]
 
 #: Lines of a file that are searched for its format.
 _LOOKED_AT = 100

@@ -45,6 +45,11 @@ def arias(record: Recording) -> float:
     return math.pi / (2.0 * GRAVITY_OF_RECORDS) * (squares * record.time_step)
 
 
+def resolved_periods(record: Recording) -> tuple[float, float]:
+    """The periods in s of which a record can tell: from two time steps to its duration."""
+    return 2.0 * record.time_step, record.time_step * (len(record.samples) - 1)
+
+
 def spectral_acceleration(record: Recording, period: float, damping: float = 0.05) -> float:
     """Pseudo-spectral acceleration in g of an oscillator of `period` (s).
 

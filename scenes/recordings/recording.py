@@ -14,10 +14,11 @@ from rockcheck.scenes.errors import InputError, printable
 GRAVITY_OF_RECORDS = 9.80665  # m/s^2, the unit "g" of record files (standard gravity)
 MOST_SAMPLES = 10_000_000
 
-Unit = Literal["g", "m/s2", "cm/s2", "gal", "mm/s2", "ft/s2"]
+Unit = Literal["g", "mg", "m/s2", "cm/s2", "gal", "mm/s2", "ft/s2"]
 #: m/s^2 in each unit that a record may have.
 UNITS: dict[str, float] = {
     "g": GRAVITY_OF_RECORDS,
+    "mg": GRAVITY_OF_RECORDS / 1000.0,
     "m/s2": 1.0,
     "cm/s2": 0.01,
     "gal": 0.01,
@@ -29,7 +30,10 @@ UNITS: dict[str, float] = {
 NUMBER = r"[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eEdD][-+]?\d++)?"
 _NUMBER = re.compile(rf"{NUMBER}|[-+]?(?:nan|inf(?:inity)?)", re.IGNORECASE)
 _EXPONENT = str.maketrans("dD", "ee")
-_PER_SECOND_SQUARED = r"/s(?:ec)?(?:/s(?:ec)?|(?:\^|\*\*)?2)"
+#: Also as in m s^-2, m_s2, and ms-2.
+_PER_SECOND_SQUARED = (
+    r"(?:/\(?s(?:ec)?(?:/s(?:ec)?|(?:\^|\*\*)?2)\)?|[._*]?s(?:ec)?(?:\^|\*\*)?\(?-2|_s(?:ec)?_?2)"
+)
 _SPELLINGS = {unit: unit.replace("/s2", _PER_SECOND_SQUARED) for unit in UNITS} | {
     "g": r"g(?:'?s)?",
     "gal": r"gals?",

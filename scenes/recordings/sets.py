@@ -3,11 +3,12 @@
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from rockcheck.scenes.base import DATA
-from rockcheck.scenes.errors import InputError, printable, refuse
-from rockcheck.scenes.recordings import Reading, Recording, read_components
+from rockcheck.scenes.errors import InputError, printable
+from rockcheck.scenes.recordings import Contradiction, Reading, Recording, read_components
 
 #: How files and networks name the vertical component. No network calls a horizontal one V or Z.
 _VERTICAL = re.compile(
@@ -20,6 +21,11 @@ _UPWARD = re.compile(
     r"(?=\d?(?:[-_. ]|$))",
     re.IGNORECASE,
 )
+#: A vertical channel's code in a file's name, and the name of a channel to the north.
+_VERTICAL_CODE = re.compile(r"(?:^|[-_. ])[HBESC][NLGH]Z(?=[-_. ]|$)", re.IGNORECASE)
+_AZIMUTH_0 = re.compile(r"(?:0|360) deg", re.IGNORECASE)
+#: How many names of files a line about them lists.
+_MOST_NAMES = 3
 #: What may stand there in the name of a horizontal one, and is not more of a station's name, as the
 #: 0-NS of S10-NS would be after S1: a number goes on as an azimuth only.
 _ACROSS = re.compile(r"(?:^|[-_. ]).*|(?:(?<!\d)|(?!\d)|(?=\d{3}(?!\d)))[^-_. ]*")
@@ -69,104 +75,167 @@ def record_path(name: str, folder: Path) -> Path:
 
 
 def motions_of(
-    paths: Iterable[Path], reading: Reading, *, paired: bool = False
+    paths: Iterable[Path], reading: Reading
 ) -> tuple[list[tuple[str, Recording]], list[str]]:
     """The horizontal components of the files with their names, and the names left out.
 
-    Left out are vertical components, by name, and `Odd` files. A component or column that `reading`
-    names is taken as horizontal, unless the motions are `paired` with vertical ones. Raises as
-    `read_components`, and where all components are vertical.
+    Left out are vertical components, by name, and what is `Odd`: files that are no records, and
+    borehole channels beside others. A component or column that `reading` names is taken as
+    horizontal. Raises as `read_components`, and where all components are vertical.
     """
-    named = not paired and (reading.component, reading.column) != (None, None)
-    across, upward, faults = _parted(paths, reading, named)
-    if faults and not across:
-        raise faults[0]
-    motions = [one for components in across.values() for one in components]
-    left_out = [name for components in upward.values() for name, _ in components]
-    if left_out and not motions:
-        raise InputError(f"{left_out[0]}: a vertical component, and no horizontal one is given")
-    return motions, [*left_out, *map(Odd, faults)]
+    is_named = (reading.component, reading.column) != (None, None)
+    across, upward, odd = _parted(paths, reading, is_named)
+    motions = [motion for components in across.values() for motion in components]
+    vertical = [name for components in upward.values() for name, _ in components]
+    if vertical and not motions:
+        raise InputError(f"{vertical[0]}: a vertical component, and no horizontal one is given")
+    return motions, [*vertical, *odd]
+
+
+def pairs_of(
+    paths: Iterable[Path], reading: Reading
+) -> tuple[list[tuple[str, Recording, Recording]], list[Odd]]:
+    """The horizontal components with their names and their vertical ones, and what is left out.
+
+    The vertical component is the one in the same file, else that of the file in the same folder
+    whose name differs only in the component, as ELC-UP.AT2 does from ELC180.AT2. A motion that has
+    not exactly one is left out, and so is a vertical component of no motion. Raises `InputError`
+    where there is no pair.
+    """
+    across, upward, odd = _parted(paths, reading, is_named=False)
+    alone = [path for path, components in across.items() if not components and upward[path]]
+    sources = {
+        path: path if upward.get(path) else _vertical_file(path, alone)
+        for path, components in across.items()
+        if components
+    }
+    verticals = {path: upward[source] if source else [] for path, source in sources.items()}
+    unpaired = _unpaired(verticals, [path for path in alone if path not in sources.values()])
+    pairs = _paired(across, verticals)
+    if unpaired and not pairs:
+        raise InputError(unpaired[0], "vertical")
+    return pairs, [*unpaired, *odd]
+
+
+def _paired(across: Components, verticals: Components) -> list[tuple[str, Recording, Recording]]:
+    """Each horizontal component with the vertical one of its file, where there is exactly one."""
+    return [
+        (name, motion, ups[0][1])
+        for path, ups in verticals.items()
+        if len(ups) == 1
+        for name, motion in across[path]
+    ]
+
+
+def _unpaired(verticals: Components, alone: Iterable[Path]) -> list[Odd]:
+    """What is left out of pairs: motions without one vertical component, and those `alone`."""
+    motions = [
+        Odd(
+            f"{printable(path)}: {len(ups)} vertical components in it or in a file of the set that"
+            " is named alike: give exactly one"
+        )
+        for path, ups in verticals.items()
+        if len(ups) != 1
+    ]
+    others = [
+        Odd(f"{printable(path)}: a vertical component, and no horizontal one is named alike")
+        for path in alone
+    ]
+    return [*motions, *others]
 
 
 def _parted(
-    paths: Iterable[Path], reading: Reading, named: bool
-) -> tuple[Components, Components, list[InputError]]:
-    """The horizontal and the vertical components of each file, and the faults of the others.
+    paths: Iterable[Path], reading: Reading, is_named: bool
+) -> tuple[Components, Components, list[Odd]]:
+    """The horizontal and the vertical components of each file, and what is left out.
 
-    All are horizontal if they are `named`.
+    All are horizontal if they are `is_named` by the options. Raises the first fault where no file
+    has a horizontal component.
     """
+    paths = _with_names(paths)
     read, faults = read_files(paths, reading)
-    across, upward = (
-        {
-            path: [one for one in found if up == (not named and is_vertical(path, one[1]))]
-            for path, found in read.items()
-        }
-        for up in (False, True)
-    )
-    return across, upward, faults
+    odd = [*map(Odd, faults)]
+    for path in _boreholes(paths, read):
+        del read[path]
+        odd.append(Odd(f"{printable(path)}: a borehole channel; name the file itself to play it"))
+    upward = {} if is_named else {path: _verticals(path, found) for path, found in read.items()}
+    across = {
+        path: [pair for pair in found if is_named or not is_vertical(path, pair[1])]
+        for path, found in read.items()
+    }
+    if faults and not any(across.values()):
+        raise faults[0]
+    return across, upward, odd
 
 
-def read_files(paths: Iterable[Path], reading: Reading) -> tuple[Components, list[InputError]]:
+def _boreholes(paths: Mapping[Path, bool], read: Components) -> list[Path]:
+    """The files that hold borehole channels beside others, and were not named themselves."""
+    below = [path for path, found in read.items() if not paths[path] and _is_borehole(found)]
+    return below if len(below) < len(read) else []
+
+
+def _verticals(path: Path, found: Sequence[tuple[str, Recording]]) -> list[tuple[str, Recording]]:
+    return [(name, recording) for name, recording in found if is_vertical(path, recording)]
+
+
+def _with_names(paths: Iterable[Path]) -> Mapping[Path, bool]:
+    """The paths, and whether each was named itself: all, unless `files_of` says otherwise."""
+    return paths if isinstance(paths, Mapping) else dict.fromkeys(paths, True)
+
+
+def read_files(
+    paths: Iterable[Path], reading: Reading, *, keep_going: bool = False
+) -> tuple[Components, list[InputError]]:
     """The components of each file that can be read, by name, and the faults of the others.
 
     A component's name is that of its file, with its own name added where the file has several, and
-    the folder's where files of two folders have one name. Raises `InputError` for a file that was
-    named itself.
+    the folder's where files of two folders have one name. To a file of a folder or pattern the
+    options supply what it does not state; what it states holds, and a note says so. Raises
+    `InputError` for a file that was named itself, unless it is to `keep_going`.
     """
     read: Components = {}
-    paths = paths if isinstance(paths, Mapping) else dict.fromkeys(paths, True)
+    paths = _with_names(paths)
     alike = Counter(path.name for path in paths)
     faults: list[InputError] = []
-    for path in paths:
+    for path, is_named in paths.items():
         try:
-            found = read_components(path, reading)
+            found = read_components(path, reading) if is_named else _supplied(path, reading)
         except InputError as error:
-            if paths[path]:
+            if is_named and not keep_going:
                 raise
             faults.append(error)
         else:
             name = path.name if alike[path.name] == 1 else "/".join(path.parts[-2:])
-            read[path] = [
-                (f"{name} {one.component}" if len(found) > 1 else name, one) for one in found
-            ]
+            read[path] = _with_component_names(name, found)
     return read, faults
 
 
-def verticals_of(paths: Iterable[Path], reading: Reading) -> list[Recording]:
-    """The vertical component of each horizontal motion, in the order of `motions_of`.
+def _with_component_names(name: str, found: list[Recording]) -> list[tuple[str, Recording]]:
+    if len(found) == 1:
+        return [(name, found[0])]
+    return [(f"{name} {recording.component}", recording) for recording in found]
 
-    It is the one in the same file, else that of the file in the same folder whose name differs only
-    in the component, as ELC-UP.AT2 does from ELC180.AT2. Raises `InputError` where there is not
-    exactly one, and for a vertical component that belongs to no motion.
-    """
-    across, upward, _ = _parted(paths, reading, named=False)
-    alone = [path for path, components in across.items() if not components]
-    sources = {
-        path: path if upward[path] else _vertical_file(path, alone)
-        for path, components in across.items()
-        if components
-    }
-    ups = {path: upward[source] if source else [] for path, source in sources.items()}
-    refuse(
-        *(
-            (
-                len(up) != 1,
-                f"{printable(path)}: {len(up)} vertical components in it or in a file of the set"
-                " that is named alike: give exactly one",
-                "vertical",
-            )
-            for path, up in ups.items()
-        ),
-        *(
-            (
-                path not in sources.values(),
-                f"{printable(path)}: a vertical component, and no horizontal one is named alike",
-                "vertical",
-            )
-            for path in alone
-        ),
+
+def _supplied(path: Path, reading: Reading) -> list[Recording]:
+    """The components of a file, without the options that contradict what it states."""
+    notes: list[str] = []
+    while True:
+        try:
+            found = read_components(path, reading)
+        except Contradiction as error:
+            value = getattr(reading, error.option)
+            notes.append(f"the file's {error.option} holds, not {value}, as for the set")
+            reading = reading.model_copy(update={error.option: None})
+        else:
+            return [replace(one, notes=(*one.notes, *notes)) for one in found]
+
+
+def _is_borehole(found: Sequence[tuple[str, Recording]]) -> bool:
+    """Whether the file holds a channel down the borehole of a KiK-net station: 1, 2, 3 of 6."""
+    return all(
+        recording.form.startswith("K-NET") and recording.component in ("1", "2", "3")
+        for _, recording in found
     )
-    return [up[0][1] for path, up in ups.items() for _ in across[path]]
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:
@@ -200,8 +269,33 @@ def _agreement(name: str, other: str) -> int:
 
 
 def is_vertical(path: Path, recording: Recording) -> bool:
-    """Whether the component is vertical, by its name; of a table, by the file's name."""
+    """Whether the component is vertical, by its name; of a table, by the file's name.
+
+    A channel code in the file's name counts for any format, as an azimuth of 0 may stand for none.
+    """
     if recording.form.startswith("K-NET") and recording.component in ("3", "6"):  # of KiK-net
         return True
     channel = "" if recording.form in ("CSV", "table") else recording.component
+    if _AZIMUTH_0.fullmatch(channel) and _VERTICAL_CODE.search(path.name):
+        return True
     return bool(_VERTICAL.fullmatch(channel or path.stem))
+
+
+def grouped(odd: Iterable[str]) -> list[str]:
+    """A line for each reason for which files are left out, with how many they are and the first."""
+    groups: dict[str, list[tuple[str, str]]] = {}
+    for message in odd:
+        name, _, reason = message.partition(": ")
+        name = re.sub(r", line \d+$", "", name)
+        groups.setdefault(re.sub(r"\d+", "#", reason), []).append((name, reason))
+    return [_group_line(group) for group in groups.values()]
+
+
+def _group_line(group: Sequence[tuple[str, str]]) -> str:
+    names = [name for name, _ in group]
+    reason = group[0][1]
+    if len(names) == 1:
+        return f"{names[0]}: {reason}"
+    first = ", ".join(Path(name).name for name in names[:_MOST_NAMES])
+    more = ", ..." if len(names) > _MOST_NAMES else ""
+    return f"{len(names)} files, {first}{more}: {reason}"

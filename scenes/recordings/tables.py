@@ -1,19 +1,22 @@
 """Tables of numbers: CSV with named columns, and plain columns of text."""
 
-import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
+from itertools import islice, pairwise
 
 import numpy as np
 
 from rockcheck.scenes.base import LEAST, Floats
-from rockcheck.scenes.errors import InputError, printable, refuse
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.reading import MOST_COLUMNS
+from rockcheck.scenes.recordings.headers import facts_of
+from rockcheck.scenes.recordings.layout import MOST_HEADER, Layout, NumberedLines, layout_of
+from rockcheck.scenes.recordings.order import Shape, are_times, settled_order
 from rockcheck.scenes.recordings.recording import (
     MOST_SAMPLES,
     UNITS,
+    Contradiction,
     Reading,
     Recording,
     fault,
@@ -22,75 +25,112 @@ from rockcheck.scenes.recordings.recording import (
     number,
     option,
     place_of,
-    settled_unit,
 )
+from rockcheck.scenes.recordings.stated import Fact, Stated, recording_of
 
 #: Names of a column of accelerations that say its unit.
 NAMED = {f"acceleration_{unit.replace('/', '_')}": unit for unit in UNITS}
-_TIMES = re.compile(r"(?:time|t)(?:_s|\s*+[\[(]\s*+s(?:ec)?\s*+[\])])?", re.IGNORECASE)
+_SECONDS = r"s(?:ec(?:ond)?s?)?"
+_TIMES = re.compile(
+    rf"(?:time|t)(?:[_ ]?{_SECONDS}|\s*+[\[(]\s*+{_SECONDS}\s*+[\])])?", re.IGNORECASE
+)
 _BRACKETS = re.compile(r"[\[(]([^\])]{1,20})[\])]")
-_DECIMAL_COMMA = re.compile(r"[-+]?\d*+,\d++(?:[eEdD][-+]?\d++)?")
-#: Most lines of words at the start of a table.
-_MOST_HEADER = 200
-
-NumberedLines = list[tuple[int, str]]
-
-
-@dataclass(frozen=True)
-class _Layout:
-    """Separator of a table's fields, and whether a comma stands before the decimals.
-
-    `separator` None: fields are separated by blanks.
-    """
-
-    separator: str | None
-    decimal_comma: bool
-
-    def words(self, n: int, line: str) -> list[str]:
-        """The fields of a line; decimal commas become points."""
-        if self.separator is None or '"' not in line:
-            words = line.split(self.separator)
-        else:
-            try:
-                words = next(csv.reader([line], delimiter=self.separator))
-            except csv.Error as error:
-                raise fault(f"not a line of a CSV table: {printable(error)}", n) from None
-        words = [word.strip() for word in words]
-        if not self.decimal_comma:
-            return words
-        return [
-            word.replace(",", ".", 1) if _DECIMAL_COMMA.fullmatch(word) else word for word in words
-        ]
+_ACCELERATION = re.compile(r"a(?:cc(?:el(?:erations?)?)?)?\.?(?=[\s_\-\[(,]|$)", re.IGNORECASE)
+#: Most lines whose first number is looked at, to know whether it is a time.
+_LOOKED_AT = 2000
 
 
 def read_table(lines: list[str], reading: Reading) -> list[Recording]:
     """Read a column of times and one of accelerations, or accelerations alone.
 
-    Lines that start with # or % are remarks.
+    Lines that start with # or % are remarks. What the lines above the numbers state is held
+    against them.
     """
     cells = _cells_of(lines, reading)
-    time, place, stated = _columns(cells, reading)
-    if time is None and reading.time_step is None:
+    above = islice(enumerate(lines, 1), min(cells.rows[0][0] - 1, MOST_HEADER))
+    facts = facts_of(above, reading.unit or "")
+    time = _time_of(cells, reading)
+    if time is None and cells.width > 1 and not cells.names:
+        step = reading.time_step or (facts.time_step.value if facts.time_step else None)
+        shape = Shape(
+            [len(cells.layout.words(*row)) for row in cells.rows], first_line=cells.rows[0][0]
+        )
+        order, notes = settled_order(shape, facts.count, step, reading)
+        if order == "rows":
+            return [_along_rows(cells, shape, facts, reading, notes)]
+        return [_column(cells, time, facts, reading, notes)]
+    if reading.order == "rows" and cells.width > 1 and "order" not in reading.overriding:
+        raise Contradiction(
+            f"{'the header names columns' if cells.names else 'the first column holds times'};"
+            " leave the option order out, or override the file:"
+            f" {option('order', 'rows!')}",
+            "order",
+        )
+    if reading.order == "rows" and cells.width > 1:
+        return [_along_rows(cells, None, facts, reading, ["numbers are taken along the lines"])]
+    return [_column(cells, time, facts, reading, [])]
+
+
+def _along_rows(
+    cells: "_Cells", shape: Shape | None, facts: Stated, reading: Reading, notes: Sequence[str]
+) -> Recording:
+    """All numbers, line after line. Only the last line may be shorter, unless a count is stated."""
+    values: list[float] = []
+    is_counted = facts.count is not None and "order" not in reading.overriding
+    last = cells.rows[-1][0]
+    for n, line in cells.rows:
+        words = cells.layout.words(n, line)
+        is_short = len(words) < cells.width
+        if len(words) > cells.width or (is_short and n != last and not is_counted):
+            raise fault(f"{len(words)} fields where the first line has {cells.width}", n)
+        values += [number(n, word) for word in words]
+    if reading.column is not None:
+        raise fault("numbers run along the lines; leave the option column out")
+    if not is_counted:
+        facts, notes = _without_count(facts, len(values), notes)
+    return recording_of(values, facts, reading, form=cells.form, notes=notes)
+
+
+def _without_count(facts: Stated, samples: int, notes: Sequence[str]) -> tuple[Stated, list[str]]:
+    """The facts without a count that an option overrides, and a note on it."""
+    if facts.count is None or facts.count.value == samples:
+        return facts, [*notes]
+    note = f"the header states {facts.count.value} samples, the table has {samples}"
+    return replace(facts, count=None), [*notes, note]
+
+
+def _column(
+    cells: "_Cells", time: int | None, facts: Stated, reading: Reading, notes: Sequence[str]
+) -> Recording:
+    """One column of accelerations, and perhaps one of times."""
+    time, place, unit = _columns(cells, time, reading)
+    if time is None and reading.time_step is None and facts.time_step is None:
         raise fault(f"no column of times; give the time step: {option('time_step', 0.01)}")
-    unit = settled_unit(stated, reading)
     samples, times, words = cells.read(place, time)
-    step, notes = float(reading.time_step or 0.0), list[str]()
+    notes = list(notes)
+    if unit:
+        facts = replace(facts, unit=Fact(unit))
+    if cells.width > 2:
+        facts = replace(facts, peak=None)  # of which column is not known
+    if facts.count is not None and facts.count.value != len(samples):
+        if "order" not in reading.overriding:
+            raise fault(
+                f"the header states {facts.count.value} samples, the table has {len(samples)}; to"
+                f" read it all the same: {option('order', 'columns!')}",
+                facts.count.line,
+            )
+        facts, notes = _without_count(facts, len(samples), notes)
     if time is not None:
-        step, notes = _step_of(times, words, [n for n, _ in cells.rows], reading)
+        step, step_notes = _checked_step(times, words, [n for n, _ in cells.rows], facts, reading)
+        facts = replace(facts, time_step=Fact(step))
+        notes += step_notes
         if not cells.names or cells.names[time].lower() in ("t", "time"):
             notes.append(f"column {time + 1} is taken as the time in s")
-    return [
-        Recording(
-            samples=samples * UNITS[unit],
-            time_step=step,
-            unit=unit,
-            form="table" if cells.layout.separator is None else "CSV",
-            component=printable(cells.names[place], 30)
-            if cells.names
-            else f"column {place + 1}" * (cells.width > 1),
-            notes=tuple(notes),
-        )
-    ]
+        reading = reading.model_copy(update={"time_step": None})
+    component = f"column {place + 1}" * (cells.width > 1)
+    if cells.names:
+        component = printable(cells.names[place], 30)
+    return recording_of(samples, facts, reading, form=cells.form, component=component, notes=notes)
 
 
 @dataclass(frozen=True)
@@ -98,9 +138,14 @@ class _Cells:
     """The lines of data and their layout; `names` is empty where no line names the columns."""
 
     rows: NumberedLines
-    layout: _Layout
+    layout: Layout
     names: list[str]
     width: int
+
+    @property
+    def form(self) -> str:
+        """The format, as a recording names it."""
+        return "table" if self.layout.separator is None else "CSV"
 
     def read(self, place: int, time: int | None) -> tuple[Floats, Floats, list[str]]:
         """Numbers of column `place` and of column `time`, and the words of the latter."""
@@ -118,76 +163,32 @@ class _Cells:
 
 
 def _cells_of(lines: list[str], reading: Reading) -> _Cells:
+    skipped = reading.header_lines or 0
     rows: NumberedLines = [
         (n, line)
         for n, line in enumerate(lines, 1)
-        if n > (reading.header_lines or 0) and line.strip() and line[0] not in "#%"
+        if n > skipped and line.strip() and line[0] not in "#%"
     ]
-    refuse(
-        (
-            reading.component is not None,
-            "a table has columns; give the option column in place of component",
-            "",
-        ),
-        (not rows, "empty", ""),
-    )
-    layout = _layout_of(rows, reading)
+    if reading.component is not None:
+        raise fault("a table has columns; give the option column in place of component")
+    if not rows:
+        raise fault("empty")
+    layout = layout_of(rows, reading)
     names, rows = _names_of(rows, layout, reading)
+    if not _names_columns(names, layout, reading):
+        names = []
+    if not rows:
+        raise fault("no line of numbers below the names of columns")
     width = len(names) or len(layout.words(*rows[0]))
-    refuse(
-        (not rows, "no line of numbers below the names of columns", ""),
-        (len(rows) > MOST_SAMPLES, f"more than {MOST_SAMPLES} lines", ""),
-        (
-            width > MOST_COLUMNS,
-            f"more than {MOST_COLUMNS} columns",
-            "".join(f"line {n}" for n, _ in rows[:1]),
-        ),
-    )
+    if len(rows) > MOST_SAMPLES:
+        raise fault(f"more than {MOST_SAMPLES} lines")
+    if width > MOST_COLUMNS:
+        raise fault(f"more than {MOST_COLUMNS} columns", rows[0][0])
     return _Cells(rows, layout, names, width)
 
 
-def _layout_of(rows: NumberedLines, reading: Reading) -> _Layout:
-    """The layout of a table, from its first line of numbers, else from its first line."""
-    head = [line for _, line in rows[:_MOST_HEADER]]
-    with_digits = next(
-        (line for line in head if re.match(r"[\s\"]*+[-+.]?[-+.\d]", line)), head[0]
-    )[:10_000]
-    separator = next((sign for sign in ";\t" if sign in with_digits), None)
-    if separator is None and "," in with_digits and reading.decimal != ",":
-        words = with_digits.split()
-        # Where each word between blanks is a number with one comma, or has none, the commas cannot
-        # separate fields; that after a blank, in 0 ,1, does.
-        if (
-            len(words) > 1
-            and "." not in with_digits
-            and all(
-                _DECIMAL_COMMA.fullmatch(word) and ("," in words[0] or word[0] != ",")
-                for word in words
-                if "," in word
-            )
-        ):
-            return _Layout(None, True)
-        if (
-            "." not in with_digits
-            and len(words) == 1
-            and reading.decimal is None
-            # no line names two columns: each with a comma is two runs of digits
-            and all("," not in line or _DECIMAL_COMMA.fullmatch(line.strip()[:60]) for line in head)
-        ):
-            raise fault(
-                f"a comma between columns or before the decimals? {option('decimal', ',')}, or"
-                " decimal .",
-                rows[-1][0],
-            )
-        return _Layout(",", False)
-    comma = reading.decimal == "," or (
-        reading.decimal is None and "." not in with_digits and "," in with_digits
-    )
-    return _Layout(separator, comma)
-
-
 def _names_of(
-    rows: NumberedLines, layout: _Layout, reading: Reading
+    rows: NumberedLines, layout: Layout, reading: Reading
 ) -> tuple[list[str], NumberedLines]:
     """The columns' names, [] where no line names them, and the lines of data."""
     first = layout.words(*rows[0])
@@ -195,12 +196,11 @@ def _names_of(
         return first, rows[1:]
     if all(map(is_number, first)):
         return [], rows
-    searched = rows[: _MOST_HEADER if reading.header_lines is None else 2]
+    searched = rows[: MOST_HEADER if reading.header_lines is None else 2]
     for index, ((n, above), line) in enumerate(pairwise(searched), 1):
         words = layout.words(*line)
         if all(map(is_number, words)):
-            names = layout.words(n, above.replace(" [", "[").replace(" (", "("))
-            return names if len(names) == len(words) else [], rows[index:]
+            return _header_names(layout.words(n, _closed_up(above)), len(words)), rows[index:]
     # A column of words, or an empty one, beside those of numbers: names have numbers below them; of
     # another line it is not clear whether it is the first of the data.
     numeric = [[*map(is_number, layout.words(*row))] for row in rows[:2]]
@@ -208,33 +208,86 @@ def _names_of(
     if len(numeric[-1]) == len(first) and (names or reading.header_lines is not None):
         return names, rows[bool(names) :]
     raise fault(
-        f"no line of numbers within the first {_MOST_HEADER}; give the lines to leave out:"
+        f"no line of numbers within the first {MOST_HEADER}; give the lines to leave out:"
         f" {option('header_lines', 3)}",
         rows[0][0],
     )
 
 
-def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, int, str]:
+def _closed_up(line: str) -> str:
+    """A line of names without blanks before the brackets of their units."""
+    return line.replace(" [", "[").replace(" (", "(")
+
+
+def _header_names(words: list[str], width: int) -> list[str]:
+    """The names of `width` columns in the words of a line, [] if it does not name so many.
+
+    A unit may stand behind the name, as in "time s acc cm/s2".
+    """
+    if len(words) == width:
+        return words
+    names: list[str] = []
+    for word in words:
+        if names and (known_unit(word) or re.fullmatch(_SECONDS, word, re.IGNORECASE)):
+            names[-1] += f" {word}"
+        else:
+            names.append(word)
+    return names if len(names) == width else []
+
+
+def unit_of_name(name: str) -> str:
+    """The unit that the name of a column states, as `acc [cm/s2]`, `acc cm/s2` or `a_g`; or ""."""
+    if name in NAMED:
+        return NAMED[name]
+    for bracketed in _BRACKETS.findall(name):
+        if unit := known_unit(bracketed):
+            return unit
+    if start := _ACCELERATION.match(name):
+        return known_unit(name[start.end() :].strip(" _-,"))
+    return ""
+
+
+def _names_columns(names: Sequence[str], layout: Layout, reading: Reading) -> bool:
+    """Whether the line above the numbers names columns, and is no other line of as many words."""
+    if layout.separator is not None or reading.column in names:
+        return True
+    return any(
+        _TIMES.fullmatch(name) or _ACCELERATION.match(name) or unit_of_name(name) for name in names
+    )
+
+
+def _time_of(cells: _Cells, reading: Reading) -> int | None:
+    """The column of times, by its name, or where columns have none by its numbers; or None."""
+    times = [index for index, name in enumerate(cells.names) if _TIMES.fullmatch(name)]
+    if len(times) == 1:
+        return times[0]
+    if cells.names or cells.width < 2:
+        return None
+    words = [cells.layout.words(*row)[:1] for row in cells.rows[:_LOOKED_AT]]
+    numbers = [
+        number(n, word)
+        for (n, _), (word,) in zip(cells.rows, filter(None, words), strict=False)
+        if is_number(word)
+    ]
+    is_time = are_times(numbers, is_step_given=reading.time_step is not None)
+    return 0 if is_time and len(numbers) == len(words) else None
+
+
+def _columns(cells: _Cells, time: int | None, reading: Reading) -> tuple[int | None, int, str]:
     """The columns of times and of accelerations, and the unit of the latter.
 
     Times are None if there is no such column. The unit is the one that the column's name states, ""
     if none. Raises `InputError` where the columns are not clear.
     """
     names = cells.names
-    stated = [
-        NAMED.get(name) or next(map(known_unit, _BRACKETS.findall(name)), "") for name in names
-    ] or [""] * cells.width
-    times = [index for index, name in enumerate(names) if _TIMES.fullmatch(name)]
-    time: int | None = times[0] if len(times) == 1 else None
-    if not names and cells.width > 1 and reading.time_step is None:
-        time = 0
+    stated = [unit_of_name(name) for name in names] or [""] * cells.width
     if reading.column is not None:
         place = _chosen(cells, reading.column)
         return None if time == place else time, place, stated[place]
     rest = [index for index in range(cells.width) if index != time]
     chosen = (
         [index for index, name in enumerate(names) if name in NAMED]
-        or [i for i in rest if stated[i] and names[i].lower().startswith("acc")]
+        or [index for index in rest if stated[index] and _ACCELERATION.match(names[index])]
         or rest
     )
     if len(chosen) == 1 and (time is not None or reading.time_step is not None or cells.width == 1):
@@ -243,19 +296,51 @@ def _columns(cells: _Cells, reading: Reading) -> tuple[int | None, int, str]:
 
 
 def _unclear(cells: _Cells) -> InputError:
-    said = (
-        f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
-        f" {', '.join(NAMED)}, or give the column"
-        if cells.names
-        else f"{cells.width} columns; give that of the accelerations"
-    )
-    line = cells.rows[0][0] - bool(cells.names) if cells.rows else 1
-    return fault(f"{said}: {option('column', 2)}", line)
+    if cells.names:
+        message = (
+            f"columns {printable(', '.join(cells.names))!r}; name them time_s and exactly one of"
+            f" {', '.join(NAMED)}, or give the column"
+        )
+        return fault(f"{message}: {option('column', 2)}", cells.rows[0][0] - 1)
+    message = f"{cells.width} columns; give that of the accelerations"
+    return fault(f"{message}: {option('column', 2)}", cells.rows[0][0])
 
 
 def _chosen(cells: _Cells, column: int | str) -> int:
-    shown = printable(", ".join(cells.names)) if cells.names else f"1 to {cells.width}"
-    return place_of("column", column, cells.names or [""] * cells.width, shown)
+    listed = printable(", ".join(cells.names)) if cells.names else f"1 to {cells.width}"
+    return place_of("column", column, cells.names or [""] * cells.width, listed)
+
+
+def _checked_step(
+    times: Floats, words: Sequence[str], lines: Sequence[int], facts: Stated, reading: Reading
+) -> tuple[float, list[str]]:
+    """The time step in s of a column of times, held against the header's and the given one.
+
+    And notes on it. Raises `InputError` where they contradict each other.
+    """
+    if reading.time_step is not None and "time_step" in reading.overriding:
+        return reading.time_step, [f"the time step {reading.time_step:g} s is given, not the times"]
+    try:
+        step, notes = _step_of(times, words, lines, reading)
+    except InputError:
+        if reading.time_step is None:
+            raise
+        own = reading.model_copy(update={"time_step": None})
+        step, _ = _step_of(times, words, lines, own)
+        raise Contradiction(
+            f"the times have a step of {step:g} s, not {reading.time_step:g} s; leave the option"
+            " time_step out, or override the file:"
+            f" {option('time_step', f'{reading.time_step:g}!')}",
+            "time_step",
+        ) from None
+    header = facts.time_step
+    if header is not None and abs(header.value - step) > 0.01 * step:
+        raise fault(
+            f"the header states a time step of {header.value:g} s, the times have {step:g} s; to"
+            f" read them all the same: {option('time_step', f'{step:g}!')}",
+            header.line,
+        )
+    return step, notes
 
 
 def _decimals(word: str) -> int:
@@ -277,14 +362,10 @@ def _step_of(
     `InputError` where none fits.
     """
     mean = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    refuse(
-        (
-            len(words) < 2,
-            f"{len(words)} sample(s); at least 2 are needed to know the time step",
-            "",
-        ),
-        (not mean > LEAST, "time_s does not increase", ""),
-    )
+    if len(words) < 2:
+        raise fault(f"{len(words)} sample(s); at least 2 are needed to know the time step")
+    if not mean > LEAST:
+        raise fault("time_s does not increase")
     digit = 10.0 ** -min(max(map(_decimals, words)), 30)
     # A coarser digit could hide a sample that is missing or in the wrong place.
     tells = digit <= 0.5 * mean

@@ -78,8 +78,14 @@ def test_vertical_components_are_left_out_unless_they_are_asked_for(tmp_path, fa
         (every[1:], recordings.Reading(column=2), True, [("ns.csv", 2.0)], ["up.csv"]),
         ([], recordings.Reading(), False, [], []),
     ):
-        motions, left_out = sets.motions_of(paths, reading, paired=paired)
-        assert ([(name, peak(one)) for name, one in motions], left_out) == (found, other)
+        if paired:
+            pairs, odd = sets.pairs_of(paths, reading)
+            assert [(name, peak(motion)) for name, motion, _ in pairs] == found
+            assert odd == []
+        else:
+            motions, left_out = sets.motions_of(paths, reading)
+            assert [(name, peak(motion)) for name, motion in motions] == found
+            assert left_out == other
     assert "up.csv: a vertical component" in str(
         fault_of(sets.motions_of, [alone], recordings.Reading())
     )
@@ -93,25 +99,34 @@ def test_the_vertical_component_is_that_of_the_same_file_or_of_one_named_alike(t
         table(tmp_path / "b-ns.csv"),
         table(tmp_path / "b-up.csv", 0.75),
     ]
-    assert [
-        peak(one)
-        for files, column in ((paths[:3], None), (paths[3:], 2))
-        for one in sets.verticals_of(files, recordings.Reading(column=column))
-    ] == [0.5, 0.5, 0.25, 0.75]
+    assert verticals(paths[:3]) == [0.5, 0.5, 0.25]
+    assert verticals(paths[3:], column=2) == [0.75]
+
+
+def verticals(paths, **options):
+    pairs, _ = sets.pairs_of(paths, recordings.Reading(**options))
+    return [peak(vertical) for _, _, vertical in pairs]
 
 
 def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(tmp_path, fault_of):
-    plain, up, down, other = (
-        table(tmp_path / f"{name}.csv") for name in ("a-ns", "a-up", "a-down", "b-up")
-    )
+    plain, up, down = (table(tmp_path / f"{name}.csv") for name in ("a-ns", "a-up", "a-down"))
     for paths, said in (
         ([plain], "a-ns.csv: 0 vertical"),
         ([plain, up, down], "a-ns.csv: 0 vertical"),
         ([channels(tmp_path / "two.v2", East=1.0, Up=0.5, Down=0.5)], "two.v2: 2 vertical"),
-        ([plain, up, other], "b-up.csv: a vertical component, and no horizontal"),
         ([up], "a-up.csv: a vertical component, and no horizontal"),
     ):
-        assert said in str(fault_of(sets.verticals_of, paths, recordings.Reading()))
+        assert said in str(fault_of(sets.pairs_of, paths, recordings.Reading()))
+
+
+def test_what_has_no_partner_is_left_out_and_named(tmp_path):
+    paths = [
+        table(tmp_path / f"{name}.csv") for name in ("a-ns", "a-up", "b-up", "c-ns", "d-ns", "d-up")
+    ]
+    pairs, odd = sets.pairs_of(paths, recordings.Reading())
+    assert [name for name, _, _ in pairs] == ["a-ns.csv", "d-ns.csv"]
+    assert "c-ns.csv: 0 vertical components" in odd[0]
+    assert "b-up.csv: a vertical component, and no horizontal one is named alike" in odd[1]
 
 
 @pytest.mark.parametrize(
@@ -136,6 +151,10 @@ def test_a_motion_has_exactly_one_vertical_component_and_none_is_left_over(tmp_p
         ("S1_V2.csv", "CSV", "acceleration_g", False),
         ("topaz.csv", "CSV", "acceleration_g", False),
         ("setup.txt", "table", "column 2", False),
+        ("station.V2", "V2", "BNZ", True),
+        ("CE12044.HNZ.acc.V2", "V2", "0 deg", True),
+        ("CE12044.HNN.acc.V2", "V2", "0 deg", False),
+        ("CE12044.HNZ.acc.V2", "V2", "90 deg", False),
     ],
 )
 def test_which_component_is_vertical(name, form, component, vertical):

@@ -304,8 +304,9 @@ def test_of_a_folder_the_odd_file_is_named(tmp_path, typed, fault_of):
     """And does not hide the others. What is named itself must be a record."""
     (tmp_path / "1.AT2").write_bytes(at2("N-S"))
     (tmp_path / "2.txt").write_text("1 2 3\n")
-    out, _ = typed("record", str(tmp_path), "--json", code=2, holds=["2.txt, line 1: 3 columns"])
+    out, _ = typed("record", str(tmp_path), "--json")
     assert json.loads(out)["samples"] == 401
+    assert "2.txt, line 1: 3 numbers a line" in json.loads(out)["left_out"][0]
     for words in ([tmp_path], [tmp_path / "[1-3].*"]):
         (motion, *more), (left_out,) = sets.motions_of(sets.files_of(words), recordings.Reading())
         assert (motion[0], more) == ("1.AT2", [])

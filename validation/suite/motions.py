@@ -79,6 +79,12 @@ class RecordSet(recordings.Reading):
     vertical: bool = False
     scenes: tuple[Word, ...] = ()
 
+    @model_validator(mode="after")
+    def _moves(self) -> RecordSet:
+        if self.scale == 0.0:
+            raise errors.InputError("0 leaves nothing of the records: give another scale", "scale")
+        return self
+
 
 def under_records(
     scenes: Mapping[str, files.UncertainScene], sets: Sequence[RecordSet], folder: Path
@@ -116,14 +122,17 @@ def _motions(
 ) -> tuple[list[tuple[str, dict[str, Record]]], list[str]]:
     """The motions of a set by their labels, as what they replace; and what is left out."""
     files = sets.files_of(given.files, folder)
-    motions, left_out = sets.motions_of(files, given, paired=given.vertical)
-    upward = sets.verticals_of(files, given) if given.vertical else [None] * len(motions)
+    pairs: list[tuple[str, recordings.Recording, recordings.Recording | None]]
+    left_out: list[str]
     if given.vertical:
-        left_out = [one for one in left_out if isinstance(one, sets.Odd)]
+        both, odd = sets.pairs_of(files, given)
+        pairs, left_out = [*both], [*odd]
+    else:
+        motions, left_out = sets.motions_of(files, given)
+        pairs = [(name, motion, None) for name, motion in motions]
     found = []
-    for label, (_, across), up in zip(
-        _labels([name for name, _ in motions]), motions, upward, strict=True
-    ):
+    labels = _labels([name for name, _, _ in pairs])
+    for label, (_, across, up) in zip(labels, pairs, strict=True):
         parts = {"excitation": (label, across)}
         if up is not None:
             parts["vertical"] = f"{label}, vertical", up

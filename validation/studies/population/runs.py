@@ -364,13 +364,25 @@ def measure_of(word: str) -> Measure:
         return (
             f"Sa({at:g} s), 5 %",
             "g",
-            lambda r, scene: recordings.intensity.spectral_acceleration(r, at),
+            lambda record, scene: _resolved_acceleration(record, at),
         )
     if word not in MEASURES:
         raise InputError(
             str(errors.unknown_name("intensity", word, [*MEASURES, "sa:0.5"])), "--levels"
         )
     return MEASURES[word]
+
+
+def _resolved_acceleration(record: recordings.Recording, period: float) -> float:
+    """Spectral acceleration in g at a period (s) that the record resolves; raises `InputError`."""
+    low, high = recordings.intensity.resolved_periods(record)
+    if not low <= period <= high:
+        raise InputError(
+            f"sa:{period:g} is not resolved by a record of {high:g} s at {record.time_step:g} s:"
+            f" give a period from {low:g} to {high:g}",
+            "--levels",
+        )
+    return recordings.intensity.spectral_acceleration(record, period)
 
 
 def ida(
