@@ -113,6 +113,7 @@ class ContinuousModel(Frozen):
         absurd excitation) or asks for too many steps.
         """
         errors.check_kind(scene, Scene, "load_scene", "scene")
+        scene.check_friction("the continuous model")
         began = time.perf_counter()
         from rockcheck.cm import kernels
 

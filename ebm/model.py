@@ -69,6 +69,8 @@ class EventBasedModel(Frozen):
         errors.check_kind(scene, Scene, "load_scene", "scene")
         floor, height, speed = scene.floor, scene.initial_height, scene.initial_velocity
         bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
+        if self.friction != "no-slip":
+            scene.check_friction("event-based models")
         errors.refuse(
             (
                 self.friction != "coulomb" and not bilateral,

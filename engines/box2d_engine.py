@@ -6,7 +6,7 @@ from types import MappingProxyType
 from typing import ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -110,3 +110,25 @@ class Box2D(Engine):
     precision: ClassVar[Literal["double", "single"]] = "single"
     fixed_because: ClassVar[str] = "Box2D holds positions in single precision"
     worlds: ClassVar[Worlds] = (_RigidBox2DWorld, _Box2DWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 1.0),
+        {
+            "block": "restitution=0, friction={friction:.4g} (of two restitutions the larger"
+            " counts, of two frictions the geometric mean)",
+            "floor": "restitution={restitution:.4g}, friction={friction:.4g}",
+            "world": "restitution_threshold=1 (slower contacts do not bounce), contact_hertz=30, 4"
+            " substeps",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "lengths: contacts may overlap by 0.005; set_contact_tuning",
+            "damping": "positions are in single precision",
+            "restitution": "restitution_threshold; it acts corner by corner",
+            "penetration": "set_contact_tuning: hertz, damping ratio, push speed",
+            "corners": "sleeping_enabled; set_contact_tuning",
+            "friction": "sleeping_enabled; frictions give their geometric mean",
+            "solver": "substeps",
+            "sleep": "World.sleeping_enabled",
+        }
+    )

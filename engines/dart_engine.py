@@ -1,12 +1,14 @@
 """DART (dartpy) as a model of the rocking block."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Scene
 
 SLAB = 10.0  # half the thickness of floor and walls
@@ -116,6 +118,26 @@ class Dart(Engine):
     name: ClassVar[str] = "dart"
     module: ClassVar[str] = "dartpy"
     worlds: ClassVar[Worlds] = (_RigidDartWorld, _DartWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 1.0),
+        {
+            "block": "setRestitutionCoeff(1), setFrictionCoeff({friction:.4g}) (restitutions"
+            " multiply, the smaller friction counts)",
+            "floor": "setRestitutionCoeff({restitution:.4g}), setFrictionCoeff({friction:.4g})",
+            "world": "contacts below 0.1 m/s do not bounce; the error reduction of 0.01 cannot be"
+            " set from Python",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "setSplitImpulseEnabled; another setBoxedLcpSolver",
+            "restitution": "setRestitutionCoeff of both bodies; below 0.1 m/s nothing bounces",
+            "penetration": "setSplitImpulseEnabled",
+            "friction": "setFrictionCoeff of both bodies: the smaller counts",
+            "solver": "setBoxedLcpSolver: tolerance and sweeps",
+            "sleep": "setDeactivationOptions",
+        }
+    )
 
     def rigid_world(self, scene: Scene) -> steps.World:
         """The scene as DART holds it, with the solver that suits the steps."""

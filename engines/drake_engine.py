@@ -3,13 +3,14 @@
 import logging
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 
 from rockcheck.engines import steps
 from rockcheck.engines.contacts import corners_of, surfaces_of
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Floor, ModelFailure, Scene, printable
 
 CORNER_RADIUS = 1e-5  # of the block's radius
@@ -174,6 +175,28 @@ class Drake(Engine):
     bounces_with: ClassVar[tuple[str, ...]] = ()
     fixed_because: ClassVar[str] = "Drake's discrete plant keeps the step it was made with"
     worlds: ClassVar[Worlds] = (_RigidDrakeWorld, _DrakeWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 20.0),
+        {
+            "AddContactMaterial": "dissipation={restitution:.4g} s/m, point_stiffness="
+            "{stiffness:.4g} N/m a kg, each body",
+            "CoulombFriction": "{friction:.4g}, {friction:.4g}",
+            "MultibodyPlant": "time_step={step:g}, DiscreteContactApproximation.kTamsi",
+            "remark": "dissipation, not restitution: it holds for this speed of approach, 2 m/s,"
+            " and this mass",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "set_stiction_tolerance, point_stiffness",
+            "lift": "DiscreteContactApproximation.kTamsi",
+            "restitution": "it has dissipation",
+            "penetration": "point_stiffness, dissipation",
+            "corners": "spheres as corners: a box on a half-space has few contact points",
+            "friction": "DiscreteContactApproximation.kTamsi; spheres as corners",
+            "solver": "DiscreteContactApproximation",
+        }
+    )
 
     def tuned_world(
         self, scene: Scene, parameters: Mapping[str, float], step: float

@@ -4,8 +4,9 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import astuple
+from dataclasses import astuple, dataclass
 from importlib.util import find_spec
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
@@ -24,6 +25,19 @@ from rockcheck.scenes import (
     observation,
     printable,
 )
+
+
+@dataclass(frozen=True)
+class ContactParameters:
+    """How an engine sets its contacts, for `conformance --tune`.
+
+    `range` holds the limits of the parameter that sets its restitution; `words` all parameters in
+    the engine's own words, in which the numbers are filled in.
+    """
+
+    range: tuple[float, float]
+    words: Mapping[str, str]
+
 
 MOST_STEPS = 5_000_000
 #: The step of an engine that cannot step adaptively, where none is given, s.
@@ -63,6 +77,9 @@ class Engine(Frozen):
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
     bounces_with: ClassVar[tuple[str, ...]] = ("best", "default")
+    contact_parameters: ClassVar[ContactParameters]
+    #: What to look at where it does not conform, by theme, in the names of its settings.
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType({})
     time_step: float | Literal["adaptive"] = "adaptive"
     largest_step: Positive = 5e-4
     short_steps: Positive = 1.0

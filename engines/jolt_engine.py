@@ -1,10 +1,12 @@
 """Jolt (culverin) as a model of the rocking block."""
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import InputError, ModelFailure, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -102,3 +104,19 @@ class Jolt(Engine):
     precision: ClassVar[Literal["double", "single"]] = "single"
     fixed_because: ClassVar[str] = "Jolt's velocities are in single precision"
     worlds: ClassVar[Worlds] = (_RigidJoltWorld, _JoltWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 1.2),
+        {
+            "create_body(block)": "friction={friction:.4g}, restitution=0 (of two restitutions the"
+            " larger counts, of two frictions the geometric mean)",
+            "create_body(floor)": "friction={friction:.4g}, restitution={restitution:.4g}",
+            "remark": "contacts below about 1 m/s do not bounce",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "damping": "culverin cannot set its damping of 0.05/s",
+            "restitution": "lengths: nothing bounces below about 1 a second",
+            "friction": "frictions give their geometric mean",
+        }
+    )

@@ -1,13 +1,14 @@
 """MuJoCo as a model of the rocking block."""
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
 
 from rockcheck.engines import steps
 from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Floor, ModelFailure, Scene, printable
 
 # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
@@ -264,6 +265,27 @@ class MuJoCo(Engine):
     name: ClassVar[str] = "mujoco"
     bounces_with: ClassVar[tuple[str, ...]] = ("best",)
     worlds: ClassVar[Worlds] = (_RigidMuJoCoWorld, MuJoCoWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.5, 2.2),
+        {
+            "geom solref": "{push:.6g} {damp:.6g}",
+            "geom solimp": "0.9999 0.9999 0.001 0.5 1",
+            "geom friction": "{friction:.4g} 0 0",
+            "option": 'timestep="{step:g}" integrator="Euler" cone="elliptic"',
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "impratio, noslip_iterations, solref of the geom",
+            "lift": "noslip_iterations do not help: the cone is convex",
+            "damping": 'condim="1" for no friction, since a friction of 0 becomes 1e-5',
+            "restitution": 'solref="-stiffness -damping"',
+            "penetration": "solref and solimp of the geom",
+            "corners": "solref and margin of the geom",
+            "friction": 'cone="elliptic", impratio',
+            "solver": "iterations, tolerance",
+        }
+    )
     cone_correction: bool = True
 
     def rigid_world(self, scene: Scene) -> steps.World:

@@ -2,10 +2,12 @@
 
 import math
 import warnings
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Scene
 
 CORNER_RADIUS = 1e-4  # of the block's radius; contacts are points
@@ -123,3 +125,22 @@ class PhysX(Engine):
     precision: ClassVar[Literal["double", "single"]] = "single"
     fixed_because: ClassVar[str] = "PhysX computes in single precision"
     worlds: ClassVar[Worlds] = (_RigidPhysXWorld, _PhysXWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 2.0),
+        {
+            "PhysxMaterial(block)": "{friction:.4g}, {friction:.4g}, 0 (of two materials the mean"
+            " counts)",
+            "PhysxMaterial(floor)": "{friction:.4g}, {friction:.4g}, {restitution:.4g}",
+            "set_scene_config": "bounce_threshold=2 (slower contacts do not bounce)",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "damping": "set_linear_damping, set_angular_damping; it computes in single precision",
+            "restitution": "bounce_threshold; of two materials the mean counts",
+            "penetration": "contact_offset of set_shape_config",
+            "corners": "contact_offset of set_shape_config",
+            "friction": "of two materials the mean counts",
+            "sleep": "sleep_threshold of set_body_config",
+        }
+    )

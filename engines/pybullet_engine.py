@@ -2,11 +2,13 @@
 
 import math
 import os
+from collections.abc import Mapping
 from functools import cache
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
@@ -178,3 +180,26 @@ class PyBullet(Engine):
     module: ClassVar[str] = "pybullet"
     last_python: ClassVar[tuple[int, int] | None] = (3, 11)
     worlds: ClassVar[Worlds] = (_RigidPyBulletWorld, _PyBulletWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 1.2),
+        {
+            "changeDynamics(block)": "restitution=1, lateralFriction=1 (of two bodies they"
+            " multiply)",
+            "changeDynamics(floor)": "restitution={restitution:.4g},"
+            " lateralFriction={friction:.4g}",
+            "setPhysicsEngineParameter": "restitutionVelocityThreshold=0.2 (slower contacts do not"
+            " bounce), contactERP=0.2",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "contactERP, contactSlop, numSolverIterations",
+            "damping": "linearDamping and angularDamping are 0.04 as it comes",
+            "restitution": "restitutionVelocityThreshold; restitutions of two bodies multiply",
+            "penetration": "contactERP, contactSlop, restitutionVelocityThreshold",
+            "corners": "a box as floor in place of GEOM_PLANE; corners as spheres",
+            "friction": "lateralFriction of both bodies: they multiply",
+            "solver": "numSolverIterations, solverResidualThreshold",
+            "sleep": "activationState without sleeping",
+        }
+    )

@@ -1,9 +1,11 @@
 """pymunk (Chipmunk, in two dimensions) as a model of the rocking block."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from rockcheck.engines import contacts, steps
-from rockcheck.engines.engine import Engine, Worlds
+from rockcheck.engines.engine import ContactParameters, Engine, Worlds
 from rockcheck.scenes import Scene
 
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
@@ -101,3 +103,23 @@ class Pymunk(Engine):
     name: ClassVar[str] = "pymunk"
     module: ClassVar[str] = "pymunk"
     worlds: ClassVar[Worlds] = (_RigidPymunkWorld, _PymunkWorld)
+    contact_parameters: ClassVar[ContactParameters] = ContactParameters(
+        (0.0, 1.2),
+        {
+            "block": "elasticity=1, friction=1 (of two shapes they multiply)",
+            "floor": "elasticity={restitution:.4g}, friction={friction:.4g}",
+            "space": "collision_bias=0.0018 (0.9 ** 60 a second), collision_slop=0.1",
+        },
+    )
+    advice: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {
+            "creep": "Space.collision_bias, collision_slop, iterations",
+            "damping": "Space.damping",
+            "restitution": "elasticity of both shapes: they multiply",
+            "penetration": "Space.collision_slop, collision_bias",
+            "corners": "Space.collision_slop; radius of the Poly",
+            "friction": "friction of both shapes: they multiply",
+            "solver": "Space.iterations",
+            "sleep": "Space.sleep_time_threshold",
+        }
+    )

@@ -98,12 +98,25 @@ def show(found: Finding, screen: Console) -> None:
             case Text():
                 for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
                     screen.print(line, style=VERDICTS[block.verdict][1], soft_wrap=True)
-    for where, reason in found.failures.items():
-        screen.print(f"failed: {where}: {reason}", style="red", soft_wrap=True)
+    for line in failure_lines(found.failures):
+        screen.print(f"failed: {line}", style="red", soft_wrap=True)
     if not found.complete:
         screen.print("not complete: the same command goes on where it ended", style="yellow")
     if found.answer:
         screen.print(found.answer, style="bold", soft_wrap=True)
+
+
+def failure_lines(failures: Mapping[str, str]) -> list[str]:
+    """A line a reason: the first task that failed for it, and how many more."""
+    tasks: dict[str, list[str]] = {}
+    for task, reason in failures.items():
+        tasks.setdefault(reason, []).append(task)
+    return [
+        f"{labels[0]} and {len(labels) - 1} more: {reason}"
+        if len(labels) > 1
+        else f"{labels[0]}: {reason}"
+        for reason, labels in tasks.items()
+    ]
 
 
 def _grid(table: Table) -> Grid:
@@ -138,7 +151,7 @@ def markdown(found: Finding) -> str:
     """The whole finding as Markdown."""
     parts = [f"# {found.title}", found.answer, *filter(None, map(block_markdown, found.blocks))]
     if found.failures:
-        parts += ["## Failed", "\n".join(f"- {at}: {why}" for at, why in found.failures.items())]
+        parts += ["## Failed", "\n".join(f"- {line}" for line in failure_lines(found.failures))]
     if found.made is not None:
         about = {"made": found.made.created, **found.made.versions, **found.made.hardware}
         parts.append(", ".join(f"{name} {value}" for name, value in about.items()))

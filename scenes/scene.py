@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, StringConstraints, model_validator
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block, Side
-from rockcheck.scenes.errors import refuse
+from rockcheck.scenes.errors import InputError, refuse
 from rockcheck.scenes.excitations import Excitation, Rest
 
 __all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
@@ -27,7 +27,7 @@ class Floor(Frozen):
     """The floor's Coulomb friction and restitution.
 
     `friction` is the kinetic coefficient; `static_friction` None means the same. `restitution` is
-    the normal one, e_g.
+    the normal one, e_g. Beyond `Scene.friction_limit` engines alone play it.
     """
 
     friction: NonNegative
@@ -36,23 +36,12 @@ class Floor(Frozen):
 
     @model_validator(mode="after")
     def _coulomb(self) -> Self:
-        refuse(
-            *(
-                (
-                    mu >= PAINLEVE_FRICTION,
-                    f"{mu:g} is not allowed: must be below 4/3, where a slipping pivot may jam"
-                    " (Painleve)",
-                    key,
-                )
-                for key, mu in (("friction", self.friction), ("static_friction", self.mu_s))
-            ),
-            (
-                self.mu_s < self.friction,
+        if self.mu_s < self.friction:
+            raise InputError(
                 f"{self.mu_s:g} is not allowed: must be at least the kinetic friction"
                 f" {self.friction:g}",
                 "static_friction",
-            ),
-        )
+            )
         return self
 
     @property
@@ -115,13 +104,6 @@ class Scene(Shown, Frozen):
                 "walls",
             ),
             (
-                self.floor.mu_s >= self.block.least_painleve_friction,
-                f"{self.floor.mu_s:g} is not allowed: must be below"
-                f" {self.block.least_painleve_friction:.4g}, where a slipping pivot of"
-                " this block may jam (Painleve)",
-                "floor.friction" if self.floor.static_friction is None else "floor.static_friction",
-            ),
-            (
                 self.duration / self.output_step > MOST_SAMPLES,
                 f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in"
                 f" {self.duration:g} s",
@@ -142,6 +124,26 @@ class Scene(Shown, Frozen):
     def wall(self, side: Side) -> Wall | None:
         """The wall on that side, or None."""
         return next((wall for wall in self.walls if wall.side == side), None)
+
+    @property
+    def friction_limit(self) -> float:
+        """Friction from which on a slipping pivot of this block may jam (Painleve); at most 4/3."""
+        return min(PAINLEVE_FRICTION, self.block.least_painleve_friction)
+
+    def check_friction(self, model: str) -> None:
+        """Raise `InputError` where the friction reaches `friction_limit`: `model` is not for it.
+
+        The motion is then not unique for them; engines play such a scene in their own way.
+        """
+        if self.floor.mu_s < self.friction_limit:
+            return
+        limit = self.friction_limit
+        words = "4/3" if limit == PAINLEVE_FRICTION else f"{limit:.4g}"
+        raise InputError(
+            f"{self.floor.mu_s:g} is not allowed for {model}: must be below {words}, where a"
+            " slipping pivot of this block may jam (Painleve); physics engines play it",
+            "floor.friction" if self.floor.static_friction is None else "floor.static_friction",
+        )
 
     @property
     def frequency_parameter(self) -> float:

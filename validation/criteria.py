@@ -44,18 +44,41 @@ def overturning_velocity(block: Block, gravity: float) -> float:
     return math.sqrt(energy / pivot.share) / math.cos(pivot.alpha)
 
 
+def critical_double_impulse(block: Block, gravity: float) -> float:
+    """Velocity (m/s) of two opposite steps of the base in the worst rhythm that just overturn.
+
+    sqrt(8 g R (1 - cos alpha)/3)/cos alpha/(1 + r), r = 1 - 1.5 sin^2 alpha, of a homogeneous
+    block that does not slip: the second step comes as the block is back from the swing of the
+    first, just after its impact, and adds to r times the velocity that the first gave (after
+    Nabeshima and others 2016).
+    """
+    pivot = block.weaker_pivot
+    ratio = 1.0 - 2.0 * pivot.share * math.sin(pivot.alpha) ** 2
+    return overturning_velocity(block, gravity) / (1.0 + ratio)
+
+
+def time_from_balance(pivot: Pivot, gravity: float, start: float, end: float) -> float:
+    """Time (s) in which a block that rocks without a slip goes from rest to another angle.
+
+    `start` and `end` are angles from its balance point (rad), to the same side. The pivot is that
+    of a pendulum upside down, phi'' = p^2 sin(phi): p t = K(m) - F(chi | m) with m =
+    cos^2(start/2), sin(chi) = cos(end/2)/cos(start/2), elliptic integrals of the first kind.
+    """
+    from scipy.special import ellipkinc, ellipkm1
+
+    half = 0.5 * start
+    chi = math.asin(min(math.cos(0.5 * end) / math.cos(half), 1.0))
+    # The complete integral by 1 - m, which a start near the balance leaves its digits.
+    turn = ellipkm1(math.sin(half) ** 2) - ellipkinc(chi, math.cos(half) ** 2)
+    return float(turn / pivot.frequency_parameter(gravity))
+
+
 def quarter_period(pivot: Pivot, gravity: float, tilt: float) -> float:
     """Time (s) in which a block that rocks without a slip falls back from a tilt (rad) at rest.
 
-    The integral of dtheta over the angular velocity, from the energy, without small angles (Housner
-    1963 for small ones). theta = tilt - root^2 takes the singularity at the start away.
+    Without small angles (Housner 1963 for these).
     """
-    nodes, weights = np.polynomial.legendre.leggauss(60)
-    root = 0.5 * math.sqrt(tilt) * (nodes + 1.0)
-    # cos(alpha - tilt) - cos(alpha - theta)
-    gap = 2.0 * np.sin(pivot.alpha - tilt + 0.5 * root**2) * np.sin(0.5 * root**2)
-    paces = 2.0 * root / (pivot.frequency_parameter(gravity) * np.sqrt(2.0 * gap))
-    return 0.5 * math.sqrt(tilt) * float(weights @ paces)
+    return time_from_balance(pivot, gravity, pivot.alpha - tilt, pivot.alpha)
 
 
 def newmark_slip(velocity: float, acceleration: float, resistance: float) -> float:

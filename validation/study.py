@@ -234,7 +234,8 @@ class _Run:
                 elif time.monotonic() < until:
                     self._end(task, pool.guarded(self.study.play, task))
             if calls:
-                for ended in self._workers.run(calls, until=until):
+                ends = self._workers.run(calls, until=until, on_playing=self._hear_playing)
+                for ended in ends:
                     self._end(ended.call.key, ended.outcome)
             if len(self.done) < len(self.known):  # the time is over
                 return
@@ -251,6 +252,12 @@ class _Run:
             if waiting := [task for task in new if task not in self.done]:
                 return waiting
         return []
+
+    def _hear_playing(self, calls: Sequence[pool.Call]) -> None:
+        """Tell the progress what plays, so that what takes long, or hangs, is known by name."""
+        if calls:
+            labels = [call.key.label for call in calls]
+            self.heard(len(self.done), len(self.known), " and ".join(labels))
 
     def _end(self, task: Task, result: Any) -> None:
         self.done[task] = result

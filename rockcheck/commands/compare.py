@@ -75,10 +75,10 @@ def run(
         )
     )
     if reference.is_dir() or reference.suffix == ".json":
-        from rockcheck.validation.studies.conformance import study
+        from rockcheck.validation.studies.conformance import changes
 
-        if study.wrote(reference):
-            told(study.changes(reference, candidate))
+        if changes.wrote(reference):
+            told(changes.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
         told(across.difference(results.Run.load(reference), results.Run.load(candidate)))
     if plot is not None:

@@ -424,11 +424,13 @@ def stress(
 
 
 def conformance(
-    engine: Annotated[
+    engines: Annotated[
         list[str] | None,
         typer.Option(
+            "--models",
             "--engine",
-            help="A name or module:Class; repeatable (default: all installed).",
+            help="Engines by name, or module:Class, with commas between; repeatable (default: all"
+            " engines that are installed).",
             autocompletion=model_names,
         ),
     ] = None,
@@ -457,6 +459,14 @@ def conformance(
             " penetration (m).",
         ),
     ] = None,
+    limit: Annotated[
+        float | None,
+        typer.Option(
+            "--limit",
+            min=1.0,
+            help="Longest time of a phenomenon, s (default: some 100 times the usual one).",
+        ),
+    ] = None,
     allow_code: AllowCodeOption = None,
     played: Played = Played(OUT / "conformance"),
 ) -> None:
@@ -465,63 +475,68 @@ def conformance(
     Writes a card an engine: a page, JSON, JUnit and Markdown. Exit 1 where an engine fails one.
     With --tune, finds what an engine needs for a restitution: it drops a block, and slides it.
     """
-    from rockcheck.validation.studies.conformance.study import (
-        WANTED,
-        Conformance,
-        Tune,
-        Tuning,
-        named,
-        written,
-    )
+    from rockcheck.validation.studies.conformance.cards import Conformance
+    from rockcheck.validation.studies.conformance.players import named, written
 
-    errors.refuse(
-        (
-            export and any((engine, histories, sets, tune is not None)),
-            "does not go with --engine, --histories, --tune or --set",
-            "--export",
-        ),
-        (tune is not None and histories, "does not go with --histories", "--tune"),
-    )
+    if export and (engines or histories or sets or tune is not None):
+        raise errors.InputError(
+            "does not go with --models, --histories, --tune or --set", "--export"
+        )
+    if tune is not None and histories:
+        raise errors.InputError("does not go with --histories", "--tune")
     if export is not None:
         _export(usable_folder(export))
-    given, folders = settings_of(sets or ()), histories or []
-    known = () if folders else models.ENGINE_NAMES
-    names = list(dict.fromkeys(engine or itertools.filterfalse(models.not_installed, known)))
-    _check_engines(names, allow_code or (), own=tune is None)
+    settings, folders = settings_of(sets or ()), histories or []
+    names = _engine_names(engines or (), () if folders else models.ENGINE_NAMES)
+    _check_engines(names, allow_code or (), user_models=tune is None)
     if tune is not None:
-        wanted = WANTED.keys() - {"restitution"}
-        if unknown := given.keys() - wanted:
-            raise errors.unknown_name("setting", min(unknown), wanted)
-        studied(
-            Tuning(tuple(Tune(name, tune, **given) for name in names)),
-            replace(played, out=played.out / "tuned"),
-        )
-    setup = given.pop("settings", None)
-    kinds = ("best", "default") if setup == "both" else (setup,)
-    players = (named(*pair, given) for pair in itertools.product(names, kinds))
-    studied(Conformance((*players, *map(written, folders))), played)
+        _tune(names, tune, settings, replace(played, out=played.out / "tuned"))
+    setup = settings.pop("settings", None)
+    setups = ("best", "default") if setup == "both" else (setup,)
+    players = [named(*pair, settings) for pair in itertools.product(names, setups)]
+    players += [written(folder) for folder in folders]
+    studied(Conformance(tuple(players), limit), played)
 
 
-def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, own: bool) -> None:
+def _tune(
+    names: Sequence[str], restitution: float, settings: Mapping[str, Any], played: Played
+) -> NoReturn:
+    from rockcheck.validation.studies.conformance.tuning import WANTED, Tune, Tuning
+
+    wanted = WANTED.keys() - {"restitution"}
+    if unknown := settings.keys() - wanted:
+        raise errors.unknown_name("setting", min(unknown), wanted)
+    studied(Tuning(tuple(Tune(name, restitution, **settings) for name in names)), played)
+
+
+def _engine_names(words: Sequence[str], default: Sequence[str]) -> list[str]:
+    """The names in words with commas between them; without words those of `default` here."""
+    names = [name.strip() for word in words for name in word.split(",")]
+    if not names:
+        names = [name for name in default if not models.not_installed(name)]
+    return list(dict.fromkeys(names))
+
+
+def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, user_models: bool) -> None:
     known = models.ENGINE_NAMES
     for name in names:
         models.check_allowed(name, allow_code)
-        if name not in known and not (own and models.is_own(name)):
+        if name not in known and not (user_models and models.is_own(name)):
             raise errors.InputError(
                 f"{printable(name)!r} is not allowed: give one of {', '.join(known)}"
-                + ", or module:Class" * own,
-                "--engine",
+                + ", or module:Class" * user_models,
+                "--models",
             )
-    need_installed(names, "--engine")
+    need_installed(names, "--models")
 
 
 def _export(folder: Path) -> NoReturn:
     from rockcheck.reports.site import write_scene_file
-    from rockcheck.validation.studies.conformance import phenomena, study
+    from rockcheck.validation.studies.conformance import export, phenomena
 
     for name, scene in phenomena.SCENES.items():
         write_scene_file(scene, folder, name)
-    names = study.export(folder)
+    names = export.export(folder)
     lines = [
         f"{len(names)} scenes in {folder}, README.md says how they are meant; then:",
         f"  rockcheck conformance --histories {folder}",

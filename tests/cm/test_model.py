@@ -259,3 +259,9 @@ def test_named_scene_runs(name):
     assert np.array_equal(history.channels["t"], shown.output_times)
     assert history.cost.evaluations >= history.cost.steps > 36.0 / model.time_step_in(shown)
     assert np.all(np.diff([event.t for event in history.event_list]) >= 0.0)
+
+
+def test_friction_that_may_jam_a_pivot_is_for_engines_alone(fault_of):
+    fault = fault_of(ContinuousModel().simulate, scene(floor=Floor(friction=2.0)))
+    assert fault.key == "floor.friction"
+    assert "must be below 4/3" in str(fault)

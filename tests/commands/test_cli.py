@@ -102,7 +102,7 @@ FILES = {
             ["simulate", "fig5a", *["--set", "tolerance=1e-8"] * 2],
             "--set: tolerance is given twice",
         ),
-        (["conformance", "--export", "x", "--tune", "1"], "--export: does not go with --engine"),
+        (["conformance", "--export", "x", "--tune", "1"], "--export: does not go with --models"),
         (["conformance", "--histories", "x", "--tune", "1"], "--tune: does not go with"),
         (["stress", "maps", "--runs", "5"], "--runs: is of random scenes, not of maps"),
         (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),
@@ -194,14 +194,14 @@ FILES = {
         *(
             (["conformance", *words.split()], said)
             for words, said in (
-                ("--engine ebm", "--engine: 'ebm' is not allowed: give one of mujoco"),
+                ("--engine ebm", "--models: 'ebm' is not allowed: give one of mujoco"),
                 ("--set time_step=0", "mujoco.time_step: 0 is not allowed"),
                 ("--set softness=2", "mujoco.softness"),
                 ("--set colour=red", "mujoco.colour"),
                 ("--histories nowhere", "engine.toml: cannot be read"),
                 ("--histories .", "engine.toml: colour"),
                 ("--tune 0.5 --set settings=best", "settings"),
-                ("--tune 0.5 --engine ebm", "--engine: 'ebm' is not allowed: give one of mujoco"),
+                ("--tune 0.5 --engine ebm", "--models: 'ebm' is not allowed: give one of mujoco"),
                 ("--tune 2", "--tune: 2.0 is not allowed"),
                 ("--tune nan", "--tune: nan is not allowed"),
                 ("--tune 0.5 --set time_step=0", "--set time_step: 0 is not allowed"),

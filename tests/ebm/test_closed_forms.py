@@ -116,6 +116,28 @@ def test_least_rectangular_pulse_that_overturns(alpha, ratio, factor):
     assert (history.outcome == "overturned left") is (factor > 1.0)
 
 
+@pytest.mark.parametrize(("factor", "outcome"), [(0.999, "stays"), (1.001, "overturns")])
+@pytest.mark.parametrize("alpha", [0.1, 0.25, 0.45])
+def test_critical_double_impulse(alpha, factor, outcome):
+    """Two opposite steps of the base's velocity, the second just after the impact that ends the
+    first swing, overturn at sqrt(8 g R (1 - cos a)/3)/cos a/(1 + r) with Housner's r (after
+    Nabeshima and others 2016)."""
+    block, step = block_of(alpha, 1.6), 2e-5
+    single = math.sqrt(8.0 * G * block.radius * (1.0 - math.cos(alpha)) / 3.0) / math.cos(alpha)
+    velocity = factor * single / (2.0 - 1.5 * math.sin(alpha) ** 2)
+    spin = 0.75 * velocity * math.cos(alpha) / block.radius
+    top = math.acos(math.cos(alpha) + spin**2 * block.radius / (1.5 * G))
+    back = round(2.0 * quarter_period(block, alpha - top) / step) + 3
+    samples = np.zeros(back + 2)
+    samples[1], samples[back] = velocity / step, -velocity / step
+    history = EventBasedModel(friction="no-slip").simulate(
+        block_scene(
+            block, 1.0, duration=12.0, excitation=Record.from_samples(samples, time_step=step)
+        )
+    )
+    assert ("overturns" if history.outcome.startswith("overturned") else "stays") == outcome
+
+
 # --- sliding and bouncing
 
 

@@ -9,6 +9,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.scenes import (
     PAPER_BLOCK,
+    Block,
     Floor,
     Record,
     Rest,
@@ -196,3 +197,36 @@ def test_restitution_of_one_and_walls_that_touch(pivot):
     hits = [e.t for e in history.event_list if e.kind == "wall impact"]
     np.testing.assert_allclose(hits, [0.3, 0.7, 1.1, 1.5, 1.9], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(np.abs(history.channels["x_dot"]), 1.0, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"floor": Floor(friction=4.0 / 3.0)}, "floor.friction", "must be below 4/3"),
+        (
+            {"floor": Floor(friction=0.3, static_friction=1.5)},
+            "floor.static_friction",
+            "must be below 4/3",
+        ),
+        (
+            {"block": Block(half_width=0.4, half_height=1.0, moment_of_inertia=0.02)},
+            "floor.friction",
+            "must be below 0.2649",
+        ),
+    ],
+)
+@pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
+def test_friction_that_may_jam_a_pivot_is_for_engines_alone(change, key, words, pivot, fault_of):
+    fault = fault_of(EventBasedModel(pivot=pivot).simulate, scene_of(**change))
+    assert fault.key == key
+    assert words in str(fault)
+    assert "physics engines play it" in str(fault)
+
+
+def test_what_never_slips_has_no_friction_to_jam():
+    model = EventBasedModel(friction="no-slip")
+    motions = [
+        model.simulate(scene_of(floor=Floor(friction=mu), initial_rotation=0.1)).channels["theta"]
+        for mu in (0.5, 5.0)
+    ]
+    np.testing.assert_array_equal(*motions)

@@ -421,3 +421,17 @@ def test_a_bounce_does_not_turn_the_slip_round(varying_engine, slip):
         for model in (varying_engine(), EventBasedModel(pivot="unilateral"))
     )
     np.testing.assert_allclose(found, exact, atol=1e-6)
+
+
+@pytest.mark.parametrize("friction", [2.0, 10.0])
+def test_friction_beyond_painleve_is_played_by_engines(double_engine, friction):
+    """What slides stops all the same after v^2/(2 mu g), if it is too squat to tip."""
+    scene = Scene(
+        name="rubber",
+        block=Block(half_width=50.0, half_height=0.5),
+        floor=Floor(friction=friction),
+        initial_velocity=2.0,
+        duration=0.3,
+    )
+    x = double_engine(time_step=1e-4).simulate(scene).channels["x"]
+    assert x[-1] == pytest.approx(4.0 / (2.0 * friction * 9.81), rel=0.02)

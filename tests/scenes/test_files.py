@@ -54,11 +54,6 @@ def test_a_scene_file(written):
             "block.half_width: -0.397 is not allowed: input should be greater than 0",
         ),
         ("half_width = 0.397", 'half_width = "0.397"', "block.half_width: 0.397 is not allowed"),
-        (
-            "friction = 0.3",
-            "friction = 1.4",
-            "floor.friction: 1.4 is not allowed: must be below 4/3",
-        ),
         ('side = "left"', 'side = "top"', "walls.0.side: top is not allowed"),
         ('kind = "ricker"', 'kind = "morlet"', "excitation"),
         ('kind = "ricker"', "", "excitation: kind is missing"),

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from rockcheck import Block, EventBasedModel, Floor, Record, Rest, Scene, Sine
 from rockcheck.validation import criteria
@@ -160,3 +161,40 @@ def test_a_base_at_rest_moves_nothing_and_of_a_wide_block_each_estimate_is_a_num
     )
     assert (criterion.says(scene, criteria.base_of(scene))[1] or 0.0) >= 0.0
     assert criteria.reserve_rocking(scene, criteria.base_of(scene)) > 0.0
+
+
+@pytest.mark.parametrize(("start", "end"), [(1e-3, 1.0), (1e-6, 0.5), (0.5, 1.0), (0.9, 1.0)])
+@pytest.mark.parametrize("block", BLOCKS)
+def test_time_from_balance_is_that_of_the_pendulum_upside_down(block, start, end):
+    """phi'' = p^2 sin(phi) from rest, stepped through; angles in alpha."""
+    pivot = block.weaker_pivot
+    p, first, last = pivot.frequency_parameter(G), start * pivot.alpha, end * pivot.alpha
+
+    def arrives(t, state):
+        return state[0] - last
+
+    arrives.terminal = True
+    found = solve_ivp(
+        lambda t, state: [state[1], p * p * math.sin(state[0])],
+        (0.0, 60.0),
+        [first, 0.0],
+        "DOP853",
+        rtol=1e-13,
+        atol=1e-18,
+        events=arrives,
+    )
+    assert criteria.time_from_balance(pivot, G, first, last) == pytest.approx(found.t[-1], rel=1e-9)
+
+
+def test_a_cube_leaves_its_balance_in_the_time_of_the_card():
+    cube = Block(half_width=0.413, half_height=0.413).weaker_pivot
+    start = 1e-3 * cube.alpha
+    assert criteria.time_from_balance(cube, G, start, cube.alpha) == pytest.approx(2.145, abs=5e-4)
+
+
+def test_the_critical_double_impulse_is_the_step_over_one_and_the_ratio():
+    for block in BLOCKS:
+        ratio = 1.0 - 1.5 * math.sin(block.alpha) ** 2
+        assert criteria.critical_double_impulse(block, G) == pytest.approx(
+            criteria.overturning_velocity(block, G) / (1.0 + ratio), rel=1e-14
+        )

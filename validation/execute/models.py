@@ -1,6 +1,7 @@
 """The models by the names that suites and the command line use, and how a worker plays them."""
 
 import importlib
+import inspect
 import sys
 import tempfile
 import time
@@ -239,7 +240,23 @@ def build(
         model: Model = model_class(**kind.fixed, **settings)
     except InputError as error:
         raise InputError(error.reason, f"{name}.{error.key}" if error.key else name) from None
+    except TypeError as error:
+        if fault := _signature_fault(model_class, settings):
+            raise InputError(
+                f"{printable(name)} takes no such settings: {fault}; a model takes them as"
+                " keywords, as in __init__(self, **settings)"
+            ) from error
+        raise
     return model
+
+
+def _signature_fault(model_class: Any, settings: Mapping[str, Any]) -> str:
+    """Why a class cannot be made with these settings; "" where its signature takes them."""
+    try:
+        inspect.signature(model_class).bind(**settings)
+    except TypeError as error:
+        return printable(error)
+    return ""
 
 
 #: What a batch sums of the cost of its runs.
@@ -280,8 +297,7 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
     Raises the model's errors.
     """
     began = time.perf_counter()
-    returned = _simulate(work, scene)
-    history = _read_back(returned) if is_own(work.family) else returned  # which may be anything
+    history = history_of(work, scene)
     found = (
         numerical.numerical_uncertainty(
             build(work.family, work.settings, work.search_path), scene, history
@@ -306,6 +322,15 @@ def play(work: Work, scene: Scene, *, uncertainty: bool = False) -> Played:
         history.packed(),
         history,
     )
+
+
+def history_of(work: Work, scene: Scene) -> History:
+    """The history of a scene; that of a user-defined model, which may be anything, is read back.
+
+    Raises the model's errors, and `ModelFailure` where it returns what cannot be used.
+    """
+    returned = _simulate(work, scene)
+    return _read_back(returned) if is_own(work.family) else returned
 
 
 def _read_back(history: History) -> History:

@@ -37,6 +37,8 @@ ONE_THREAD = dict.fromkeys(
 AHEAD = 2
 #: Extra time (s) of the first call that uses compiled code, to compile it.
 COMPILING = 600.0
+#: How often the run looks which calls play, s.
+LOOK = 1.0
 #: How often a pool begins anew with new processes.
 MOST_BREAKS = 10
 #: Exit code of a process that ended by itself, told in place of 0.
@@ -181,10 +183,17 @@ class Pool:
             for key, value in self._environment.items():
                 os.environ.pop(key, None) if value is None else os.environ.update({key: value})
 
-    def run(self, calls: Iterable[Call], *, until: float = math.inf) -> Iterator[Ended]:
+    def run(
+        self,
+        calls: Iterable[Call],
+        *,
+        until: float = math.inf,
+        on_playing: Callable[[list[Call]], None] = lambda calls: None,
+    ) -> Iterator[Ended]:
         """Run the calls, and yield each as it ends.
 
-        Calls that have not ended at `until` (of `time.monotonic`) are ended and not yielded.
+        Calls that have not ended at `until` (of `time.monotonic`) are ended and not yielded. While
+        none ends, `on_playing` hears now and then which calls play.
         """
         waiting = deque(calls)
         running: dict[Future[Any], tuple[Call, float]] = {}
@@ -193,11 +202,7 @@ class Pool:
             while waiting or running:
                 self._mend(waiting, running)
                 self._begin(waiting, running)
-                done = wait(
-                    running,
-                    min(max(0.0, until - time.monotonic()), threading.TIMEOUT_MAX),
-                    FIRST_COMPLETED,
-                ).done
+                done = _await_end(running, until, on_playing)
                 if not done:
                     return
                 if self._mend(waiting, running):
@@ -259,6 +264,20 @@ class Pool:
                 call.function, args=call.arguments, timeout=None if seconds == math.inf else seconds
             )
         ]
+
+
+def _await_end(
+    running: dict[Future[Any], tuple[Call, float]],
+    until: float,
+    on_playing: Callable[[list[Call]], None],
+) -> set[Future[Any]]:
+    """Those that have ended, as soon as there are any; none where `until` comes first."""
+    while True:
+        left = max(0.0, until - time.monotonic())
+        done = wait(running, min(left, LOOK), FIRST_COMPLETED).done
+        if done or left <= LOOK:
+            return done
+        on_playing([call for future, (call, _) in running.items() if future.running()])
 
 
 @contextmanager
