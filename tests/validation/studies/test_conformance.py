@@ -144,7 +144,7 @@ def test_the_engines_here_are_those_that_are_installed():
         (
             "mujoco",
             "default",
-            2,
+            3,
             {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14", "RC-21", "RC-22", "RC-28"},
         ),
         *(
@@ -170,7 +170,7 @@ def test_the_engines_here_are_those_that_are_installed():
             )
         ),
         pytest.param(
-            "drake", "best", 2, set(), marks=[pytest.mark.slow, pytest.mark.needs("drake")]
+            "drake", "best", 3, set(), marks=[pytest.mark.slow, pytest.mark.needs("drake")]
         ),
     ],
 )
