@@ -44,7 +44,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Floats, Scene, kinematics
+from rockcheck.cm.extremes import FLAT_SHARE, Corners, note_mode, note_place
+from rockcheck.cm.grid import GRID
+from rockcheck.scenes import Floats, Scene, interpolation, kinematics
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
 Integers = NDArray[np.int64]
@@ -55,14 +57,11 @@ Vector = tuple[float, float]
 #: Samples of the base acceleration along one axis, the sums of their means (of two neighbours each)
 #: up to every one, and how many there are a second.
 Samples = tuple[Floats, Floats, float]
-#: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top
-#: right.
-Corners = tuple[float, float, float, float, float, float, float, float]
 
 SURFACES = LEFT_WALL, RIGHT_WALL, FLOOR = 0, 1, 2
 #: Columns of a contact's memory; contact 2 i + j is corner j (on walls the lower, on the floor the
 #: left one is 0) at surface i.
-COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE, STIFFNESS = 0, 1, 2, 3, 4, 5, 6
+COLUMNS = CLOSED, DAMPING, FORCE, LAST_CLOSED, STRUCK, IMPULSE, STIFFNESS, SPEED = range(8)
 #: Columns of the floor's friction: force, the spring's stretch, whether it slips, whether it
 #: slipped a step ago.
 SHEAR, STRETCH, SLIPS, SLIPPED = 0, 1, 2, 3
@@ -95,6 +94,30 @@ TOUCHING = 1e-9
 DONE, OVERTURNED, BLOWN_UP = 0, 1, 2
 
 
+#: The state of a run: the motion of the mass's centre at the end of the last step, and at its
+#: start; SI units, the velocities those of the centre and the rotation.
+STATE = np.dtype(
+    [
+        *((name, "f8") for name in ("t", "x", "y", "theta", "vx", "vy", "w")),
+        *((f"past_{name}", "f8") for name in ("t", "x", "y", "theta", "vx", "vy", "w")),
+        # The time until which a contact is young, the step that it needs; the time until an open
+        # contact closes; when the first strike began that is not written yet, s.
+        ("calm", "f8"),
+        ("fine", "f8"),
+        ("closing", "f8"),
+        ("first_strike", "f8"),
+        # The energy allowed by the work done on the block; that work, every part of it positive.
+        ("allowed", "f8"),
+        ("gross", "f8"),
+        # The number of the next multiple of `GRID`; counts of the steps, and of the sweeps over the
+        # surfaces.
+        ("grid", "i8"),
+        ("steps", "i8"),
+        ("sweeps", "i8"),
+    ]
+)
+
+
 class Parameters(NamedTuple):
     """Constants of a run; SI units, per unit mass. Tuples hold one value a surface."""
 
@@ -114,6 +137,8 @@ class Parameters(NamedTuple):
     time_step: float
     #: `STRIKE`, or for as long as a contact is young, s.
     strike: float
+    #: Below this |theta| the block is flat, rad.
+    flat: float
 
 
 class Contacts(NamedTuple):
@@ -211,8 +236,8 @@ def damping_ratio(restitution: float, least: float) -> float:
 
 def begun(
     scene: Scene, stiffness: float, time_step: float, calibrated: bool
-) -> tuple[Floats, Contacts]:
-    """State (see `advance`) and contacts at t = 0; the latter `calibrated`, or the paper's.
+) -> tuple[np.record, Contacts]:
+    """State and contacts at t = 0; the latter `calibrated`, or the paper's.
 
     A block on the floor starts sunk in by its weight, so that it does not bounce.
     """
@@ -239,6 +264,7 @@ def begun(
         calibrated=calibrated,
         time_step=time_step,
         strike=max(STRIKE, YOUNG / math.sqrt(stiffness)),
+        flat=FLAT_SHARE * scene.block.alpha,
     )
     x, y, tilt, *rates = scene.initial_state
     memory = np.zeros((2 * len(SURFACES), len(COLUMNS)))
@@ -265,7 +291,17 @@ def begun(
         placed[1] -= sunk
     energy = kinematics.energy(scene.block, scene.gravity, y, tilt, *rates)
     gross = abs(energy) + 0.01 * scene.gravity * scene.block.half_width
-    state = np.array((*placed, 0.0, math.inf, 0.0, math.inf, energy, gross))
+    x, y, theta, vx, vy, w = placed.tolist()
+    state = np.rec.array(
+        [
+            (
+                *(0.0, x, y, theta, vx, vy, w),
+                *(0.0, x, y, theta, vx, vy, w),
+                *(0.0, math.inf, 0.0, math.inf, energy, gross, 1, 0, 0),
+            )
+        ],
+        dtype=STATE,
+    )[0]
     surfaces = np.flatnonzero(np.isfinite(parameters.distance))
     return state, Contacts(memory, np.zeros(4), parameters, surfaces)
 
@@ -455,6 +491,7 @@ def closes(
     if t - memory[one, LAST_CLOSED] > parameters.strike:
         memory[one, STRUCK] = t
         memory[one, IMPULSE] = 0.0
+        memory[one, SPEED] = -comes.rate
     if parameters.calibrated:
         left, right, bottom, top = parameters.reach
         spring = 1.0
@@ -660,7 +697,8 @@ def gather(
     for i in range(len(memory)):
         memory[i, IMPULSE] += step * memory[i, FORCE]
         if memory[i, STRUCK] <= until:
-            events[n_events, :] = memory[i, STRUCK], float(i), memory[i, IMPULSE]
+            events[n_events, 0], events[n_events, 1] = memory[i, STRUCK], float(i)
+            events[n_events, 2], events[n_events, 3] = memory[i, IMPULSE], memory[i, SPEED]
             n_events += 1
             memory[i, STRUCK] = math.inf
         first = min(first, memory[i, STRUCK])
@@ -742,96 +780,120 @@ def corners_at(parameters: Parameters, theta: float) -> Corners:
 
 
 @inner_kernel
-def run_to(
+def take_step(
     contacts: Contacts,
     base: tuple[Samples, Samples],
-    times: tuple[float, float],
-    state: Floats,
+    end: float,
+    state: np.record,
+    noted: Floats,
     events: Floats,
     n_events: int,
-) -> tuple[bool, int, int, int, float]:
-    """Steps from one of two times to the other, and moves `state` along (see `advance`).
-
-    Returns whether the block overturns, the events written, the steps and the sweeps taken, and the
-    time reached.
-    """
+) -> int:
+    """Moves `state` on by one step, to `end` (s) at most. Returns the events written."""
     parameters, memory = contacts.parameters, contacts.memory
     contact_time = 1.0 / math.sqrt(parameters.stiffness)
-    x, y, theta, vx, vy, w, calm, fine, closing, first_strike, allowed, gross = state
-    v = vx, vy, w
-    steps = sweeps = 0
-    t, end = times
-    while t < end and abs(theta) < 0.5 * math.pi:
-        settled = t >= calm
-        step = max(min(parameters.time_step if settled else fine, closing), SHORTEST * contact_time)
-        if t + step > end - SHORTEST * contact_time:
-            step = end - t
-        half = 0.5 * step
-        middle = t + half
-        # Means over the step.
-        u = (gained(*base[0], t + step) - gained(*base[0], t)) / step
-        vg = (gained(*base[1], t + step) - gained(*base[1], t)) / step
-        t = end if step == end - t else t + step
-        steps += 1
-        # Half a step of motion, then the kick.
-        x += half * v[0]
-        y += half * v[1]
-        theta += half * v[2]
-        v0 = v
-        v = v[0] - step * u, v[1] - step * (parameters.gravity + vg), v[2]
-        now = Step(x, y, corners_at(parameters, theta), v0, step, middle)
-        v, closing, young, swept = kick(contacts, now, v, settled)
-        sweeps += swept
-        stretch(contacts, now, v)
-        if young < math.inf:
-            fine = young if settled else min(young, fine)
-            calm = middle + YOUNG * contact_time
-        if min(first_strike, young) < math.inf:
-            n_events, first_strike = gather(memory, step, t - parameters.strike, events, n_events)
-        work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
-        allowed += work
-        gross += abs(work)
-        x += half * v[0]
-        y += half * v[1]
-        theta += half * v[2]
-    state[:] = x, y, theta, v[0], v[1], v[2], calm, fine, closing, first_strike, allowed, gross
-    return abs(theta) >= 0.5 * math.pi, n_events, steps, sweeps, t
+    t = state.t
+    settled = t >= state.calm
+    longest = parameters.time_step if settled else state.fine
+    step = max(min(longest, state.closing), SHORTEST * contact_time)
+    stop = min(state.grid * GRID, end)
+    if t + step > stop - SHORTEST * contact_time:
+        step = stop - t
+    half = 0.5 * step
+    middle = t + half
+    # Means over the step.
+    u = (gained(*base[0], t + step) - gained(*base[0], t)) / step
+    vg = (gained(*base[1], t + step) - gained(*base[1], t)) / step
+    v0 = state.vx, state.vy, state.w
+    state.past_t, state.past_x, state.past_y, state.past_theta = t, state.x, state.y, state.theta
+    state.past_vx, state.past_vy, state.past_w = v0
+    # Half a step of motion, then the kick.
+    x, y, theta = state.x + half * v0[0], state.y + half * v0[1], state.theta + half * v0[2]
+    corners = corners_at(parameters, theta)
+    note_place(noted, x, y, theta, middle, corners)
+    now = Step(x, y, corners, v0, step, middle)
+    v = v0[0] - step * u, v0[1] - step * (parameters.gravity + vg), v0[2]
+    v, state.closing, young, swept = kick(contacts, now, v, settled)
+    stretch(contacts, now, v)
+    load = memory[2 * FLOOR, FORCE] + memory[2 * FLOOR + 1, FORCE]
+    slip_rate = lower_corner(now, v)[1] if load > 0.0 else 0.0
+    note_mode(noted, theta, v[2], slip_rate, middle, parameters.flat)
+    if step == stop - t:
+        t = stop
+        state.grid += 1
+    else:
+        t += step
+    if young < math.inf:
+        state.fine = young if settled else min(young, state.fine)
+        state.calm = middle + YOUNG * contact_time
+    if min(state.first_strike, young) < math.inf:
+        n_events, state.first_strike = gather(memory, step, t - parameters.strike, events, n_events)
+    work = -half * (u * (v0[0] + v[0]) + vg * (v0[1] + v[1]))
+    state.allowed += work
+    state.gross += abs(work)
+    state.t, state.x, state.y = t, x + half * v[0], y + half * v[1]
+    state.theta = theta + half * v[2]
+    state.vx, state.vy, state.w = v
+    state.steps += 1
+    state.sweeps += swept
+    return n_events
+
+
+@inner_kernel
+def write_row(state: np.record, t: float, row: Floats) -> None:
+    """The motion at a time within the last step: places by the cubic, rates in between."""
+    if t == state.t:
+        row[0], row[1], row[2] = state.x, state.y, state.theta
+        row[3], row[4], row[5] = state.vx, state.vy, state.w
+        return
+    length = state.t - state.past_t
+    share = (t - state.past_t) / length
+    first = state.past_x, state.past_y, state.past_theta
+    last = state.x, state.y, state.theta
+    before, after = (state.past_vx, state.past_vy, state.past_w), (state.vx, state.vy, state.w)
+    for i in range(3):
+        row[i] = hermite(share, first[i], last[i], length * before[i], length * after[i])
+        row[3 + i] = before[i] + share * (after[i] - before[i])
+
+
+hermite = inner_kernel(interpolation.hermite)
 
 
 @kernel
 def advance(
     contacts: Contacts,
     base: tuple[Samples, Samples],
-    state: Floats,
+    state: np.record,
+    noted: Floats,
     events: Floats,
+    end: float,
     times: Floats,
     output: Floats,
-) -> tuple[int, int, int, int, int, float]:
-    """Fills the rows of `output` with the motion that follows `state`, which is moved along.
+) -> tuple[int, int, int]:
+    """Fills the rows of `output`, at `times`, with the motion that follows `state`.
 
-    The first of the `times` is that of `state`, the others are those of the rows. A row is x, y,
-    theta and their rates. `state` (12) continues with the time until which a contact is young, the
-    step that it needs, the time until an open contact closes, when the first strike began that is
-    not written yet, the energy allowed by the work done on the block, and that work with every part
-    of it counted as positive. `events` gets rows (onset time, contact, impulse). Returns the ending
-    (DONE, OVERTURNED or BLOWN_UP), the rows and events written, the steps taken, the sweeps over
-    the surfaces, and the time reached.
+    That is moved along, in steps that know nothing of the rows: they end at multiples of `GRID`
+    and at the run's `end`. A row is
+    x, y, theta and their rates. `noted` holds the extremes (see `cm.extremes`). `events` gets rows
+    (onset time, contact, impulse, speed of approach). Returns the ending (DONE, OVERTURNED or
+    BLOWN_UP), the rows and events written.
     """
     parameters = contacts.parameters
-    n_events = steps = sweeps = 0
-    for row in range(len(output)):
-        falls, n_events, taken, swept, t = run_to(
-            contacts, base, (times[row], times[row + 1]), state, events, n_events
-        )
-        steps += taken
-        sweeps += swept
-        if falls:
-            return OVERTURNED, row, n_events, steps, sweeps, t
-        vx, vy, w, allowed, gross = state[3], state[4], state[5], state[10], state[11]
-        energy = 0.5 * (vx**2 + vy**2 + w**2 / parameters.inverse_inertia) + parameters.gravity * (
-            state[1] - parameters.reach[2]
-        )
-        if not (energy <= allowed + ENERGY * gross and energy < 1e300):
-            return BLOWN_UP, row, n_events, steps, sweeps, t
-        output[row, :] = state[:6]
-    return DONE, len(output), n_events, steps, sweeps, times[-1]
+    n_events = row = 0
+    ending = DONE
+    while row < len(output) and ending == DONE:
+        if times[row] > state.t:
+            n_events = take_step(contacts, base, end, state, noted, events, n_events)
+            if abs(state.theta) >= 0.5 * math.pi:
+                ending = OVERTURNED
+            continue
+        kinetic = state.vx**2 + state.vy**2 + state.w**2 / parameters.inverse_inertia
+        energy = 0.5 * kinetic + parameters.gravity * (state.y - parameters.reach[2])
+        if not (energy <= state.allowed + ENERGY * state.gross and energy < 1e300):
+            ending = BLOWN_UP
+            continue
+        write_row(state, times[row], output[row])
+        row += 1
+    corners = corners_at(parameters, state.theta)
+    note_place(noted, state.x, state.y, state.theta, state.t, corners)
+    return ending, row, n_events

@@ -2,12 +2,14 @@
 
 import math
 import time
+from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
 
+from rockcheck.cm.grid import GRID
 from rockcheck.scenes import (
     Cost,
     Event,
@@ -19,6 +21,7 @@ from rockcheck.scenes import (
     Rest,
     Ricker,
     Scene,
+    Side,
     Sine,
     errors,
     kinematics,
@@ -100,11 +103,11 @@ class ContinuousModel(Frozen):
         return scene.gravity / self.penetration if self.stiffness is None else self.stiffness
 
     def time_step_in(self, scene: Scene) -> float:
-        """Longest step in s in that scene, a whole fraction of its output step."""
+        """Longest step in s in that scene, a whole fraction of `GRID`."""
         longest = (
             3.0 / math.sqrt(self.stiffness_in(scene)) if self.time_step is None else self.time_step
         )
-        return scene.output_step / math.ceil(scene.output_step / longest * (1.0 - 1e-12))
+        return GRID / math.ceil(GRID / longest * (1.0 - 1e-12))
 
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene's block. Events: floor impacts, wall impacts, overturning.
@@ -115,7 +118,7 @@ class ContinuousModel(Frozen):
         errors.check_kind(scene, Scene, "load_scene", "scene")
         scene.check_friction("the continuous model")
         began = time.perf_counter()
-        from rockcheck.cm import kernels
+        from rockcheck.cm import extremes, kernels
 
         times = scene.run_times
         stiffness, dt = self.stiffness_in(scene), self.time_step_in(scene)
@@ -135,51 +138,52 @@ class ContinuousModel(Frozen):
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
         strikes_a_slab = (
-            math.ceil(min(rows_a_slab * scene.output_step, times[-1]) / kernels.STRIKE) + 2
+            math.ceil(min(rows_a_slab * scene.output_step, times[-1]) / kernels.STRIKE) + 4
         )
-        events = np.empty((len(contacts.memory) * strikes_a_slab, 3))
-        advance = partial(kernels.advance, contacts, base, state, events)
-        advance(times[:1], output[:0])  # compiles, or reads the compiled loop from its cache
+        events = np.empty((len(contacts.memory) * strikes_a_slab, 4))
+        noted = extremes.noted_at_start(scene)
+        end = float(times[-1])
+        advance = partial(kernels.advance, contacts, base, state, noted, events, end)
+        advance(times[:0], output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
         strikes: list[Floats] = []
-        row, steps, sweeps, ending, reached = 1, 0, 0, kernels.DONE, 0.0
+        row, ending = 1, kernels.DONE
         while row < len(times) and ending == kernels.DONE:
-            slab = partial(
-                advance, times[row - 1 : row + rows_a_slab], output[row : row + rows_a_slab]
-            )
-            ending, rows, found, more_steps, more_sweeps, reached = progress.interruptible(slab)
-            row, steps, sweeps = row + rows, steps + more_steps, sweeps + more_sweeps
-            strikes.append(events[:found].copy())
-            if steps > MOST_STEPS:
+            slab = slice(row, row + rows_a_slab)
+            play = partial(advance, times[slab], output[slab])
+            ending, rows, count = progress.interruptible(play)
+            row += rows
+            strikes.append(events[:count].copy())
+            if state.steps > MOST_STEPS:
                 raise errors.ModelFailure(
-                    f"cm: more than {MOST_STEPS:.3g} steps by {reached:.4g} s"
+                    f"cm: more than {MOST_STEPS:.3g} steps by {state.t:.4g} s"
                 )
         if ending == kernels.BLOWN_UP:
             raise errors.ModelFailure(
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
                 f" with a step of {dt:.3g} s and a stiffness of {stiffness:.3g} 1/s^2"
             )
-        strikes.append(events[: kernels.gather(contacts.memory, 0.0, reached, events, 0)[0]])
+        strikes.append(events[: kernels.gather(contacts.memory, 0.0, state.t, events, 0)[0]])
         cost = Cost(
             wall_seconds=time.perf_counter() - ready,
             cpu_seconds=time.process_time() - ready_cpu,
             set_up=ready - began,
-            steps=steps,
-            evaluations=sweeps,
+            steps=int(state.steps),
+            evaluations=int(state.sweeps),
         )
+        rows_of_strikes = sorted(np.concatenate(strikes).tolist())
         happened = [
             Event(
                 t=t,
                 kind="floor impact" if contact >= 2 * kernels.FLOOR else "wall impact",
                 impulse=impulse,
             )
-            for t, contact, impulse in sorted(np.concatenate(strikes).tolist())
+            for t, contact, impulse, _ in rows_of_strikes
         ]
         if ending == kernels.OVERTURNED:
-            happened.append(
-                Event(t=reached, kind="overturned left" if state[2] > 0.0 else "overturned right")
-            )
-        return observation.observe(
+            side = "left" if state.theta > 0.0 else "right"
+            happened.append(Event(t=float(state.t), kind=f"overturned {side}"))
+        history = observation.observe(
             scene,
             self.name,
             kinematics.of_box(scene.block, output[:row]),
@@ -192,6 +196,17 @@ class ContinuousModel(Frozen):
                 "damping_rule": self.damping_rule,
             },
         )
+        walls: dict[int, Side] = {kernels.LEFT_WALL: "left", kernels.RIGHT_WALL: "right"}
+        at_walls = [
+            (walls[contact // 2], t, impulse, speed)
+            for t, contact, impulse, speed in rows_of_strikes
+            if contact < 2 * kernels.FLOOR
+        ]
+        last = np.array([state[name] for name in ("x", "y", "theta", "vx", "vy", "w")])
+        found = extremes.extremes_of(
+            scene, noted, kinematics.of_box(scene.block, last), history, at_walls
+        )
+        return replace(history, model_extremes=found)
 
 
 def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[Floats, float]:

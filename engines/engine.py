@@ -4,7 +4,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal, Self
@@ -12,15 +12,25 @@ from typing import Any, ClassVar, Literal, Self
 from pydantic import model_validator
 
 from rockcheck.engines import contacts, events
-from rockcheck.engines.steps import AdaptiveStep, FixedStep, World, at_output_times, in_units_of
+from rockcheck.engines.steps import (
+    AdaptiveStep,
+    FixedStep,
+    World,
+    at_output_times,
+    in_units_of,
+    time_of_fall,
+)
 from rockcheck.scenes import (
     Cost,
+    Extremes,
+    Floats,
     Floor,
     Frozen,
     History,
     Positive,
     Scene,
     errors,
+    interpolation,
     kinematics,
     observation,
     printable,
@@ -223,12 +233,32 @@ class Engine(Frozen):
                 steps=len(states) - 1,
             )
         states[:, [0, 1, 3, 4]] *= unit
-        return observation.observe(
+        happened = events.events_of(scene, times, states, unit * felt)
+        history = observation.observe(
             scene,
             self.name,
             kinematics.of_box(scene.block, at_output_times(scene, times, states)),
-            events=events.events_of(scene, times, states, unit * felt),
+            events=happened,
             cost=cost,
             settings=self.model_dump(),
             notes=self.notes(scene),
         )
+        return replace(history, model_extremes=_extremes(scene, times, states, history))
+
+
+def _extremes(scene: Scene, times: Floats, states: Floats, history: History) -> Extremes:
+    """The extremes of a run, from the states of the mass's centre at the ends of all steps."""
+    happened = history.event_list
+    box = kinematics.of_box(scene.block, states)
+    whole = interpolation.Track.of(times, box, happened)
+    # A step of fixed length may go beyond the scene's end.
+    end = min(scene.run_times[-1], time_of_fall(times, states))
+    return interpolation.extremes_of(
+        whole.until(end),
+        scene.block,
+        scene.walls,
+        happened,
+        history.outcome,
+        source="model",
+        gravity=scene.gravity,
+    )

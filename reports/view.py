@@ -160,7 +160,9 @@ class SceneView(View):
             if cell.status == "done" and cell.history is not None:
                 try:
                     reading.within(self.folder, str(events_path(Path(cell.history))))
-                    found[cell.model] = History.load(reading.within(self.folder, cell.history))
+                    found[cell.model] = History.load_with_extremes(
+                        reading.within(self.folder, cell.history)
+                    )
                 except InputError as error:
                     found[cell.model] = str(error)
         return found

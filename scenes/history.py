@@ -8,7 +8,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, FiniteFloat
+from pydantic import ConfigDict, FiniteFloat, TypeAdapter, ValidationError
 
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
@@ -154,8 +154,8 @@ class History(Shown):
 
     @property
     def peak_rotation(self) -> float:
-        """Largest |theta| on the output grid, rad."""
-        return float(np.max(np.abs(self.channels["theta"])))
+        """Largest |theta| of the run, rad; pi/2 where it overturned."""
+        return self.extremes.peak_rotation
 
     @property
     def overturned_at(self) -> float | None:
@@ -253,6 +253,7 @@ class History(Shown):
             "notes": list(self.notes),
             "uncertainty": dict(self.uncertainty),
             "cost": {key: value for key, value in vars(self.cost).items() if value is not None},
+            **({"extremes": asdict(self.model_extremes)} if self.model_extremes else {}),
         }
 
     def _tables(self) -> tuple[str, str]:
@@ -270,6 +271,24 @@ class History(Shown):
         return {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
 
     @classmethod
+    def load_with_extremes(cls, path: str | Path) -> History:
+        """Read a file that `save` wrote of a run, with the extremes that the model kept.
+
+        For files that nobody has edited since. Raises `InputError` as `load`.
+        """
+        history, about = cls._read(Path(path))
+        if about.extremes is None:
+            return history
+        try:
+            return replace(
+                history, model_extremes=TypeAdapter(Extremes).validate_python(about.extremes)
+            )
+        except ValidationError:
+            raise InputError(
+                f"{printable(path)}: column {ABOUT!r}: not written by rockcheck"
+            ) from None
+
+    @classmethod
     def load(cls, path: str | Path) -> History:
         """Read a file that `save` wrote, or any CSV with columns of t and theta.
 
@@ -279,9 +298,13 @@ class History(Shown):
         base. Raises `InputError` that names file and column for a file that is missing or no CSV,
         lacks those columns or has one twice, is not numeric, not finite or not ordered in time.
         """
+        return cls._read(Path(path))[0]
+
+    @classmethod
+    def _read(cls, path: Path) -> tuple[History, _About]:
+        """The history of a file, and the metadata in it."""
         import pandas as pd
 
-        path = Path(path)
         shown = printable(path)
         if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
             raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
@@ -317,7 +340,7 @@ class History(Shown):
             raise InputError(
                 f"{printable(beside)}: not an events table written by rockcheck"
             ) from None
-        return cls(
+        history = cls(
             name=printable(about.name or path.stem, 200),
             model=printable(about.model, 200),
             channels=channels,
@@ -329,6 +352,7 @@ class History(Shown):
             uncertainty={printable(name): float(u) for name, u in about.uncertainty.items()},
             block=block,
         )
+        return history, about
 
 
 def check_format(path: Path, more: str = "") -> None:
@@ -421,6 +445,7 @@ class _About(Frozen):
     notes: tuple[Any, ...] = ()
     uncertainty: Mapping[str, NonNegative] = {}
     cost: Mapping[str, int | FiniteFloat | Mapping[str, Any] | None] = {}
+    extremes: Any = None
 
 
 def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:

@@ -271,7 +271,8 @@ def _hop(track: Track, block: Block) -> float:
     angle = block.box_angle - np.abs(theta)
     rate = y_dot - sign * block.half_diagonal * np.sin(angle) * theta_dot
     # Where the block passes upright, another corner becomes the lower one.
-    passes = np.flatnonzero(sign[:-1] != sign[1:])
+    turned = np.diff(theta) != 0.0
+    passes = np.flatnonzero((sign[:-1] != sign[1:]) & turned)
     part = theta[passes] / (theta[passes] - theta[passes + 1])
     upright = track.t[passes] + part * np.diff(track.t)[passes]
     highest = largest(track.t, height, rate, track.breaks, passes)[0]
@@ -317,6 +318,7 @@ def _walls(
     wall, a "floor impact" strikes it as well.
     """
     found = dict.fromkeys((wall.side for wall in walls), NO_STRIKE)
+    instants = np.array(sorted(event.t for event in events))
     if block is None or not np.all(np.isfinite(track.states[:, [0, 3, 5]])):
         return found
     for event in events:
@@ -326,7 +328,7 @@ def _walls(
         near = [wall for wall in walls if _may_strike(track, block, wall, row, event.kind)]
         if not near:
             continue
-        speed, side = _strike(track, block, near, row, event.t, gravity)
+        speed, side = _strike(track, block, near, row, event.t, instants, gravity)
         before = found[side]
         found[side] = WallExtremes(
             strikes=before.strikes + 1,
@@ -348,15 +350,22 @@ def _may_strike(track: Track, block: Block, wall: Wall, row: int, kind: str) -> 
 
 
 def _strike(
-    track: Track, block: Block, walls: Sequence[Wall], row: int, at: float, gravity: float
+    track: Track,
+    block: Block,
+    walls: Sequence[Wall],
+    row: int,
+    at: float,
+    instants: Floats,
+    gravity: float,
 ) -> tuple[float, Side]:
     """Speed (m/s) of the corner that strikes one of the walls at a time, and the wall's side.
 
-    Speeds in `row` are carried on to that time, at the acceleration since the row before where no
-    impact lies between. It is the fastest of the corners that are then nearest to a wall.
+    Speeds in `row` are carried on to that time, at the acceleration since the row before where none
+    of the `instants` of events lies between. It is the fastest of the corners that are then nearest
+    to a wall.
     """
     previous = max(row - 1, 0)
-    between = np.searchsorted(track.breaks, [track.t[previous], at - FLUSH])
+    between = np.searchsorted(instants, [track.t[previous], at - FLUSH])
     if between[1] > between[0]:
         previous = row
     rest = at - track.t[row]

@@ -17,7 +17,8 @@ from rockcheck import (
     Wall,
     load_scene,
 )
-from rockcheck.scenes import PAPER_BLOCK
+from rockcheck.cm.grid import GRID
+from rockcheck.scenes import PAPER_BLOCK, interpolation
 from rockcheck.scenes.kinematics import energy
 
 G = 9.81
@@ -57,7 +58,9 @@ def test_stiffness_and_step_follow_from_the_penetration():
     still = scene(output_step=1.0)
     soft, stiff = ContinuousModel(penetration=1e-5), ContinuousModel(penetration=1e-7)
     assert stiff.stiffness_in(still) == pytest.approx(G / 1e-7)
-    assert soft.time_step_in(still) == pytest.approx(10.0 * stiff.time_step_in(still), rel=0.01)
+    for model in (soft, stiff):
+        longest = 3.0 / math.sqrt(model.stiffness_in(still))
+        assert model.time_step_in(still) == GRID / math.ceil(GRID / longest)
     given = ContinuousModel(stiffness=5e6, time_step=1e-5)
     assert given.time_step_in(still) == pytest.approx(1e-5)
     assert (
@@ -265,3 +268,36 @@ def test_friction_that_may_jam_a_pivot_is_for_engines_alone(fault_of):
     fault = fault_of(ContinuousModel().simulate, scene(floor=Floor(friction=2.0)))
     assert fault.key == "floor.friction"
     assert "must be below 4/3" in str(fault)
+
+
+def test_extremes_do_not_depend_on_the_rows():
+    struck = scene(
+        initial_rotation=-0.6 * PAPER_BLOCK.alpha,
+        walls=[Wall(side="left", gap=0.02, restitution=0.4)],
+        duration=2.0,
+    )
+    fine, coarse = (
+        ContinuousModel().simulate(struck.replace(output_step=step)).extremes
+        for step in (0.005, 0.0213)
+    )
+    assert fine == coarse
+    assert fine.source == "model"
+    assert fine.walls["left"].strikes > 0
+
+
+def test_extremes_are_those_of_fine_rows():
+    struck = scene(
+        initial_rotation=-0.6 * PAPER_BLOCK.alpha,
+        walls=[Wall(side="left", gap=0.02, restitution=0.4)],
+        duration=2.0,
+        output_step=1e-4,
+    )
+    history = ContinuousModel().simulate(struck)
+    rows = interpolation.from_rows(
+        history.channels, history.event_list, struck.block, history.outcome, struck.walls
+    )
+    found = history.extremes
+    for name in ("rotation_left", "rotation_right", "slip", "reach_left", "top_displacement"):
+        # Rows do not see that an impact lasts as long as they are apart.
+        assert getattr(found, name) == pytest.approx(getattr(rows, name), rel=5e-4), name
+    assert found.walls["left"].speed == pytest.approx(rows.walls["left"].speed, rel=1e-3)

@@ -14,6 +14,7 @@ from rockcheck import (
     MuJoCo,
     PyBullet,
     Scene,
+    Wall,
     engines,
 )
 from rockcheck.engines import events
@@ -224,3 +225,22 @@ def test_an_impact_before_the_block_arrives_is_an_impact(rebound, duration, corn
     assert sum(event.impulse for event in impacts) == pytest.approx(
         0.5 * corners * (1.0 + rebound) * 9.81 * 0.2, rel=0.02
     )
+
+
+@pytest.mark.parametrize("step", ["adaptive", 1e-4])
+def test_extremes_do_not_depend_on_the_rows(step):
+    struck = Scene(
+        name="struck",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.4),
+        walls=(Wall(side="left", gap=0.02, restitution=0.4),),
+        initial_rotation=-0.6 * PAPER_BLOCK.alpha,
+        duration=1.5,
+    )
+    fine, coarse = (
+        MuJoCo(time_step=step).simulate(struck.replace(output_step=rows)).extremes
+        for rows in (0.005, 0.02)
+    )
+    assert fine == coarse
+    assert fine.source == "model"
+    assert fine.walls["left"].strikes > 0

@@ -15,14 +15,13 @@ import numpy as np
 
 from rockcheck.scenes import (
     Block,
-    Floats,
+    Extremes,
     History,
     Scene,
     Shown,
     Side,
-    Wall,
     errors,
-    kinematics,
+    interpolation,
 )
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
@@ -251,10 +250,6 @@ def _step(history: History) -> float:
 
 # How far a block moves.
 
-#: A slip or reach below this share of the block's half height is rounding.
-ROUNDING = 1e-14
-#: Events at which a wall is struck that is nearer than this to the upright block, m.
-STRIKES = {"wall impact": math.inf, "floor impact": 1e-9}
 #: The four figures: name, what readers call it, unit and meaning.
 QUANTITIES = (
     Column(
@@ -277,26 +272,42 @@ QUANTITIES = (
 )
 
 
+def extremes_in(history: History, scene: Scene | None) -> Extremes:
+    """The extremes of a history, with the walls of its scene where the model did not keep any."""
+    if scene is None or history.model_extremes is not None:
+        return history.extremes
+    return interpolation.from_rows(
+        history.channels,
+        history.event_list,
+        scene.block,
+        history.outcome,
+        scene.walls,
+        scene.gravity,
+    )
+
+
 def motion_of(history: History, scene: Scene | None = None) -> dict[str, float | None]:
     """How far a block moves: the four figures of a history, by their names.
 
     None where unknown and, except `wall_speed`, for a fallen block; `wall_speed` is None where the
     block struck no wall. `scene` gives the block and the walls.
     """
-    block, channels = scene.block if scene else history.block, history.channels
-    stands = not history.outcome.startswith("overturned")
-    peak = top = None
-    if stands and block is not None:
-        peak = history.peak_rotation / block.alpha
-        if "x" in channels:
-            places = kinematics.top_corners(block, channels["x"], channels["theta"])
-            top = float(np.max(np.abs(places - places[:, :1])))
-    return {
-        "peak_rotation": peak,
-        "slip": largest_slip(history) if stands and "slip" in channels else None,
-        "top_displacement": top,
-        "wall_speed": max(wall_speeds(history, scene), default=(None,))[0] if scene else None,
-    }
+    block = scene.block if scene else history.block
+    extremes = extremes_in(history, scene)
+    struck = [wall.speed for wall in extremes.walls.values() if wall.strikes]
+    motion: dict[str, float | None] = {quantity.name: None for quantity in QUANTITIES}
+    motion["wall_speed"] = max(struck, default=None)
+    if history.outcome.startswith("overturned"):
+        return motion
+    if block is not None:
+        motion["peak_rotation"] = extremes.peak_rotation / block.alpha
+    motion["slip"] = _where_known(extremes.slip)
+    motion["top_displacement"] = _where_known(extremes.top_displacement)
+    return motion
+
+
+def _where_known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def motion_words(motion: Mapping[str, float | None]) -> list[str]:
@@ -307,57 +318,14 @@ def motion_words(motion: Mapping[str, float | None]) -> list[str]:
 
 def largest_slip(history: History) -> float:
     """Largest |slip|, m, also of a block that falls; 0 if it is rounding of the pivot's place."""
-    largest = float(np.max(np.abs(history.channels["slip"])))
-    return largest if largest > ROUNDING * getattr(history.block, "half_height", 0.0) else 0.0
+    return history.extremes.slip
 
 
 def wall_speeds(history: History, scene: Scene) -> Iterator[tuple[float, Side]]:
-    """Speeds (m/s) with which the block struck walls, and the walls' sides.
-
-    One per event "wall impact", and one per "floor impact" of a block that lands flush with a wall,
-    whose corners strike at that instant. The speed of the corner that strikes, in the last row
-    before the event, extrapolated to the event from the last two rows if no other event lies
-    between; of an event at the start in that row. It is the fastest of the corners that are nearest
-    to a wall at the event, as far as that row tells.
-    """
-    names = ("t", "x", "theta", "x_dot", "theta_dot")
-    if not scene.walls or any(name not in history.channels for name in names):
-        return
-    columns = np.array([history.channels[name] for name in names], dtype=float)
-    t, times = columns[0], np.array([event.t for event in history.event_list])
-    for event in history.event_list:
-        row = max(int(np.searchsorted(t, event.t - 1e-9)) - 1, 0)
-        upright = kinematics.slip(scene.block, *columns[1:3, row]), 0.0
-        walls = [
-            wall
-            for wall in scene.walls
-            if abs(kinematics.clearance(scene.block, wall.side, wall.gap, *upright))
-            < STRIKES.get(event.kind, 0.0)
-        ]
-        first = max(row - 1, 0)
-        between = np.any((times > t[first]) & (times < event.t - 1e-9))
-        if walls:
-            yield _strike(scene, walls, columns[:, [row if between else first, row]], event.t)
-
-
-def _strike(scene: Scene, walls: Sequence[Wall], rows: Floats, at: float) -> tuple[float, Side]:
-    """Speed (m/s) of the corner that strikes one of the walls at a time, and the wall's side.
-
-    `rows` are t, x, theta and the rates of both in two rows from which speeds are carried on; or in
-    one, twice.
-    """
-    corners = [
-        (*corner, wall.side)
-        for wall in walls
-        for corner in kinematics.side_corners(scene.block, wall.side, wall.gap, *rows[1:])
-    ]
-    (_, gaps), (before, rates) = (np.array([c[k] for c in corners]).T for k in (0, 1))
-    rest, step = at - rows[0, 1], rows[0, 1] - rows[0, 0]
-    speeds = rates + (rates - before) * rest / (step or 1.0)
-    places = gaps - rates * rest
-    far = places > np.min(places) + scene.gravity * rest * rest
-    fastest = int(np.argmax(np.where(far, -np.inf, speeds)))
-    return max(0.0, float(speeds[fastest])), corners[fastest][2]
+    """The largest speed (m/s) with which the block struck each wall, and that wall's side."""
+    for side, wall in extremes_in(history, scene).walls.items():
+        if wall.strikes:
+            yield wall.speed, side
 
 
 def largest_reach(history: History, scene: Scene, side: Side) -> float:
@@ -365,9 +333,8 @@ def largest_reach(history: History, scene: Scene, side: Side) -> float:
 
     A wall at a smaller clear gap there would be struck.
     """
-    x, theta = history.channels["x"], history.channels["theta"]
-    reach = float(np.max(-kinematics.clearance(scene.block, side, 0.0, x, theta)))
-    return reach if reach > ROUNDING * scene.block.half_height else 0.0
+    extremes = extremes_in(history, scene)
+    return extremes.reach_left if side == "left" else extremes.reach_right
 
 
 def spread(values: Sequence[float]) -> dict[str, Any]:

@@ -339,7 +339,7 @@ def _read_back(history: History) -> History:
         path = Path(folder) / "history.csv.gz"
         history.save(path)
         try:
-            return History.load(path)
+            return History.load_with_extremes(path)
         except InputError as error:
             raise ModelFailure(
                 f"its history cannot be read back: {str(error).partition(': ')[2]}"

@@ -109,7 +109,7 @@ class Store:
         if found is None:
             for suffix in SUFFIXES:
                 reading.within(self.folder, HISTORIES, f"{name}{suffix}")
-            found = History.load(self.folder / HISTORIES / f"{name}{TABLE}")
+            found = History.load_with_extremes(self.folder / HISTORIES / f"{name}{TABLE}")
             self._recent.append((name, found))
         return found
 
