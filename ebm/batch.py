@@ -41,7 +41,12 @@ class Outcomes:
     @property
     def failed(self) -> NDArray[np.bool_]:
         """Which runs reached a cap or had no consistent motion."""
-        return ~np.isin(self.runs["ending"], (Ending.DONE, Ending.OVERTURNED))
+        return np.isin(self.runs["ending"], list(FAILURES))
+
+    @property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Which runs were given up before they were decided (`ebm.core.decide.CALM`)."""
+        return np.asarray(self.runs["ending"] == Ending.UNDECIDED)
 
 
 def run_batch(

@@ -128,7 +128,8 @@ class EventBasedModel(Frozen):
         states, work = natural.state_for(self, 0), state.workspace()
         kept = np.empty(1, state.FOUND)
         ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
-        motion, t, _, _, steps, written, at_rest = kept[0].tolist()
+        end = kept[0]
+        t, written = float(end.t), int(end.rows)
         if ending in names.FAILURES:
             raise errors.ModelFailure(
                 f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s"
@@ -151,8 +152,8 @@ class EventBasedModel(Frozen):
             wall_seconds=seconds,
             cpu_seconds=cpu,
             set_up=ready - began,
-            steps=steps,
-            evaluations=steps,
+            steps=int(end.steps),
+            evaluations=int(end.steps),
             energy_gains=int(found.gains),
             largest_energy_gain=float(found.largest_gain),
             rules={
@@ -164,10 +165,11 @@ class EventBasedModel(Frozen):
         seen = natural.to_si(scene, out[:rows])
         # at the end of the run (the last row may come before): what slides without friction, or
         # rocks, as slowly as in any history at rest (`outcome_of`)
-        slow = np.abs(natural.to_si(scene, np.array([motion]))[0, 2:]) < history.STILL
-        outcome = "at rest" if at_rest or slow.all() else "moving"
+        motion = np.array([end.motion.tolist()])
+        slow = np.abs(natural.to_si(scene, motion)[0, 2:]) < history.STILL
+        outcome = "at rest" if end.at_rest or slow.all() else "moving"
         if ending == names.Ending.OVERTURNED:
-            outcome = "overturned left" if motion[2] > 0 else "overturned right"
+            outcome = "overturned left" if end.motion.theta > 0 else "overturned right"
         played = observation.observe(
             scene,
             self.name,

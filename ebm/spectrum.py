@@ -47,7 +47,8 @@ class Spectrum(Shown):
     `outcomes[i, j]` is -1 (overturned left, counterclockwise), 0 (safe) or +1 (right, clockwise) at
     `amplitude_ratios[i]` (a_p / (g tan alpha)) and `frequency_ratios[j]` (omega_p / p).
     `evaluations` counts the runs, fewer than nodes where only the boundary was refined. `undecided`
-    lists the nodes (i, j) whose run failed: their outcome says 0, but `safe` excludes them.
+    lists the nodes (i, j) whose run failed, or was given up before anything decided it: their
+    outcome says 0, but `safe` excludes them.
     `depends_on_law` lists the nodes whose outcome changes under another law of impacts; None where
     that was not checked.
     """
@@ -165,7 +166,7 @@ def play_nodes(
     jobs: int | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Nodes:
-    """Outcomes at nodes of a spectrum: sides (-1, 0, +1), and whether the run failed.
+    """Outcomes at nodes of a spectrum: sides (-1, 0, +1), and whether the run has none.
 
     The ratios are 1-D arrays of one length. A run that fails is made once more at a hundredth of
     the tolerance.
@@ -174,7 +175,7 @@ def play_nodes(
 
     packed = _packed(scene, amplitude_ratios, frequency_ratios, model)
     found = batch.run_decided(packed, model, jobs=jobs, on_progress=on_progress)
-    return found.side, found.failed
+    return found.side, found.failed | found.undecided
 
 
 def _packed(

@@ -4,9 +4,9 @@ import math
 
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.core.names import Family, Kind, Pivot, Shape
+from rockcheck.ebm.core.names import Ending, Family, Fate, Kind, Pivot, Shape
 from rockcheck.ebm.core.series import NOISE
-from rockcheck.ebm.core.state import on_wall, rocks
+from rockcheck.ebm.core.state import on_wall, rocks, stands_still
 from rockcheck.scenes.compiled import inner_kernel
 
 # A pulse is over when its acceleration is below this share of the tolerance. The second is the
@@ -15,6 +15,12 @@ _LEFT, _MARGIN = 1e-3, 0.9
 #: Steps of a swing, from one impact to the next.
 _STEPS = 4.0
 _TINIEST = math.ulp(0.0)
+#: How long a run on a quiet base goes on undecided, in 1/p. A block with tan alpha = 0.05, which
+#: loses a hundredth of its energy an impact, comes to rest within 700. What moves longer is held up
+#: by elastic walls, or slides without friction.
+CALM = 1e3
+#: The slowest slide of a frictionless block that moves, sqrt(g R).
+_SLIDES = 1e-5
 
 
 @inner_kernel
@@ -24,6 +30,31 @@ def quiet_from(base, tolerance):
     if upward.kind == Shape.STILL and along.kind == Shape.GAUSSIAN:
         return along.centre + math.sqrt(-math.log(_LEFT * tolerance) / along.rate)
     return max(along.quiet, upward.quiet)
+
+
+@inner_kernel
+def given_up_at(block, quiet):
+    """The time at which a run that is still undecided is given up, by when its base is quiet."""
+    squares = block.left.share * block.left.radius, block.right.share * block.right.radius
+    return quiet + CALM / math.sqrt(min(squares[0], squares[1]))
+
+
+@inner_kernel
+def fate_of(block, state):
+    """What becomes of the block, a Fate, of a run that has ended.
+
+    A block that cannot overturn comes to rest, unless its swings repeat or nothing brakes it.
+    """
+    ending, motion = state.ending, state.motion
+    if ending == Ending.OVERTURNED:
+        return Fate.OVERTURNED_LEFT if motion.theta > 0.0 else Fate.OVERTURNED_RIGHT
+    if ending == Ending.UNDECIDED:
+        return Fate.UNDECIDED
+    if ending != Ending.DONE:
+        return Fate.FAILED
+    slides_on = block.mu_k == 0.0 and not block.no_slip and abs(motion.vx) > _SLIDES
+    moves = state.repeats or slides_on or not state.control.until_decided
+    return Fate.MOVING if moves and not stands_still(state.mode) else Fate.AT_REST
 
 
 @inner_kernel

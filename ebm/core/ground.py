@@ -19,8 +19,8 @@ NEVER = np.inf
 
 #: One component of the base motion but for its samples. GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3
 #: tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate t) up to `quiet`; SAMPLED is
-#: linear between samples, every `step`, of which it has `count` from `first` on. After `quiet`
-#: there is no motion.
+#: linear between `scale` times the samples, every `step`, of which it has `count` from `first` on.
+#: After `quiet` there is no motion.
 FORM = record(
     kind="i8",
     c0="f8",
@@ -31,6 +31,7 @@ FORM = record(
     centre="f8",
     quiet="f8",
     step="f8",
+    scale="f8",
     first="i8",
     count="i8",
 )
@@ -76,7 +77,11 @@ def ground_of(
         taken = np.ascontiguousarray(excitation.samples / gravity)
         if taken.any():
             samples = taken
-            given = {"kind": Shape.SAMPLED, "step": excitation.time_step / time_unit}
+            given = {
+                "kind": Shape.SAMPLED,
+                "step": excitation.time_step / time_unit,
+                "scale": 1.0,
+            }
     quiet = {"quiet": excitation.quiet_after / time_unit}
     return Ground(filled(FORM, **quiet | given, count=len(samples)), samples)
 
@@ -110,8 +115,9 @@ def _with_rate(g, t):
     if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
-            rise = g.samples[i + 1] - g.samples[i]
-            return g.samples[i] + (t / g.form.step - i) * rise, rise / g.form.step
+            here = g.form.scale * g.samples[i]
+            rise = g.form.scale * g.samples[i + 1] - here
+            return here + (t / g.form.step - i) * rise, rise / g.form.step
     return 0.0, 0.0
 
 
@@ -261,7 +267,7 @@ def largest_ahead(g, t):
     if g.form.kind == Shape.SAMPLED:
         for i in range(max(interval(g, t), 0), g.samples.size):
             largest = max(largest, abs(g.samples[i]))
-        return largest
+        return abs(g.form.scale) * largest
     while t < NEVER:
         largest = max(largest, abs(acceleration(g, t)))
         t = _next_extremum(g, t)
@@ -336,7 +342,9 @@ def _leaves(g, times, values, level, beyond, ahead):
 @inner_kernel
 def _just_before(g, t):
     """Acceleration at time t; where a record ends that just before."""
-    return g.samples[interval(g, t)] if g.form.kind == Shape.SAMPLED else acceleration(g, t)
+    if g.form.kind == Shape.SAMPLED:
+        return g.form.scale * g.samples[interval(g, t)]
+    return acceleration(g, t)
 
 
 @inner_kernel

@@ -11,15 +11,12 @@ import numpy as np
 
 from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, series, settle, steps
 from rockcheck.ebm.core.contacts import closed_floor, lean
-from rockcheck.ebm.core.decide import quiet_from
+from rockcheck.ebm.core.decide import fate_of, given_up_at, quiet_from
 from rockcheck.ebm.core.guards import KIND
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
 from rockcheck.ebm.core.state import NEW_STATE, Base, Records, Run, mode_code, rests
 from rockcheck.ebm.core.strike import strike
 from rockcheck.scenes.compiled import inner_kernel, kernel
-
-#: The duration of a run that ends as soon as it is decided.
-_ENDLESS = 1e6
 
 
 @inner_kernel
@@ -80,6 +77,7 @@ def play_rows(friction, rows, states, begins, work, records, found):
         kept = found[i]
         kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
         kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
+        kept.fate = fate_of(given.setting, state)
         kept.at_rest = rests(state.mode)
 
 
@@ -88,8 +86,6 @@ def begin(block, base, run):
     """Prepares the first mode at t = 0, in a state that is new but for its motion and control."""
     state, motion, control = run.state, run.state.motion, run.state.control
     state.peak = abs(motion.theta)
-    if control.until_decided:
-        state.t_end = _ENDLESS
     # All that a block does before it topples happens within alpha. Terms fall like the powers of a
     # ratio. If the last one is the tolerance, and the first one is 1, that ratio is known, and what
     # is left out is a geometric series. It may be half of the tolerance.
@@ -97,6 +93,8 @@ def begin(block, base, run):
     state.tolerance_rad = control.tolerance * min(block.left.alpha, block.right.alpha)
     state.last_term_rad = 0.5 * state.tolerance_rad * (1.0 - ratio) / ratio
     state.quiet_from = quiet_from(base, state.tolerance_rad)
+    if control.until_decided:
+        state.t_end = given_up_at(block, state.quiet_from)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
     stands = lean(motion) == 0.0 and motion.vx == 0.0 and motion.vy == 0.0

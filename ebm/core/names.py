@@ -107,10 +107,13 @@ HistoryMode = IntEnum("HistoryMode", "REST SLIDE ROCK SLIDE_ROCK LEAN LADDER FLI
 #: Names of these modes.
 MODE_NAMES = tuple(one.name.lower().replace("_", "-") for one in HistoryMode)
 
-#: How a run ended.
+#: How a run ended; UNDECIDED: nothing decided it for so long that it was given up.
 Ending = IntEnum(
-    "Ending", "GOING DONE OVERTURNED TOO_MANY_STEPS TOO_MANY_EVENTS NOT_FINITE", start=-1
+    "Ending", "GOING DONE OVERTURNED TOO_MANY_STEPS TOO_MANY_EVENTS NOT_FINITE UNDECIDED", start=-1
 )
+
+#: What becomes of a block; the first four in the order of `scenes.history.OUTCOMES`.
+Fate = IntEnum("Fate", "AT_REST MOVING OVERTURNED_LEFT OVERTURNED_RIGHT UNDECIDED FAILED", start=0)
 
 FAILURES: dict[int, str] = {
     Ending.TOO_MANY_STEPS: "the cap on steps was reached",

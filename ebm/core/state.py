@@ -160,8 +160,18 @@ GIVEN = record(
     output_step="f8",
 )
 #: What is kept of each of many runs: where and when it ended, its largest |theta|, why it ended (an
-#: Ending), counts of its steps and of the rows written, and whether it then stood at rest.
-FOUND = record(motion=MOTION, t="f8", peak="f8", ending="i8", steps="i8", rows="i8", at_rest="?")
+#: Ending), what becomes of the block (a Fate), counts of its steps and of the rows written, and
+#: whether it then stood at rest.
+FOUND = record(
+    motion=MOTION,
+    t="f8",
+    peak="f8",
+    ending="i8",
+    fate="i8",
+    steps="i8",
+    rows="i8",
+    at_rest="?",
+)
 
 
 class Base(NamedTuple):
@@ -233,6 +243,12 @@ def rocks(mode):
 def rests(mode):
     """Whether the block stands at rest on its base."""
     return mode.family == Family.FLAT and mode.pivot == Pivot.STICK
+
+
+@inner_kernel
+def stands_still(mode):
+    """Whether nothing moves while this mode lasts: the block rests, or leans on a wall."""
+    return mode.pivot == Pivot.STICK and (mode.family == Family.FLAT or on_wall(mode))
 
 
 @inner_kernel

@@ -14,7 +14,7 @@ from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Rule, Shape
 from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, largest, may_top, slope, value
-from rockcheck.ebm.core.state import mode_code, note, on_wall, rests
+from rockcheck.ebm.core.state import mode_code, note, on_wall, rests, stands_still
 from rockcheck.scenes.compiled import inner_kernel
 
 #: Of a longer step before, this share counts after each further one.
@@ -29,8 +29,11 @@ def may_go_on(block, base, run):
     """
     state, motion, decides = run.state, run.state.motion, run.state.control.until_decided
     verdict = decided(block, base, state) if decides else -1.0
-    if state.t >= state.t_end or (decides and state.repeats):
+    if decides and state.repeats:
         state.ending = Ending.DONE
+    elif state.t >= state.t_end:
+        ends = not decides or stands_still(state.mode)
+        state.ending = Ending.DONE if ends else Ending.UNDECIDED
     elif verdict > 0.0:
         state.peak = verdict
         state.ending = Ending.DONE
