@@ -6,6 +6,8 @@
 | COSMOS V2, CSMIP V2 | `.V2` | points, format, unit, time step; one or several channels |
 | ESM (DYNA 1.2) | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
 | K-NET, KiK-net | `.NS`, `.EW1`, ... | Scale Factor, Sampling Freq(Hz), Duration Time(s) |
+| China, GeoNet, SMC, NSMN, CWB, BBP | any | see `networks` |
+| `name`, `npts dt`, values | any | the unit by `Reading` |
 | CSV | any | `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
 | columns of text | any | nothing: options of `Reading` supply the rest |
 
@@ -28,6 +30,7 @@ from rockcheck.scenes.recordings.formats import (
     read_knet,
     read_volume,
 )
+from rockcheck.scenes.recordings.networks import NETWORKS, network_reader
 from rockcheck.scenes.recordings.recording import (
     GRAVITY_OF_RECORDS,
     UNITS,
@@ -61,6 +64,7 @@ _WITH_HEADER: dict[Reader, str] = {
     read_esm: "an ESM file",
     read_knet: "a K-NET file",
     read_volume: "a V2 file",
+    **NETWORKS,
 }
 
 
@@ -83,6 +87,9 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
                 AT2_HEADER.search(one) or AT2_HEADER_PLAIN.search(one) for one in head[:20]
             ),
         }
+        network = network_reader(head)
+        if network is not None:
+            by_content = {network: True, **by_content}
         fits = next((reader for reader, fit in by_content.items() if fit), read_table)
         read = _BY_NAME.get(path.suffix.lower(), fits)
         if read in _WITH_HEADER:

@@ -95,7 +95,9 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
     unit = settled_unit(stated, reading)
     count = checked_count(header, "NPTS", match[1])
     step = settled_step(checked_step(header, "DT", match[2]), reading)
-    values = numbers(enumerate(lines[header:], header + 1), count)
+    end = _end_of_samples(lines, header, count)
+    behind = " ".join(" ".join(lines[end:]).split())
+    values = numbers(enumerate(lines[header:end], header + 1), count)
     if len(values) != count:
         raise fault(f"NPTS says {count}, the file has {len(values)} samples", header)
     fields = lines[1].split(",")  # event, date, station and component, or another form
@@ -106,9 +108,29 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
             time_step=step,
             unit=unit,
             form="PEER AT2",
+            notes=(f"left out behind the last sample: {printable(behind, 60)!r}",)
+            if behind
+            else (),
             component=name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else "",
         )
     ]
+
+
+def _end_of_samples(lines: list[str], first: int, count: int) -> int:
+    """Index behind the line that completes `count` numbers; of all lines where none does.
+
+    It is also that of all lines where a number stands behind, as too many are then.
+    """
+    samples = 0
+    for index, line in enumerate(lines[first:], first):
+        if samples == count and line.strip():
+            has_number = any(is_number(word) for text in lines[index:] for word in text.split())
+            return len(lines) if has_number else index
+        words = line.split()
+        if not all(map(is_number, words)):
+            break
+        samples += len(words)
+    return len(lines)
 
 
 def read_esm(lines: list[str], reading: Reading) -> list[Recording]:
@@ -245,6 +267,7 @@ def read_volume(lines: list[str], reading: Reading) -> list[Recording]:
             index = _heed(lines, index, header, block)
         elif said := COSMOS_BLOCK.match(line):
             block.count, block.seconds = said[1], said[2] or ""
+            _refuse_counts(said, index)
             block.unit = known_unit(said[3]) or _COSMOS_UNITS.get(said[4] or "", "")
             block.across, block.width = int(said[5]), int(said[6])
         elif said := CSMIP_BLOCK.match(line):
@@ -263,6 +286,12 @@ def read_volume(lines: list[str], reading: Reading) -> list[Recording]:
             "a V2 file without a block of accelerations; only corrected accelerations can be read",
         )
     return found
+
+
+def _refuse_counts(block: re.Match[str], line: int) -> None:
+    """Raise `InputError` for a block whose unit is counts, COSMOS' unit 50."""
+    if "count" in block[3].lower() or block[4] == "50":
+        raise fault("raw counts of the digitiser; only accelerations can be read", line)
 
 
 def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
