@@ -50,7 +50,7 @@ OUTCOMES = {
     "overturned": "#e8833a",
     "undecided": "#9a9a9a",
 }
-#: Colours of the letters of `validation.paper.measures`: FALLEN, STANDS, GAINED, LOST.
+#: Colours of the letters of `validation.paper.tables`: FALLEN, STANDS, GAINED, LOST.
 MARKED = {"F": "#e9e9e9", "T": "#a9c1df", "G": "#009168", "X": "#c4342d"}
 #: Colours of all letters; of the outcome letters (`validation.studies.spectrum.tiles`) without a
 #: wall.

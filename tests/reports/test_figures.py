@@ -26,7 +26,9 @@ from rockcheck.validation.finding import (
     plain,
 )
 from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
-from rockcheck.validation.paper.measures import Paper, beyond, findings_of
+from rockcheck.validation.paper.findings import findings_of
+from rockcheck.validation.paper.spectra import Paper
+from rockcheck.validation.paper.tables import finding_blocks
 from rockcheck.validation.studies.spectrum.study import (
     CANDIDATES,
     PLAYED_SHARE,
@@ -129,13 +131,13 @@ def test_the_documentation_shows_the_kept_study():
 def test_a_map_of_each_finding():
     paper = Paper(kept_spectra())
     found = findings_of(paper)
-    _, plot, rows = beyond(paper, found)
+    _, plot, rows = finding_blocks(paper, found)
     letters = [panel["outcomes"] for panel in plot.data["panels"]]
     assert [(one.count("G"), one.count("X")) for one in letters] == [
         (one.gained.sum(), one.lost.sum()) for one in found
     ]
     assert len(figure_of(plot).axes) == 3
-    assert len(rows.rows) == sum(len(one.rows) for one in found)
+    assert len(rows.rows) == sum(len(one.evidence) for one in found)
 
 
 PLOTS = [

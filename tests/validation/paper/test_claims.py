@@ -13,7 +13,9 @@ from cases import kept_spectra
 from rockcheck.ebm import EventBasedModel, Spectrum
 from rockcheck.ebm.spectrum import TOLERANCE, node_scene, play_nodes
 from rockcheck.validation.paper import paper_panels
-from rockcheck.validation.paper.measures import Paper, claims_of, findings_of, near_one_impact
+from rockcheck.validation.paper.findings import findings_of
+from rockcheck.validation.paper.sentences import claims_of
+from rockcheck.validation.paper.spectra import Paper, near_one_impact
 from rockcheck.validation.studies.spectrum.tiles import Request
 
 MODEL = EventBasedModel(tolerance=TOLERANCE)
@@ -223,7 +225,7 @@ def test_sentences_hold_where_made_to(case):
     found = {claim.about["name"]: claim for claim in claims_of(paper)}
     assert {name: found[name].verdict for name in verdicts} == verdicts
     told = {
-        name: " ".join([claim.finding, *(row.value for row in claim.rows)])
+        name: " ".join([claim.finding, *(figure.value for figure in claim.evidence)])
         for name, claim in found.items()
     }
     assert [(name, said) for name, said in words if said not in told[name]] == []

@@ -27,8 +27,10 @@ from rockcheck.validation.paper import (
     KEPT,
     TITLES,
     Panel,
-    measures,
     paper_panels,
+    sentences,
+    spectra as paper_spectra,
+    tables as paper_tables,
 )
 from rockcheck.validation.studies.spectrum import tiles
 from rockcheck.validation.study import Study
@@ -103,13 +105,13 @@ class Spectra(Study):
         )
         blocks: list[Block] = [*self._blocks(by_panel, motions)]
         if paper:
-            claims = list(measures.claims_of(paper))
+            claims = list(sentences.claims_of(paper))
             tally = Counter(claim.verdict for claim in claims)
             answer = (
                 f"Of {tally.total()} sentences of the paper {tally['holds']} hold,"
                 f" {tally['holds in part']} hold in part, {tally['does not hold']} do not."
             )
-            blocks += measures.blocks(paper, claims)
+            blocks += paper_tables.blocks(paper, claims)
         if self._papers and not self.compared:
             compared, panels = reading.read_json(KEPT / "agreement.json"), [*paper_panels()]
         if compared:
@@ -145,7 +147,10 @@ class Spectra(Study):
     def _found(
         self, book: tiles.Book
     ) -> tuple[
-        dict[Panel, Spectrum], dict[Panel, tiles.Played], measures.Paper | None, Agreement | None
+        dict[Panel, Spectrum],
+        dict[Panel, tiles.Played],
+        paper_spectra.Paper | None,
+        Agreement | None,
     ]:
         """Spectra and motions by panel, what the paper's sentences ask for, and the agreement.
 
@@ -198,19 +203,21 @@ class Spectra(Study):
             return one
         return replace(one, depends_on_law=tiles.differing(one, laws))
 
-    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> measures.Paper | None:
+    def _paper(self, book: tiles.Book, spectra: Sequence[Spectrum]) -> paper_spectra.Paper | None:
         scanned = {
-            measures.SCANNED_WALLS[one.scene.name]: book.outcomes(
+            paper_spectra.SCANNED_WALLS[one.scene.name]: book.outcomes(
                 self.request.nodes(
                     one.scene,
-                    measures.SCANNED,
-                    np.full(len(measures.SCANNED), measures.SCANNED_AT),
+                    paper_spectra.SCANNED,
+                    np.full(len(paper_spectra.SCANNED), paper_spectra.SCANNED_AT),
                 )
             )
             for one in spectra
-            if one.scene.name in measures.SCANNED_WALLS
+            if one.scene.name in paper_spectra.SCANNED_WALLS
         }
-        struck = [(one, *measures.near_one_impact(one)) for one in spectra if not one.scene.walls]
+        struck = [
+            (one, *paper_spectra.near_one_impact(one)) for one in spectra if not one.scene.walls
+        ]
         records = [
             book.ask(
                 self.request.nodes(
@@ -226,10 +233,10 @@ class Spectra(Study):
             mask = np.zeros(one.outcomes.shape, dtype=bool)
             mask[i, j] = [letter == "Y" for record in some for letter in record.letters]
             tongues[one.scene.floor.friction] = mask
-        return measures.Paper(
+        return paper_spectra.Paper(
             spectra,
             {
-                wall: float(measures.SCANNED[sides != SAFE].min(initial=np.inf))
+                wall: float(paper_spectra.SCANNED[sides != SAFE].min(initial=np.inf))
                 for wall, (sides, _) in scanned.items()
             },
             tongues,
