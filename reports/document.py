@@ -7,6 +7,7 @@ Each block is rendered from one description. All pages have one look, made of th
 import hashlib
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -270,6 +271,7 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
             else [],
         },
         found=found,
+        here=shlex.quote(folder.resolve().name),
         live=bool(live),
         scripts=dict.fromkeys(
             script

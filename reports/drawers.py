@@ -77,7 +77,6 @@ OWN_MARK: dict[str, Any] = {
     "markerfacecolor": "white",
     "markeredgecolor": "black",
     "markeredgewidth": 0.9,
-    "label": "the scene's own pulse",
 }
 
 
@@ -266,9 +265,9 @@ def spectra(plot: Plot) -> Figure:
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)
             axes.set_ylabel(of if beside else "", fontsize=7.0)
         if pulse:
-            if own := pulse.get("own"):
-                axes.plot(*own, **OWN_MARK)
             _units(axes, data)
+        if own := data.get("own"):
+            axes.plot(*own, **OWN_MARK | {"label": own_label(data["record"])})
         figure.legend(handles=handles, loc="outside lower center", ncols=columns, fontsize=7)
         figure.suptitle(plot.title, fontsize=9, x=0.01, ha="left")
     return figure
@@ -286,6 +285,11 @@ def _units(axes: Any, data: Any) -> None:
     axes.secondary_yaxis(
         "right", functions=(lambda y: y * g, lambda y: y / g), ylabel="peak acceleration, g"
     )
+
+
+def own_label(record: bool) -> str:
+    """What the star in a spectrum is."""
+    return "the block and the record as they are" if record else "the scene's own pulse"
 
 
 def outcome_key(panels: Any) -> dict[str, str]:
@@ -315,8 +319,9 @@ def _legend(data: Any) -> tuple[list[Any], int]:
     handles: list[Any] = [Patch(facecolor=colour, label=words) for colour, words in key.items()]
     if any(panel.get("law") for panel in data["panels"]):
         handles.append(Line2D([], [], label="depends on the impact law", **LAW_MARK))
-    if (data.get("pulse") or {}).get("own"):
-        handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0}))
+    if data.get("own"):
+        words = own_label(data["record"])
+        handles.append(Line2D([], [], **OWN_MARK | {"markersize": 7.0, "label": words}))
     return handles, 1 if "key" in data else 2 if len(data["panels"]) == 1 else 4
 
 

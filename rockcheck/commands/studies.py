@@ -319,7 +319,7 @@ def spectrum(
     rockcheck spectrum paper --agreement 200               against the other models
     rockcheck spectrum shelf.toml --amplitudes 1 6 --refine    your own block and pulse
     """
-    from rockcheck.validation.studies.spectrum import study, tiles
+    from rockcheck.validation.studies.spectrum import scene_node, study, tiles
 
     if what in PAPER:
         panels = paper_panels(*PAPER[what])
@@ -330,7 +330,10 @@ def spectrum(
     hops = what not in PAPER and panels[0].wall is not None
     given = settings_of(settings or ())
     name = model or ("ebm-unilateral" if hops and agreement is None else "ebm")
-    request = tiles.Request(grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine)
+    through = None if what in PAPER else scene_node.ratios(panels[0].scene)
+    request = tiles.Request(
+        grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine, through
+    )
     if agreement is not None:
         errors.refuse(
             (

@@ -69,7 +69,7 @@
       make("i", { class: name }, entry);
       entry.append(said);
     }
-    if (data.pulse?.own) make("span", {}, key, "★ the scene's own pulse");
+    if (data.own) make("span", {}, key, data.record ? "★ the block and the record as they are" : "★ the scene's own pulse");
     const grid = make("div", { class: data.panels.length > 1 ? "panels" : "panels one" }, host);
     const output = make("output", { class: "node" }, host, "Point at a node to name it; click to play it. With a panel in focus: arrows move, enter plays.");
     const panels = data.panels.map(panel => {
@@ -103,7 +103,11 @@
       panel.image ??= picture(panel);
       ctx.drawImage(panel.image, rim.left, rim.top, w, h);
       const x = j => rim.left + (j + 0.5) / size[0] * w, y = i => rim.top + h - (i + 0.5) / size[1] * h;
-      const along = (values, value) => (value - values[0]) / (values[values.length - 1] - values[0]) * (values.length - 1);
+      // The place of a value among the nodes, which need not be equally far from each other.
+      const along = (values, value) => {
+        const k = Math.min(Math.max(values.findLastIndex(one => one <= value), 0), values.length - 2);
+        return k + (value - values[k]) / (values[k + 1] - values[k]);
+      };
       ctx.fillStyle = colour("--soft");
       ctx.font = "10px system-ui, sans-serif";
       ctx.textAlign = "center";
@@ -135,7 +139,7 @@
         ctx.fillText("peak acceleration, g", 0, 0);
         ctx.restore();
       }
-      if (data.pulse?.own) star(ctx, x(along(xs, data.pulse.own[0])), y(along(ys, data.pulse.own[1])), [rim.left, rim.top, w, h]);
+      if (data.own) star(ctx, x(along(xs, data.own[0])), y(along(ys, data.own[1])), [rim.left, rim.top, w, h]);
       ctx.lineWidth = 1;
       for (const [node, ring] of [[store.node, false], [store.chosen?.panel === panel ? store.chosen.node : null, true]]) {
         if (!node) continue;

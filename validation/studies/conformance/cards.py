@@ -236,14 +236,15 @@ def engines_table(cards: Sequence[Card]) -> Table:
 def cards_table(cards: Sequence[Card]) -> Table:
     """All cards side by side, a row a phenomenon."""
     marks = [{row["id"]: mark_of(row) for row in card["phenomena"]} for card in cards]
-    head = [text("phenomenon"), Column("target"), Column("limit"), text("unit")]
     rows = []
     for id, phenomenon in PHENOMENA.items():
-        about = [f"{id} {phenomenon.name}", phenomenon.target, phenomenon.limit, phenomenon.unit]
-        rows.append([*about, *(card.get(id) for card in marks)])
+        results = [card.get(id) for card in marks]
+        about = [phenomenon.target, phenomenon.limit, phenomenon.unit]
+        rows.append([f"{id} {phenomenon.name}", *results, *about])
+    results_columns = [Column(card["title"]) for card in cards]
     return Table(
         "cards",
-        [*head, *(Column(card["title"]) for card in cards)],
+        [text("phenomenon"), *results_columns, Column("target"), Column("limit"), text("unit")],
         rows,
         "Cards",
         "Tiny scenes whose answer is closed or certain. One conforms where its value is within the"

@@ -9,7 +9,7 @@ import json
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -32,7 +32,7 @@ from rockcheck.validation.paper import (
     spectra as paper_spectra,
     tables as paper_tables,
 )
-from rockcheck.validation.studies.spectrum import tiles
+from rockcheck.validation.studies.spectrum import scene_node, tiles
 from rockcheck.validation.study import Study
 
 Indices = NDArray[np.int64]
@@ -45,6 +45,12 @@ ABOUT = (
     " corner. Point at a node: each spectrum of the figure says what becomes of the block there. A"
     " click plays the motion: of the model's own histories, the one next to the click that ends the"
     " same way."
+)
+ABOUT_RECORD = (
+    "Which blocks the record overturns: the size of the block, over its own, against the scale of"
+    " the record, each node a run until its outcome is certain. 1 and 1 is the block and the record"
+    " as they are. Point at a node to see what becomes of the block there. A click plays the"
+    " motion: of the model's own histories, the one next to the click that ends the same way."
 )
 LAWS = (
     "Depends on the impact law: so many nodes have another outcome where a block strikes one"
@@ -90,7 +96,8 @@ class Spectra(Study):
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[tiles.Nodes]:
         """The nodes that are still to be played."""
         book = tiles.Book(done)
-        self._found(book)
+        spectra, *_ = self._found(book)
+        self._scene_node(book, list(spectra.values()))
         return book.wanted
 
     def gather(self, done: Mapping[Any, Any]) -> Finding:
@@ -98,11 +105,12 @@ class Spectra(Study):
         by_panel, motions, paper, compared = self._found(tiles.Book(done))
         panels, spectra = list(by_panel), list(by_panel.values())
         nodes, runs = sum(s.outcomes.size for s in spectra), sum(s.evaluations for s in spectra)
-        answer = (
-            f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
-            if len(self.panels) == len(spectra) == 1
-            else f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
-        )
+        answer = f"{len(spectra)} spectra: {nodes} nodes, {runs} runs."
+        if len(self.panels) == len(spectra) == 1:
+            answer = f"{100.0 * spectra[0].safe_area:.2f} % of {nodes} nodes are safe."
+        at_scene = self._scene_node(tiles.Book(done), spectra)
+        if at_scene is not None:
+            answer = scene_node.answer(at_scene, self.panels[0].scene)
         blocks: list[Block] = [*self._blocks(by_panel, motions)]
         if paper:
             claims = list(sentences.claims_of(paper))
@@ -125,6 +133,7 @@ class Spectra(Study):
                 "model": self.request.model,
                 "settings": dict(self.request.settings),
                 "agreement": compared,
+                "own": at_scene and asdict(at_scene),
             },
             files={
                 f"{self._stem(panel)}.{kind}": content
@@ -133,6 +142,25 @@ class Spectra(Study):
             },
             exit_code=3 if any(isinstance(one, pool.Failure) for one in done.values()) else 0,
         )
+
+    def _scene_node(
+        self, book: tiles.Book, spectra: Sequence[Spectrum]
+    ) -> scene_node.NodeAnswer | None:
+        """The answer at the scene's own pulse or record; None of the paper's spectra.
+
+        A node beyond the axes is a task of its own, which the book asks for.
+        """
+        scene = self.panels[0].scene
+        ratios = scene_node.ratios(scene)
+        if self.panels[0].figure is not None or ratios is None or len(spectra) != 1:
+            return None
+        answer = scene_node.within(spectra[0], ratios)
+        if answer is not None:
+            return answer
+        frequency, amplitude = np.array([ratios[0]]), np.array([ratios[1]])
+        sides, failed = book.outcomes(self.request.nodes(scene, amplitude, frequency))
+        letters = tiles.letters_of(sides, np.argwhere(failed))
+        return scene_node.NodeAnswer(str(letters[0]), inside=False)
 
     @property
     def _papers(self) -> bool:
@@ -246,7 +274,8 @@ class Spectra(Study):
         self, spectra: Mapping[Panel, Spectrum], motions: Mapping[Panel, tiles.Played]
     ) -> Iterator[Block]:
         """The figures, and the shares of outcomes."""
-        yield Text(ABOUT, on="page")
+        record = self.panels[0].scene.excitation.kind == "record"
+        yield Text(ABOUT_RECORD if record else ABOUT, on="page")
         for number in dict.fromkeys(panel.figure for panel in spectra):
             mine = {panel: one for panel, one in spectra.items() if panel.figure == number}
             yield self._figure(mine, motions)
@@ -295,15 +324,10 @@ class Spectra(Study):
         request, first, pulses = self.request, next(iter(spectra)), None
         number, pulse = first.figure, first.scene.excitation
         if isinstance(pulse, Ricker | Sine):
-            # amplitude (m/s^2) and period (s) along the axes, and where the user's own one is
+            # amplitude (m/s^2) and period (s) along the axes
             f, a = request.frequencies, request.amplitudes
             amplitudes, periods = (abs(some).tolist() for some in node_pulse(first.scene, a, f))
-            own = f[0] * periods[0] / pulse.period, a[0] * abs(pulse.amplitude) / amplitudes[0]
-            pulses = {
-                "amplitude": amplitudes,
-                "period": periods,
-                "own": [*map(float, own)] if number is None else None,
-            }
+            pulses = {"amplitude": amplitudes, "period": periods}
         return Plot(
             self._stem(first).replace(first.name, f"figure-{number}" if number else first.name),
             TITLES.get(number, first.title)
@@ -317,6 +341,7 @@ class Spectra(Study):
                 "amplitudes": request.amplitudes.tolist(),
                 "record": pulse.kind == "record",
                 "pulse": pulses,
+                "own": scene_node.ratios(first.scene) if number is None else None,
                 "panels": [
                     self._panel(panel, one, motions[panel]) for panel, one in spectra.items()
                 ],

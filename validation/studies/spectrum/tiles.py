@@ -209,6 +209,9 @@ class Request:
     model: str = "ebm"
     settings: Mapping[str, Any] = field(default_factory=dict)
     refine: bool = False
+    #: Frequency and amplitude ratio of a pulse to be played itself: the nearest line of nodes of
+    #: each axis moves there, unless it lies beyond the axis.
+    through: tuple[float, float] | None = None
     frequencies: Floats = field(init=False, compare=False)
     amplitudes: Floats = field(init=False, compare=False)
 
@@ -231,6 +234,10 @@ class Request:
                 what = "the lower end comes first" if usable else "give positive finite numbers"
                 raise InputError(f"{low:g} to {high:g} is not allowed: {what}", f"--{name}")
             object.__setattr__(self, name, np.linspace(low, high, self.size))
+        if self.through is not None:
+            frequency, amplitude = self.through
+            object.__setattr__(self, "frequencies", moved_to(self.frequencies, frequency))
+            object.__setattr__(self, "amplitudes", moved_to(self.amplitudes, amplitude))
 
     def nodes(
         self, scene: Scene, amplitudes: Floats, frequencies: Floats, what: What = "outcomes"
@@ -259,6 +266,15 @@ class Request:
             )
             for a, f in parts
         ]
+
+
+def moved_to(axis: Floats, value: float) -> Floats:
+    """The axis with its nearest node moved to `value`; as it is where that lies beyond its ends."""
+    if not axis[0] <= value <= axis[-1]:
+        return axis
+    moved = axis.copy()
+    moved[int(np.argmin(np.abs(axis - value)))] = value
+    return moved
 
 
 class _Waiting(Exception):
