@@ -40,6 +40,8 @@ FIGURES = "figures"
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
 #: The files of a study in its run.json: their hashes by their names.
 FILES = TypeAdapter(dict[str, str])
+#: Characters above which a text has a wide column.
+LONG_TEXT = 24
 #: Of a verdict: its sign, and its colour on a terminal.
 VERDICTS = {
     "": ("", ""),
@@ -65,12 +67,18 @@ def row_cells(
     ]
 
 
+def text_class(table: Table, number: int) -> str:
+    """The class of a column that holds text: "text", or "text long" where that needs room."""
+    lengths = [len(str(plain(row[number]) or "")) for row in table.rows]
+    return "text long" if max(lengths, default=0) > LONG_TEXT else "text"
+
+
 def _words(mark: Mark, column: Column, write: Callable[[float, int], str]) -> str:
     """A cell's value for people; a sign before it where it has a verdict."""
     digits = mark.digits or column.digits
     match column.kind, mark.value:
         case _, value if value is None or value != value:  # NaN
-            said = ""
+            said = column.empty
         case "model", value:
             said = style.label_of(str(value))
         case _, bool(value):
@@ -271,7 +279,7 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
             else [],
         },
         found=found,
-        here=shlex.quote(folder.resolve().name),
+        here=folder_argument(folder),
         live=bool(live),
         scripts=dict.fromkeys(
             script
@@ -295,6 +303,7 @@ TEMPLATES = Environment(
     lstrip_blocks=True,
     finalize=lambda value: errors.inert(value) if type(value) is str else value,
 )
+TEMPLATES.globals["text_class"] = text_class
 TEMPLATES.filters |= {
     one.__name__: one for one in (number, unit, duration, moment, window, readable)
 } | {"share": lambda used: _words(Mark(used), Column("used", kind="used"), number)}
@@ -331,6 +340,11 @@ def belongings(page: Path) -> set[str]:
     )
     drawn = [name.removesuffix(".svg") + ".json" for name in names if name.endswith(".svg")]
     return {*names, *drawn, f"{FIGURES}/{page.stem}~small.svg"}
+
+
+def folder_argument(folder: Path) -> str:
+    """A page's folder in its commands: as the user gave it, of an absolute path the name."""
+    return shlex.quote(folder.name if folder.is_absolute() else folder.as_posix())
 
 
 def remove(folder: Path, names: Iterable[str]) -> None:

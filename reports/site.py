@@ -201,6 +201,7 @@ class _Pages:
                 ],
             },
             "run": self.run,
+            "here": document.folder_argument(folder),
             "looks": style.looks(self.run.models),
             "channels": CHANNELS,
             "SEVERITY": results.SEVERITY,

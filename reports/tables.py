@@ -423,6 +423,15 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
     )
 
 
+def alike(run: results.Run, cells: Sequence[results.Cell]) -> list[list[results.Cell]]:
+    """Cells of a scene by what its card says of them: verdict, whether judged, and outcome."""
+    groups: dict[tuple[str, str, bool, str], list[results.Cell]] = {}
+    for cell in cells:
+        outcome = outcome_of(run, cell) if cell.outcome else ""
+        groups.setdefault((cell.verdict, cell.words, bool(cell.checks), outcome), []).append(cell)
+    return list(groups.values())
+
+
 def accuracy(run: results.Run) -> list[Block]:
     """Peak rotation by each model against the reference's, over all scenes.
 

@@ -35,7 +35,7 @@ class Column:
     shown: "number" with `digits` significant digits, "percent" (of a share), "used" (used share of
     a limit, 1 at the limit), "text", or "model" (a model's name, with its colour). Files keep all
     digits. A terminal shows `brief` columns only. Readers do not see an `optional` column that has
-    no value.
+    no value. `empty` stands where a cell has none.
     """
 
     name: str
@@ -46,6 +46,7 @@ class Column:
     help: str = ""
     brief: bool = True
     optional: bool = False
+    empty: str = ""
 
     @property
     def head(self) -> str:

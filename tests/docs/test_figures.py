@@ -117,19 +117,20 @@ def ratio(found, line, other) -> list[float]:
 
 
 def test_the_step_that_an_engine_needs():
-    of = {
-        row["line"]: row["all"]
+    rows = {
+        row["line"]: row
         for run in ("league", "league-jolt")
         for row in whole_runs.load(run).table("first-steps").records()
     }
-    assert {
-        (of[engine], of.get(f"{engine} adaptive", "0.008 s"))
-        for engine in ("mujoco", "pybullet", "pymunk", "dart", "box2d")
-    } == {("0.0001 s", "0.008 s")}
-    assert [of[engine] for engine in ("drake", "physx", "jolt")] == [
-        f"never (down to {step} s)" for step in ("0.001", "0.0001", "0.0001")
-    ]
-    assert {of[f"{engine} default"] for engine in ("pymunk", "dart")} == {"0.0001 s"}
+    reached = {line: row["all"] for line, row in rows.items()}
+    at_best = {reached[line] for line in ("mujoco", "pybullet", "pymunk", "dart", "box2d")}
+    assert at_best == {1e-4}
+    adaptive = {step for line, step in reached.items() if line.endswith(" adaptive")}
+    assert adaptive == {8e-3}
+    assert {reached[f"{engine} default"] for engine in ("pymunk", "dart")} == {1e-4}
+    beyond = {line: rows[line]["smallest"] for line in ("drake", "physx", "jolt")}
+    assert beyond == {"drake": 1e-3, "physx": 1e-4, "jolt": 1e-4}
+    assert {reached[line] for line in beyond} == {None}
 
 
 def test_what_the_benchmark_says():

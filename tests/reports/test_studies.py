@@ -26,7 +26,10 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.paper import Panel, paper_panels
+from rockcheck.validation.studies.conformance.cards import cards_table
+from rockcheck.validation.studies.conformance.phenomena import PHENOMENA
 from rockcheck.validation.studies.population.runs import blocks_of, lines_of
+from rockcheck.validation.studies.spectrum import scene_node
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
@@ -128,9 +131,9 @@ def ida() -> Finding:
     )
 
 
-def spectra(letters: str, *panels: Panel) -> Finding:
+def spectra(letters: str, *panels: Panel, request: Request | None = None) -> Finding:
     """Spectra whose outcomes are made up; their histories are the model's own."""
-    study = Spectra(panels, Request(SIZE))
+    study = Spectra(panels, request or Request(SIZE))
     done = {
         task: Played(letters) if task.what == "outcomes" else study.play(task)
         for task in study.tasks({})
@@ -200,6 +203,20 @@ def test_accessible(visit, barriers, name, scheme):
     assert barriers(page) == []
 
 
+#: Colours in the middle of nodes of a panel, of `SIZE` nodes an axis.
+COLOURS = """([panel, nodes]) => {
+    const c = document.querySelectorAll('.panel canvas')[panel], r = devicePixelRatio;
+    const w = c.clientWidth - 48, h = c.clientHeight - 30;
+    const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+    return nodes.map(([i, j]) => {
+        const place = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h];
+        const [x, y] = place.map(pixels => Math.round(r * pixels));
+        const hex = k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0');
+        return '#' + [0, 1, 2].map(hex).join('');
+    });
+}"""
+
+
 def place_of_node(page: playwright.Page, panel: int, row: int, column: int) -> tuple[float, float]:
     canvas = page.locator(".panel canvas").nth(panel)
     canvas.scroll_into_view_if_needed()
@@ -218,20 +235,9 @@ def test_the_panels_stand_as_in_the_paper_and_are_painted(visit):
         "overturned; no wall: counterclockwise",
         "undecided",
     ]
-    colours = """([panel, nodes]) => {
-        const c = document.querySelectorAll('.panel canvas')[panel], r = devicePixelRatio;
-        const w = c.clientWidth - 48, h = c.clientHeight - 30;
-        const all = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
-        return nodes.map(([i, j]) => {
-            const place = [42 + (j + .5) / 20 * w, 4 + h - (i + .5) / 20 * h];
-            const [x, y] = place.map(pixels => Math.round(r * pixels));
-            const hex = k => all[4 * (y * c.width + x) + k].toString(16).padStart(2, '0');
-            return '#' + [0, 1, 2].map(hex).join('');
-        });
-    }"""
-    free = page.evaluate(colours, [0, [[3, 9], [9, 9], [0, 0]]])
+    free = page.evaluate(COLOURS, [0, [[3, 9], [9, 9], [0, 0]]])
     assert free == [OUTCOMES["safe"], OUTCOMES["clockwise"], OUTCOMES["undecided"]]
-    assert page.evaluate(colours, [1, [[3, 9], [9, 9]]]) == [
+    assert page.evaluate(COLOURS, [1, [[3, 9], [9, 9]]]) == [
         OUTCOMES["safe"],
         OUTCOMES["overturned"],
     ]
@@ -270,6 +276,41 @@ def test_ones_own_block_is_told_in_hertz_and_g(opened, tmp_path):
     g = AMPLITUDES[4] * panel.scene.gravity / 9.80665 * panel.scene.block.slope
     hertz = FREQUENCIES[7] * panel.scene.frequency_parameter / (2.0 * np.pi)
     assert list(shown) == pytest.approx([g, hertz], rel=0.01)
+
+
+def test_the_star_lies_in_the_middle_of_the_cell_that_was_played(opened, tmp_path):
+    panel = Panel("shelf", "shelf", paper_panels(8)[1].scene)
+    ratios = scene_node.ratios(panel.scene)
+    request = Request(SIZE, (0.3 * ratios[0], 2.2 * ratios[0]), through=ratios)
+    column = request.frequencies.tolist().index(ratios[0])
+    row = request.amplitudes.tolist().index(ratios[1])
+    page = opened(publish(spectra("S" * SIZE**2, panel, request=request), tmp_path))
+    [middle] = page.evaluate(COLOURS, [0, [[row, column]]])
+    assert middle == "#ffffff"
+
+
+def test_a_phone_shows_the_result_of_a_card(opened, tmp_path):
+    rows = [
+        {"id": id, "value": 1.0, "limit": 0.1, "verdict": "conforms", "reason": ""}
+        for id in PHENOMENA
+    ]
+    table = cards_table([{"title": "pymunk 7.3.1, best", "phenomena": rows}])
+    page = opened(publish(found([table]), tmp_path), **PHONE)
+    result = page.locator("tbody tr").first.locator("td").first.bounding_box()
+    assert result["x"] + result["width"] <= PHONE["viewport"]["width"]
+
+
+def test_a_sentence_in_a_table_of_many_columns_has_room(opened, tmp_path):
+    figures = [Column(f"number {k}") for k in range(20)]
+    sentence = "depth of a corner in floor or wall, over the half diagonal"
+    table = Table("wide", [text("words"), *figures], [[sentence, *[1.0] * 20]])
+    page = opened(publish(found([table]), tmp_path))
+    assert page.locator("tbody th").bounding_box()["width"] >= 220.0
+
+
+def test_commands_name_the_folder_of_the_page(tmp_path):
+    page = publish(marked(), tmp_path / "my run").read_text("utf-8")
+    assert "rockcheck report &#39;my run&#39; --scene curve" in page
 
 
 def test_a_click_plays_the_kept_history_that_ends_the_same_way(visit, eventually):

@@ -104,5 +104,5 @@ def answer(node: NodeAnswer, scene: Scene) -> str:
 def _words(change: Change) -> str:
     return (
         f"it {OUTCOMES[change.letter]} at {change.other:.3g} times the {change.axis}"
-        f" (last as now: {change.same:.3g})"
+        f" (not yet at {change.same:.3g})"
     )

@@ -285,7 +285,7 @@ class Spectra(Study):
             [
                 text("spectrum"),
                 text("title", brief=False),
-                Column("figure", brief=False),
+                Column("figure", brief=False, optional=True),
                 Column("safe", kind="percent", digits=4),
                 Column("left", kind="percent", digits=4, help="overturned counterclockwise"),
                 Column("right", kind="percent", digits=4, help="overturned clockwise"),

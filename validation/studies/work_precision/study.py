@@ -241,26 +241,9 @@ def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
             "Free rocking and pulses. Error: RMS of theta. Cost: CPU a simulated second. Empty:"
             " not reached.",
         )
-    if steps := runs.first_steps(frame):
-        kinds = {"free": "free rocking", "pulse": "pulse", "wall": "wall", "all": "all three"}
-        yield Table(
-            "first-steps",
-            [text("line", "engine"), *(text(kind, label) for kind, label in kinds.items())],
-            [
-                [
-                    line,
-                    *(
-                        f"never (down to {least:g} s)"
-                        if math.isnan(met[kind])
-                        else f"{met[kind]:g} s"
-                        for kind in kinds
-                    ),
-                ]
-                for line, met, least in steps
-            ],
-            f"The step at which an engine first meets {runs.LEVEL:g} alpha",
-            "Median RMS error of theta over the scenes of a kind. Adaptive: the largest step.",
-        )
+    steps = runs.first_steps(frame)
+    if steps:
+        yield _steps_table(steps)
     for title, starts in SHEETS.items():
         shown = [family for family in families if family.startswith(starts)]
         if shown:
@@ -273,6 +256,7 @@ def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
         [[label, *(of.get((label, family)) for family in families)] for label in labels],
         f"Run time at an error of {runs.LEVEL:g} alpha, over the EBM's",
         on="page",
+        folded=True,
     )
     yield Table(
         "order-spread",
@@ -285,6 +269,7 @@ def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
         [_spread(label, trends[trends.line == label]) for label in labels],
         "Order and run time",
         "Order: median slope of the error in the swept setting.",
+        folded=True,
     )
     yield Table(
         "scenes",
@@ -313,6 +298,20 @@ def _models(samples: Sequence[runs.BenchmarkRun]) -> Iterator[Block]:
     yield _table("orders-and-ratios", trends)
     yield _table("runs", pd.DataFrame(samples))
     yield Text(title="Left out", items=runs.LEFT_OUT, on="page")
+
+
+def _steps_table(steps: Sequence[tuple[str, Mapping[str, float], float]]) -> Table:
+    """The step at which each engine's line first meets the level (`runs.first_steps`)."""
+    kinds = {"free": "free rocking", "pulse": "pulse", "wall": "wall", "all": "all three"}
+    reached = [Column(kind, label, "s", empty="–") for kind, label in kinds.items()]
+    return Table(
+        "first-steps",
+        [text("line", "engine"), *reached, Column("smallest", "smallest step played", "s")],
+        [[line, *(met[kind] for kind in kinds), smallest] for line, met, smallest in steps],
+        f"The step at which an engine first meets {runs.LEVEL:g} alpha",
+        "Median RMS error of theta over the scenes of a kind. Adaptive: the largest step. –: not"
+        " with the smallest step that was played.",
+    )
 
 
 def _about(family: str) -> tuple[float, float]:
@@ -546,4 +545,5 @@ def _timings(
         ],
         "What a scene does not need",
         f"Not measured: {'; '.join(timings.NOT_MEASURED)}.",
+        folded=True,
     )
