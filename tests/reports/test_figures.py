@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.reports.document import FIGURES, belongings, hash_of, publish
-from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, OWN_MARK, draw_spectrum, figure_of
+from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, draw_spectrum, figure_of, own_label
 from rockcheck.scenes import reading
 from rockcheck.validation.finding import (
     Axis,
@@ -109,7 +109,7 @@ def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
     figure = figure_of(plot_of(Case("rack", "Rack", scene), ranges=((1.0, 8.0), (1.0, 4.0))))
     (star,) = figure.axes[0].lines
     np.testing.assert_allclose(star.get_xydata(), [own])
-    assert OWN_MARK["label"] in labels(figure)
+    assert own_label(record=False) in labels(figure)
     assert not any(axes.lines for axes in figure_of(plot_of(*paper_panels(8))).axes)
 
 
@@ -169,9 +169,9 @@ def test_it_is_the_figure_of_the_page_in_any_format(study, tmp_path, typed, name
     shown = (study / FIGURES / f"{name}.svg").read_bytes()
     unstamped = re.sub(rb" *<dc:identifier>.*\n", b"", shown)
     assert (tmp_path / "one.svg").read_bytes() == unstamped != shown
-    assert f"rockcheck report DIR --scene {name} -o {name}.pdf" in (study / "index.html").read_text(
-        "utf-8"
-    )
+    assert f"rockcheck report {study.name} --scene {name} -o {name}.pdf" in (
+        study / "index.html"
+    ).read_text("utf-8")
 
 
 @pytest.mark.parametrize(
