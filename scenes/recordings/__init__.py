@@ -3,10 +3,10 @@
 | format | file | what the file must say |
 |---|---|---|
 | PEER | `.AT2` | NPTS, DT, UNITS OF G or of another unit; columns may run together |
-| COSMOS V2, CSMIP V2 | `.V2` | points, format, unit, time step; one or several channels |
-| ESM (DYNA 1.2) | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
+| COSMOS V1, V2, CSMIP V2 | `.V2` | points, format, unit, time step; one or several channels |
+| ESM (DYNA 1.2), AFAD | `.ASC` | NDATA, SAMPLING_INTERVAL_S, UNITS |
 | K-NET, KiK-net | `.NS`, `.EW1`, ... | Scale Factor, Sampling Freq(Hz), Duration Time(s) |
-| China, GeoNet, SMC, NSMN, CWB, BBP | any | see `networks` |
+| networks: China, GeoNet, SMC, CSMIP V1, RENADIC, USC, BHRC, ... | any | see `networks` |
 | `name`, `npts dt`, values | any | the unit by `Reading` |
 | CSV | any | `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
 | columns of text | any | nothing: options of `Reading` supply the rest |

@@ -16,6 +16,7 @@ import numpy as np
 
 from rockcheck.scenes.base import LEAST, MOST
 from rockcheck.scenes.errors import printable, refuse
+from rockcheck.scenes.recordings.network_lines import digit_notes
 from rockcheck.scenes.recordings.recording import (
     NUMBER,
     UNITS,
@@ -29,9 +30,8 @@ from rockcheck.scenes.recordings.recording import (
     number,
     numbers,
     option,
-    settled_step,
-    settled_unit,
 )
+from rockcheck.scenes.recordings.stated import Fact, Stated, last_digit, recording_of
 
 AT2_HEADER = re.compile(rf"NPTS\s*+=\s*+(\d++)\s*+(?:,\s*+)?DT\s*+=\s*+({NUMBER})", re.IGNORECASE)
 AT2_HEADER_PLAIN = re.compile(rf"^\s*+(\d++)\s++({NUMBER})\s++NPTS\s*+(?:,\s*+)?DT", re.IGNORECASE)
@@ -62,6 +62,11 @@ _HEADER = re.compile(
 _CSMIP_FORMAT = re.compile(_FORMAT.replace(r"\(?", r"\("), re.IGNORECASE)
 _CSMIP_UNIT = re.compile(r"\b(?:in\s++|units\s*+:\s*+)([a-z/0-9^]++)", re.IGNORECASE)
 _CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGNORECASE)
+#: The peak in the text of CSMIP's header, and in that of COSMOS, where "Uncor max" is another.
+_PEAK = re.compile(
+    rf"(?:\bPeak\s++accel\w*+\s*+=|\bProcessed:.{{0,60}}\bMax\s*+=)\s*+({NUMBER})\s*+([a-z/0-9^]++)",
+    re.IGNORECASE,
+)
 _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
 _DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down", 402: "vertical"}
 NO_FIELDS = "a format without fields"
@@ -92,28 +97,21 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
             "",
         ),
     )
-    unit = settled_unit(stated, reading)
     count = checked_count(header, "NPTS", match[1])
-    step = settled_step(checked_step(header, "DT", match[2]), reading)
+    facts = Stated(
+        count=Fact(count, "NPTS", header),
+        time_step=Fact(checked_step(header, "DT", match[2]), "DT", header),
+        unit=Fact(stated, "UNITS") if stated else None,
+    )
     end = _end_of_samples(lines, header, count)
     behind = " ".join(" ".join(lines[end:]).split())
     values = numbers(enumerate(lines[header:end], header + 1), count)
-    if len(values) != count:
-        raise fault(f"NPTS says {count}, the file has {len(values)} samples", header)
+    notes = [f"left out behind the last sample: {printable(behind, 60)!r}"] if behind else []
+    notes += digit_notes(lines[header:end], header + 1)
     fields = lines[1].split(",")  # event, date, station and component, or another form
     name = fields[-1].strip()[:10]
-    return [
-        Recording(
-            samples=np.array(values) * UNITS[unit],
-            time_step=step,
-            unit=unit,
-            form="PEER AT2",
-            notes=(f"left out behind the last sample: {printable(behind, 60)!r}",)
-            if behind
-            else (),
-            component=name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else "",
-        )
-    ]
+    component = name if len(fields) > 2 and re.fullmatch(r"[0-9A-Za-z-]{1,6}", name) else ""
+    return [recording_of(values, facts, reading, form="PEER AT2", component=component, notes=notes)]
 
 
 def _end_of_samples(lines: list[str], first: int, count: int) -> int:
@@ -158,20 +156,27 @@ def read_esm(lines: list[str], reading: Reading) -> list[Recording]:
         ),
     )
     count = checked_count(place, "NDATA", counted)
-    step = settled_step(checked_step(line, "SAMPLING_INTERVAL_S", interval), reading)
-    unit = settled_unit(known_unit(header.get("UNITS", (0, ""))[1]), reading)
+    unit_line, unit_word = header.get("UNITS", (0, ""))
+    unit = known_unit(unit_word)
+    length_line, length = header.get("DURATION_S", (0, ""))
+    peak_line, peak = header.get("PGA_CM/S^2", (0, ""))
+    facts = Stated(
+        count=Fact(count, "NDATA", place),
+        time_step=Fact(
+            checked_step(line, "SAMPLING_INTERVAL_S", interval), "SAMPLING_INTERVAL_S", line
+        ),
+        unit=Fact(unit, "UNITS", unit_line) if unit else None,
+        duration=Fact(number(length_line, length), "DURATION_S", length_line)
+        if is_number(length)
+        else None,
+        peak=Fact(number(peak_line, peak) * UNITS["gal"], "PGA", peak_line)
+        if is_number(peak)
+        else None,
+        peak_within=last_digit(peak) * UNITS["gal"] if is_number(peak) else 0.0,
+    )
     values = numbers(enumerate(lines[first - 1 :], first))
-    if len(values) != count:
-        raise fault(f"NDATA says {count}, the file has {len(values)} samples", place)
-    return [
-        Recording(
-            samples=np.array(values) * UNITS[unit],
-            time_step=step,
-            unit=unit,
-            form="ESM ASCII",
-            component=printable(header.get("STREAM", (0, ""))[1], 30),
-        )
-    ]
+    component = printable(header.get("STREAM", (0, ""))[1], 30)
+    return [recording_of(values, facts, reading, form="ESM ASCII", component=component)]
 
 
 def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
@@ -209,18 +214,22 @@ def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
             f"line {line_of}",
         ),
     )
-    unit = settled_unit("gal", reading)
-    samples = values * (factor / counts * UNITS[unit])
-    mean = float(np.mean(samples))
-    said = f"the mean, {mean / UNITS[unit]:.4g} gal, is taken out: the offset of the digitiser"
+    gals = values * (factor / counts)
+    mean = float(np.mean(gals))
+    peak_line, peak = header.get("Max. Acc. (gal)", (0, ""))
+    facts = Stated(
+        time_step=Fact(1.0 / hertz, "Sampling Freq(Hz)"),
+        unit=Fact("gal", "Scale Factor", place),
+        peak=Fact(number(peak_line, peak) * UNITS["gal"], "Max. Acc.", peak_line)
+        if is_number(peak)
+        else None,
+        peak_within=last_digit(peak) * UNITS["gal"] if is_number(peak) else 0.0,
+    )
+    note = f"the mean, {mean:.4g} gal, is taken out: the offset of the digitiser"
+    component = printable(header.get("Dir.", (0, ""))[1], 30)
     return [
-        Recording(
-            samples=samples - mean,
-            time_step=settled_step(1.0 / hertz, reading),
-            unit=unit,
-            form="K-NET ASCII",
-            component=printable(header.get("Dir.", (0, ""))[1], 30),
-            notes=(said,),
+        recording_of(
+            gals - mean, facts, reading, form="K-NET ASCII", component=component, notes=(note,)
         )
     ]
 
@@ -230,8 +239,8 @@ class _Block:
     """What is known of the next block of accelerations, from its headers and its own first line.
 
     `step` is the line of the time step, and its value (s); `count` samples, in all some whole
-    `seconds` where these are stated; `across` numbers stand on a line, each `width` characters
-    wide.
+    `seconds` where these are stated; `peak` is in m/s^2; `across` numbers stand on a line, each
+    `width` characters wide.
     """
 
     name: str = ""
@@ -241,6 +250,8 @@ class _Block:
     unit: str = ""
     across: int = 8
     width: int = 10
+    peak: Fact[float] | None = None
+    peak_within: float = 0.0
 
     @property
     def height(self) -> int:
@@ -276,8 +287,8 @@ def read_volume(lines: list[str], reading: Reading) -> list[Recording]:
             block.unit = next(map(known_unit, _CSMIP_UNIT.findall(rest)), "")
             if shape := _CSMIP_FORMAT.search(rest):
                 block.across, block.width = map(int, shape.groups())
-        elif named := _CHANNEL.search(line):
-            block.name = named[2]
+        else:
+            _take_text(line, index, block)
         if block.count:
             found.append(_recording(lines, index, block, reading))
             block, index = _Block(), index + block.height
@@ -286,6 +297,17 @@ def read_volume(lines: list[str], reading: Reading) -> list[Recording]:
             "a V2 file without a block of accelerations; only corrected accelerations can be read",
         )
     return found
+
+
+def _take_text(line: str, n: int, block: _Block) -> None:
+    """Take the channel's name and its peak from a line of text, number `n`."""
+    if named := _CHANNEL.search(line):
+        block.name = named[2]
+    peak = _PEAK.search(line)
+    unit = known_unit(peak[2]) if peak else ""
+    if peak and unit:
+        block.peak = Fact(number(n, peak[1]) * UNITS[unit], "the header", n)
+        block.peak_within = last_digit(peak[1]) * UNITS[unit]
 
 
 def _refuse_counts(block: re.Match[str], line: int) -> None:
@@ -318,24 +340,24 @@ def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) ->
 
 
 def _recording(lines: list[str], index: int, about: _Block, reading: Reading) -> Recording:
-    (place, stated), here, end = about.step, f"line {index}", index + about.height
+    (place, seconds), here, end = about.step, f"line {index}", index + about.height
     refuse(
         (not place, "no real header before this block states the time step", here),
         (about.across < 1 or about.width < 1, NO_FIELDS, here),
     )
     count = checked_count(index, "the count of points", about.count)
-    step = checked_step(place, "the time step", f"{stated!r}")
-    seconds = settled_step(step, reading)
-    unit = settled_unit(about.unit, reading)
+    step = checked_step(place, "the time step", f"{seconds!r}")
     values: list[float] = []
     for n, line in enumerate(lines[index:end], index + 1):
-        places = range(0, min(about.across, count - len(values)) * about.width, about.width)
+        on_line = min(about.across, count - len(values))
+        places = range(0, on_line * about.width, about.width)
         words = [line[k : k + about.width].strip() for k in places]
         # a field is empty, or lines are shifted: the last one's number goes on behind it
         if "" in words or line[about.across * about.width :][:1].strip():
             break
+        if len(line.rstrip()) < on_line * about.width:
+            raise fault(f"{len(line.rstrip())} characters: a digit is missing", n)
         values += [number(n, word) for word in words]
-    length = count * seconds
     refuse(
         (
             len(values) != count,
@@ -347,17 +369,15 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
             f"the header says {count} points of acceleration, more follow",
             here,
         ),
+    )
+    length = float(about.seconds[:9]) if about.seconds else None
+    facts = Stated(
+        time_step=Fact(step, "the header", place),
+        unit=Fact(about.unit, "the header", index) if about.unit else None,
         # A time step of another record would be a silent fault.
-        (
-            about.seconds and abs(length - int(about.seconds[:9])) > 1.0 + 0.01 * length,
-            f"{count} points every {seconds:g} s are {length:.6g} s, not {about.seconds[:9]} secs",
-            here,
-        ),
+        duration=Fact(length, "the header", index) if length is not None else None,
+        duration_within=1.0 + 0.01 * count * step,
+        peak=about.peak,
+        peak_within=about.peak_within,
     )
-    return Recording(
-        samples=np.array(values) * UNITS[unit],
-        time_step=seconds,
-        unit=unit,
-        form="V2",
-        component=printable(about.name, 30),
-    )
+    return recording_of(values, facts, reading, form="V2", component=printable(about.name, 30))

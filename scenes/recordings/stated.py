@@ -61,6 +61,7 @@ class Stated:
     | `unit` | a key of `UNITS` |
     | `duration` | s; right within `duration_within`, and always within 1.5 time steps |
     | `peak` | largest absolute acceleration, m/s^2; its sign does not matter |
+    | `peak_within` | m/s^2; what the peak's last digit leaves open, beside `PEAK_TOLERANCE` |
     """
 
     count: Fact[int] | None = None
@@ -69,6 +70,7 @@ class Stated:
     duration: Fact[float] | None = None
     duration_within: float = 0.0
     peak: Fact[float] | None = None
+    peak_within: float = 0.0
 
 
 def recording_of(
@@ -100,9 +102,16 @@ def recording_of(
             *unit_notes,
             *step_notes,
             *duration_notes(len(samples), time_step, stated, reading),
-            *peak_notes(samples, unit, stated.peak, reading),
+            *peak_notes(samples, unit, stated, reading),
         ),
     )
+
+
+def last_digit(word: str) -> float:
+    """Half of the last printed digit's unit in a number: 0.0005 in 0.058."""
+    mantissa, _, exponent = word.lower().replace("d", "e").partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 0.5 * 10.0 ** (int(exponent or 0) - decimals)
 
 
 def _check_count(samples: int, count: Fact[int] | None) -> None:
@@ -155,16 +164,17 @@ def duration_notes(samples: int, time_step: float, stated: Stated, reading: Read
     raise fault(f"{message}{hint}", duration.line)
 
 
-def peak_notes(samples: Floats, unit: str, peak: Fact[float] | None, reading: Reading) -> list[str]:
+def peak_notes(samples: Floats, unit: str, stated: Stated, reading: Reading) -> list[str]:
     """A note where a unit that was given for the stated one contradicts the peak, in m/s^2.
 
     Raises `InputError` where the peak is contradicted otherwise.
     """
+    peak = stated.peak
     if peak is None:
         return []
     largest = float(np.max(np.abs(samples), initial=0.0))
     expected = abs(peak.value)
-    if abs(largest - expected) <= PEAK_TOLERANCE * expected:
+    if abs(largest - expected) <= max(PEAK_TOLERANCE * expected, stated.peak_within):
         return []
     name = peak.name or "the header"
     message = (

@@ -94,7 +94,7 @@ def esm(component: str) -> bytes:
         "EVENT_NAME: GREECE\nSTATION_NAME: Town Hall,Argos\nSAMPLING_INTERVAL_S:"
         f" {STEP:.6f}\nNDATA: {len(values)}\nDURATION_S: 4.010\n"
         f"STREAM: { {'N-S': 'HNN', 'E-W': 'HNE', 'U-D': 'HNZ'}[component] }\n"
-        "UNITS: cm/s^2\nPGA_CM/S^2: 304\nDATA_TYPE: ACCELERATION\nUSER5: \n"
+        f"UNITS: cm/s^2\nPGA_CM/S^2: {max(abs(values)):.6f}\nDATA_TYPE: ACCELERATION\nUSER5: \n"
         + _fixed(values, 1, ".6f")
     ).encode()
 
@@ -234,7 +234,7 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
 @pytest.mark.parametrize(
     ("name", "content", "option", "said"),
     [
-        ("a.V2", cosmos("N-S").replace(OWN, UNKNOWN), {}, "401 points every 0.02 s are 8.02 s"),
+        ("a.V2", cosmos("N-S").replace(OWN, UNKNOWN), {}, "401 samples every 0.02 s are 8.02 s"),
         ("a.V2", re.sub(rb"(?m)^([- .\d]{80})$", rb" \1", csmip("N-S")), {}, "the block has 0"),
         (
             "a.V2",
