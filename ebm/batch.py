@@ -4,13 +4,13 @@ A batch gives outcomes and peaks, and the motion on request. Threads take chunks
 of a row depends neither on the other rows nor on the number of threads.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.names import FAILURES, Ending
-from rockcheck.ebm.core.state import FOUND, Records, Rows, workspace
+from rockcheck.ebm.core.state import EXTREMES, FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.natural import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
@@ -26,11 +26,13 @@ class Outcomes:
 
     `runs` has a FOUND a run: `t`, in sqrt(R/g), and `motion` are those at which it was decided;
     `peak` is pi/2 when it overturned, and counts rotations after the outcome is certain, too. `out`
-    has, as asked for, columns (x, y, theta and their rates) of the first `rows` output rows.
+    has, as asked for, columns (x, y, theta and their rates) of the first `rows` output rows;
+    `extremes` an EXTREMES a run, or nothing.
     """
 
     runs: NDArray[np.void]
     out: Floats
+    extremes: NDArray[np.void]
 
     @property
     def side(self) -> NDArray[np.int8]:
@@ -47,6 +49,16 @@ class Outcomes:
     def undecided(self) -> NDArray[np.bool_]:
         """Which runs were given up before they were decided (`ebm.core.decide.CALM`)."""
         return np.asarray(self.runs["ending"] == Ending.UNDECIDED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a batch is asked for: see `run_batch`; and whether the extremes are kept."""
+
+    until_decided: bool = True
+    rows: int = 0
+    columns: slice | int = field(default_factory=lambda: slice(None))
+    extremes: bool = False
 
 
 def run_batch(
@@ -68,45 +80,72 @@ def run_batch(
     `ModelFailure` if `strict`, else only its `ending` says so. Raises `InputError` where the
     model's runs do not know when they are decided.
     """
+    asked = Asked(until_decided=until_decided, rows=rows, columns=columns)
+    outcomes = play_batch(packed, model, asked, jobs=jobs, on_progress=on_progress)
+    if strict and outcomes.failed.any():
+        first = int(np.argmax(outcomes.failed))
+        why = FAILURES[int(outcomes.runs["ending"][first])]
+        raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
+    return outcomes
+
+
+def play_batch(
+    packed: Rows,
+    model: EventBasedModel,
+    asked: Asked,
+    *,
+    jobs: int | None = None,
+    on_progress: progress.OnProgress = progress.unheard,
+) -> Outcomes:
+    """Runs every row, whether it fails or not.
+
+    With `asked.extremes` a run until it is decided goes on until none of them can change.
+    """
     if not model.decides:
         raise InputError("a batch has Coulomb's friction or none", "friction")
-    count = len(packed.given)
+    count, rows = len(packed.given), asked.rows
     found = np.empty(count, FOUND)
+    extremes = np.zeros(count if asked.extremes else 0, EXTREMES)
+    most_steps = min(model.most_steps, 2_000_000)
 
     def chunk(first: int) -> Floats:
-        some = found[first : first + _CHUNK]
+        some, kept = found[first : first + _CHUNK], extremes[first : first + _CHUNK]
         size = len(some)
         out, modes = np.zeros((size, rows, 6)), np.zeros((size, rows), dtype=np.int8)
-        states = state_for(model, min(model.most_steps, 2_000_000), until_decided)
-        records = Records(out, modes, np.empty((size, 0, 5)))
+        states = state_for(model, most_steps, asked.until_decided, asked.extremes)
+        records = Records(out, modes, np.empty((size, 0, 5)), kept)
         part = packed._replace(given=packed.given[first : first + size])
         work = part, states, workspace(), records, some
         loop_of(model, *work)(*work)
-        return out[:, :, columns].copy()
+        return out[:, :, asked.columns].copy()
 
-    kept = [np.empty((0, rows, 6))[:, :, columns]]
+    outs = [np.empty((0, rows, 6))[:, :, asked.columns]]
     with progress.threads(jobs) as pool:
         for n, out in enumerate(pool.map(chunk, range(0, count, _CHUNK)), 1):
-            kept.append(out)
+            outs.append(out)
             on_progress(min(_CHUNK * n, count), count)
-    outcomes = Outcomes(runs=found, out=np.concatenate(kept))
-    if strict and outcomes.failed.any():
-        first = int(np.argmax(outcomes.failed))
-        why = FAILURES[int(found["ending"][first])]
-        raise ModelFailure(f"{model.name}: run {first} of the batch: {why}")
-    return outcomes
+    return Outcomes(runs=found, out=np.concatenate(outs), extremes=extremes)
 
 
 def run_decided(
     packed: Rows,
     model: EventBasedModel,
     *,
+    extremes: bool = False,
     jobs: int | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Outcomes:
-    """`run_batch` until all is decided; a run that fails is made once more by `model.finer()`."""
-    found = run_batch(packed, model, strict=False, jobs=jobs, on_progress=on_progress)
-    if (again := found.failed).any():
-        some = packed._replace(given=packed.given[again])
-        found.runs[again] = run_batch(some, model.finer(), strict=False, jobs=jobs).runs
+    """Runs every row until all is decided; one that fails is made once more by `model.finer()`.
+
+    With `extremes` until none of these can change.
+    """
+    asked = Asked(extremes=extremes)
+    found = play_batch(packed, model, asked, jobs=jobs, on_progress=on_progress)
+    again = found.failed
+    if again.any():
+        failed = packed._replace(given=packed.given[again])
+        finer = play_batch(failed, model.finer(), asked, jobs=jobs)
+        found.runs[again] = finer.runs
+        if extremes:
+            found.extremes[again] = finer.extremes
     return found

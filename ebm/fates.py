@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,8 +20,6 @@ from rockcheck.scenes import Floats, progress
 __all__ = ["Fates", "RunTable", "play_fates"]
 #: The codes of `Fates.outcome`; the first four in the order of `scenes.history.OUTCOMES`.
 AT_REST, MOVING, OVERTURNED_LEFT, OVERTURNED_RIGHT, UNDECIDED, FAILED = range(6)
-#: Rows that are packed at once.
-_ROWS = 65_536
 _STARTS_INSIDE = "the block would start inside a wall"
 
 
@@ -31,9 +28,10 @@ class Fates:
     """What became of the runs of a table, an entry a row.
 
     `outcome` is one of the codes above. `time_s` (s) is when that was certain. `peak` (rad) is the
-    largest |theta| of the whole motion, pi/2 where the block overturned. `extremes`, if asked for,
-    has the names of `scenes.extremes.Extremes`, SI units, and for each wall names such as
-    `wall_left_speed`; NaN where there is none. `reasons` says why a row is FAILED, by its number.
+    largest |theta| of the whole motion, pi/2 where the block overturned; both are NaN where a row
+    is FAILED, and `reasons` says why, by its number. `extremes`, if asked for, has the names of
+    `scenes.extremes.Extremes`, SI units, and for each wall names such as `wall_left_speed`; NaN
+    where there is none.
     """
 
     outcome: NDArray[np.int8]
@@ -52,48 +50,47 @@ def play_fates(
     table: RunTable,
     model: EventBasedModel,
     *,
+    extremes: bool = False,
     jobs: int | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Fates:
     """What becomes of each row of a table.
 
-    A run that fails is made once more by `model.finer()`. The result of a row depends neither on
-    the other rows nor on `jobs` (threads; default: all cores). Raises `InputError` where the model
-    cannot play a scene, and for Bouc-Wen friction, which has no decision.
+    With `extremes` a run goes on until none of them can change; otherwise until its outcome and its
+    peak are certain. `time_s` is then. A run that fails is made once more by `model.finer()`. The
+    result of a row depends neither on the other rows nor on `jobs` (threads; default: all cores).
+    Raises `InputError` where the model cannot play a scene, and for Bouc-Wen friction, whose runs
+    do not know when they are decided.
     """
     from rockcheck.ebm import batch, packing
     from rockcheck.ebm.core.names import FAILURES
     from rockcheck.ebm.core.state import FOUND
+    from rockcheck.ebm.extremes import columns_of
 
-    draws, motions = packing.draws_of(table, model), packing.motions_of(table)
-    inside = packing.inside_a_wall(table)
-    count = len(table.scene)
+    draws, inside = packing.draws_of(table, model), packing.inside_a_wall(table)
+    played, count = np.flatnonzero(~inside), len(inside)
+    packed = packing.rows_of(table, draws, packing.motions_of(table), played)
+    found = batch.run_decided(packed, model, extremes=extremes, jobs=jobs, on_progress=on_progress)
     runs = np.zeros(count, FOUND)
     runs["fate"], runs["t"], runs["peak"] = FAILED, np.nan, np.nan
-    play = np.flatnonzero(~inside)
-    for first in range(0, len(play), _ROWS):
-        which = play[first : first + _ROWS]
-        packed = packing.rows_of(table, draws, motions, which)
-        tell = partial(_tell, on_progress, first, count)
-        runs[which] = batch.run_decided(packed, model, jobs=jobs, on_progress=tell).runs
+    runs[played] = found.runs
     reasons = dict.fromkeys(np.flatnonzero(inside).tolist(), _STARTS_INSIDE)
-    for row in np.flatnonzero((runs["fate"] == FAILED) & ~inside).tolist():
+    for row in played[found.failed].tolist():
         reasons[row] = FAILURES[int(runs["ending"][row])]
+    failed = runs["fate"] == FAILED
+    runs["t"][failed] = runs["peak"][failed] = np.nan
+    length, time = draws.length[table.scene], draws.time[table.scene]
+    columns: dict[str, Floats] | None = None
+    if extremes:
+        setting = packed.given["setting"]
+        known = columns_of(found.extremes, setting, length[played], time[played])
+        columns = {name: np.full(count, np.nan) for name in known}
+        for name, column in known.items():
+            columns[name][played] = np.where(found.failed, np.nan, column)
     return Fates(
         outcome=runs["fate"].astype(np.int8),
-        time_s=runs["t"] * draws.time[table.scene],
+        time_s=runs["t"] * time,
         peak=runs["peak"].copy(),
+        extremes=columns,
         reasons=reasons,
     )
-
-
-def _tell(
-    on_progress: progress.OnProgress,
-    before: int,
-    count: int,
-    done: float,
-    total: float,
-    what: str = "",
-) -> None:
-    """Tells how many of all rows are done, where some were done before these."""
-    on_progress(before + done, count)

@@ -8,6 +8,7 @@ import numpy as np
 
 from rockcheck.ebm.core.names import RULE_NAMES, Rule
 from rockcheck.ebm.model import EventBasedModel, ImpactLaw
+from rockcheck.ebm.ties import ties_of
 from rockcheck.scenes import InputError, Scene
 
 #: The relative disturbance, and the separation (alpha) up to which two histories still count as the
@@ -42,7 +43,8 @@ def predictability_horizon(
 
     Where several contacts are struck at once, as when a block lands flush against a wall or flat on
     the floor, the scene is played under the `other_laws` of impacts, too: histories mean the same
-    only as long as they do not depend on the law.
+    only as long as they do not depend on the law. So it is where the mechanics has more than one
+    answer (`ebm.ties`).
     """
     model = model or EventBasedModel(pivot="unilateral", tolerance=1e-13)
     played = model.simulate(scene)
@@ -54,9 +56,9 @@ def predictability_horizon(
         theta = other.simulate(disturbed).channels["theta"][:rows]
         apart = np.abs(theta - undisturbed[: len(theta)]) > allowed * scene.block.alpha
         rows = int(np.argmax(apart)) if apart.any() else rows
-    return (
-        scene.duration if rows == len(undisturbed) else float(scene.output_times[max(rows - 1, 1)])
-    )
+    whole = rows == len(undisturbed)
+    horizon = scene.duration if whole else float(scene.output_times[max(rows - 1, 1)])
+    return min([horizon, *(max(tie.from_s, scene.output_step) for tie in ties_of(scene, model))])
 
 
 def may_fly(scene: Scene) -> bool:

@@ -117,6 +117,7 @@ class EventBasedModel(Frozen):
         began = time.perf_counter()
         from rockcheck.ebm import natural
         from rockcheck.ebm.core import state
+        from rockcheck.ebm.extremes import extremes_of
 
         given, unit = natural.pack([scene], self), natural.time_unit(scene)
         shape = 1, len(scene.output_times)
@@ -124,8 +125,9 @@ class EventBasedModel(Frozen):
             out=np.empty((*shape, 6)),
             out_mode=np.zeros(shape, dtype=np.int8),
             log=np.empty((1, self.most_events, 5)),
+            extremes=np.zeros(1, state.EXTREMES),
         )
-        states, work = natural.state_for(self, 0), state.workspace()
+        states, work = natural.state_for(self, 0, extremes=True), state.workspace()
         kept = np.empty(1, state.FOUND)
         ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
         end = kept[0]
@@ -134,7 +136,7 @@ class EventBasedModel(Frozen):
             raise errors.ModelFailure(
                 f"{self.name}: {names.FAILURES[ending]} at t = {t * unit:.6g} s"
             )
-        found, (out, modes, log) = states[0], (rows[0] for rows in records)
+        found, (out, modes, log) = states[0], (rows[0] for rows in records[:3])
         rows = max(written, 1)
         speed = scene.block.radius / unit
         out[0] = natural.state_of(scene) if written == 0 else out[0]
@@ -179,6 +181,7 @@ class EventBasedModel(Frozen):
             outcome=outcome,
             cost=cost,
             settings=self.model_dump(),
+            model_extremes=extremes_of(scene, records.extremes, given.given["setting"]),
         )
         if not self.estimate_error:
             return played

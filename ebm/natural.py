@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm.core import march
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
-from rockcheck.ebm.core.ground import FORM, ground_of
+from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import LAWS, Shape
 from rockcheck.ebm.core.state import GIVEN, STATE, Base, Rows
-from rockcheck.scenes import Floats, Scene, Side, kinematics, progress
+from rockcheck.scenes import Excitation, Floats, Record, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
 
 #: The event loops that are compiled, by a model's friction.
@@ -39,6 +39,7 @@ def setting_of(scene: Scene, model: Any) -> np.record:
         left=side_of(scene, "left"),
         right=side_of(scene, "right"),
         height=math.cos(scene.block.alpha),
+        top=_top_of(scene),
         spin=3.0 if scene.block.homogeneous else radius**2 / scene.block.gyration_squared,
         mu_s=max(scene.floor.mu_s, LEAST_FRICTION),
         mu_k=scene.floor.friction,
@@ -50,6 +51,14 @@ def setting_of(scene: Scene, model: Any) -> np.record:
         law=LAWS.index(model.impacts),
         yields=model.yield_displacement / radius,
     )
+
+
+def _top_of(scene: Scene) -> float:
+    """Height of the box's top over the mass's centre, in R."""
+    block = scene.block
+    if block.homogeneous:
+        return math.cos(block.alpha)
+    return (block.half_height - block.offset[1]) / block.radius
 
 
 def side_of(scene: Scene, side: Side) -> np.record:
@@ -121,13 +130,53 @@ def to_si(scene: Scene, states: Floats) -> Floats:
     return np.asarray(kinematics.of_box(scene.block, found))
 
 
+class SampleStore:
+    """The samples of base motions; a record's are stored once, whatever its scale and its units."""
+
+    def __init__(self) -> None:
+        self._parts: list[Floats] = [np.empty(0)]
+        self._count = 0
+        self._records: dict[tuple[float, ...], tuple[np.record, float, float]] = {}
+
+    @property
+    def samples(self) -> Floats:
+        """All samples, one motion's after the other's."""
+        return np.concatenate(self._parts)
+
+    def form_of(self, motion: Excitation, gravity: float, time: float) -> np.record:
+        """The FORM of a motion in units of `gravity` (m/s^2) and `time` (s)."""
+        if not isinstance(motion, Record) or motion.scale == 0.0:
+            return self._stored(motion, gravity, time)
+        if motion.unscaled not in self._records:
+            first = self._stored(motion, gravity, time)
+            self._records[motion.unscaled] = first, motion.scale, gravity
+        stored, scale, gravity_then = self._records[motion.unscaled]
+        form: np.record = stored.copy()
+        form["scale"] = motion.scale / scale * (gravity_then / gravity)
+        form["step"], form["quiet"] = motion.time_step / time, motion.quiet_after / time
+        return form
+
+    def _stored(self, motion: Excitation, gravity: float, time: float) -> np.record:
+        """The FORM of a motion whose samples are stored now."""
+        ground = ground_of(motion, gravity, time)
+        ground.form["first"] = self._count
+        self._count += len(ground.samples)
+        self._parts.append(ground.samples)
+        return ground.form
+
+
 def pack(scenes: Sequence[Scene], model: Any) -> Rows:
     """Packs a list of scenes; raises `InputError` where the model cannot play one of them."""
     for scene in scenes:
         model.check(scene)
-    grounds = [ground for scene in scenes for ground in base_of(scene)]
-    forms = np.array([ground.form for ground in grounds], FORM).reshape(-1, 2)
-    forms["first"] = np.cumsum(forms["count"]).reshape(-1, 2) - forms["count"]
+    store = SampleStore()
+    forms = [
+        [
+            store.form_of(motion, scene.gravity, time_unit(scene))
+            for motion in (scene.excitation, scene.vertical)
+        ]
+        for scene in scenes
+    ]
     given = [
         (
             setting_of(scene, model),
@@ -138,8 +187,7 @@ def pack(scenes: Sequence[Scene], model: Any) -> Rows:
         )
         for scene, both in zip(scenes, forms, strict=True)
     ]
-    samples = [np.empty(0), *(ground.samples for ground in grounds)]
-    return Rows(np.array(given, GIVEN), np.concatenate(samples))
+    return Rows(np.array(given, GIVEN), store.samples)
 
 
 def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -> Rows:
@@ -161,10 +209,15 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     return Rows(given, samples)
 
 
-def state_for(model: Any, most_steps: int, until_decided: bool = False) -> NDArray[np.void]:
+def state_for(
+    model: Any, most_steps: int, until_decided: bool = False, extremes: bool = False
+) -> NDArray[np.void]:
     """An array of one state, with what the model's settings ask of a run."""
     states = np.zeros(1, STATE)
-    states["control"] = model.tolerance, most_steps, model.most_events, until_decided, 0.0
+    control = states["control"]
+    control["tolerance"], control["most_steps"] = model.tolerance, most_steps
+    control["most_events"] = model.most_events
+    control["until_decided"], control["extremes"] = until_decided, extremes
     return states
 
 

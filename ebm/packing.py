@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core.block import SETTING
-from rockcheck.ebm.core.ground import FORM, ground_of
+from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.names import Shape
 from rockcheck.ebm.core.state import GIVEN, MOTION, Rows
-from rockcheck.ebm.natural import setting_of, state_of, time_unit
+from rockcheck.ebm.natural import SampleStore, setting_of, state_of, time_unit
 from rockcheck.ebm.table import RunTable
-from rockcheck.scenes import Excitation, Floats, Side, kinematics
+from rockcheck.scenes import Floats, Side, kinematics
 
 #: Penetration that is put down to rounding, relative to half the box's diagonal.
 _TOUCHES = 1e-12
@@ -61,22 +61,11 @@ class Motions:
 
 def motions_of(table: RunTable) -> Motions:
     """The motions of a table; each one's samples are stored once, however often it is used."""
-    stored: dict[int, np.record] = {}
-    samples: list[Floats] = [np.empty(0)]
-    count = 0
-
-    def form(excitation: Excitation) -> np.record:
-        nonlocal count
-        if id(excitation) not in stored:
-            ground = ground_of(excitation, 1.0, 1.0)
-            ground.form["first"] = count
-            count += len(ground.samples)
-            samples.append(ground.samples)
-            stored[id(excitation)] = ground.form
-        return stored[id(excitation)]
-
-    forms = np.array([[form(along), form(up)] for along, up in table.motions], FORM)
-    return Motions(forms[:, 0], forms[:, 1], np.concatenate(samples))
+    store = SampleStore()
+    forms = np.array(
+        [[store.form_of(motion, 1.0, 1.0) for motion in both] for both in table.motions], FORM
+    ).reshape(-1, 2)
+    return Motions(forms[:, 0], forms[:, 1], store.samples)
 
 
 def rows_of(table: RunTable, draws: Draws, motions: Motions, which: NDArray[np.intp]) -> Rows:

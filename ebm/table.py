@@ -50,3 +50,19 @@ class RunTable:
                 raise InputError("a gap is not allowed to be below 0", name)
         if not 0.0 <= self.restitution <= 1.0:
             raise InputError(f"{self.restitution:g} is not allowed: from 0 to 1", "restitution")
+
+
+def table_of(*scenes: Scene) -> RunTable:
+    """A row a scene, each under its own motion."""
+    rows, ones = np.arange(len(scenes)), np.ones(len(scenes))
+    as_it_is = np.full(len(scenes), np.nan)
+    return RunTable(
+        scenes=scenes,
+        motions=[(scene.excitation, scene.vertical) for scene in scenes],
+        scene=rows,
+        motion=rows,
+        factor=ones,
+        vertical_factor=ones,
+        gap_left=as_it_is,
+        gap_right=as_it_is,
+    )

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, new_figure, power_of_ten
-from rockcheck.scenes import recordings, writing
+from rockcheck.scenes import Scene, recordings, writing
 from rockcheck.validation.execute.pool import Call, Pool, cores
 from rockcheck.validation.finding import Axis, Panel, Plot
 
@@ -28,6 +29,8 @@ COLOURS = (
     ("#bf5f92", "#d98ab4"),
 )
 GREY = ("#9a9a9a", "#767c85")
+#: Colours of a block: its edges, floor and walls; its face.
+INK, SHADE = "#1b1b1b", "#d5d5d5"
 #: Panels beside each other.
 COLUMNS = 3
 STYLES: dict[str, dict[str, Any]] = {
@@ -82,9 +85,19 @@ OWN_MARK: dict[str, Any] = {
 
 def figure_of(plot: Plot) -> Figure:
     """The figure of a plot; lines, unless its kind has a drawer of its own."""
-    return {"spectra": spectra, "stable-steps": stable_steps, "strips": strips}.get(
-        plot.kind, lines
-    )(plot)
+    return {
+        "block": block,
+        "spectra": spectra,
+        "stable-steps": stable_steps,
+        "strips": strips,
+    }.get(plot.kind, lines)(plot)
+
+
+def block(plot: Plot) -> Figure:
+    """The block of a scene with its walls, to scale, in m."""
+    with new_figure(figsize=(0.5 * PAGE, 0.5 * PAGE), layout="constrained") as figure:
+        draw_block(figure.add_subplot(), Scene.model_validate(plot.data["scene"]))
+    return figure
 
 
 def lines(plot: Plot) -> Figure:
@@ -184,6 +197,31 @@ def strips(plot: Plot) -> Figure:
             ax.grid(axis="y", visible=False)
             ax.set_ylabel(one["label"], rotation=0, ha="right", va="center")
     return figure
+
+
+def draw_block(axes: Any, scene: Scene) -> None:
+    """Draw block (at its initial position and rotation), floor and walls to scale, in m."""
+    block = scene.block
+    x, y, theta = scene.initial_state[:3]
+    turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (block.half_width, block.half_height)
+    axes.add_patch(Polygon(corners @ turn.T + (x, y), facecolor=SHADE, edgecolor=INK))
+    if block.centre_of_mass is not None:
+        axes.plot(*(np.array(block.offset) @ turn.T + (x, y)), marker="+", color=INK)
+    reach = 1.4 * block.half_diagonal
+    axes.axhline(0.0, color=INK, linewidth=2)
+    thick = 0.12 * block.half_diagonal
+    for wall in scene.walls:
+        place = block.half_width + wall.gap
+        left = -place - thick if wall.side == "left" else place
+        axes.add_patch(Rectangle((left, 0.0), thick, 2.4 * block.half_height, facecolor=INK))
+    axes.set(
+        xlim=(-reach, reach),
+        ylim=(-0.1 * block.half_height, 2.4 * block.half_height),
+        aspect="equal",
+        xlabel="m",
+    )
+    axes.tick_params(labelsize="small")
 
 
 def draw_spectrum(spectrum: Spectrum, axes: Any) -> None:

@@ -45,8 +45,11 @@ SIDE = record(
 SETTING = record(
     left=SIDE,
     right=SIDE,
-    # Height of the mass's centre where the block stands, and 1/I.
+    # Height of the mass's centre where the block stands.
     height="f8",
+    # Height of the box's top over the mass's centre.
+    top="f8",
+    # 1/I.
     spin="f8",
     mu_s="f8",
     mu_k="f8",

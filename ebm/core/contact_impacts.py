@@ -97,8 +97,9 @@ IMPACT = record(
     target=("f8", (CONTACTS,)),
     full=("f8", (CONTACTS,)),
     part=("f8", (CONTACTS,)),
-    # The velocities after the stage.
+    # The velocities after the stage, and each contact's impulses in all stages so far.
     after=("f8", (3,)),
+    given=("f8", (CONTACTS,)),
 )
 
 
@@ -359,7 +360,7 @@ def contact_impact(block, state):
     """
     impact, v = state.impact, state.impact.v
     contact_rows(block, impact.sense, impact.phi, impact.rows)
-    impact.part[:], impact.after[:] = 0.0, 0.0
+    impact.part[:], impact.after[:], impact.given[:] = 0.0, 0.0, 0.0
     rounding = ROUNDING * _size(v)
     fits = True
     for number in range(_MOST_STAGES):
@@ -383,6 +384,7 @@ def contact_impact(block, state):
         impact.v = impact.after
         for j in range(CONTACTS):
             state.impulse += impact.part[j]
+            impact.given[j] += impact.part[j]
     if impact.touching[Contact.TIP_TOP] and impact.touching[Contact.FAR_BOTTOM]:
         # Its diagonal just fits between two walls, with a lever so short that no impulse can be
         # solved for: it jams.

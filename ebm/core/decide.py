@@ -3,6 +3,7 @@
 import math
 
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
+from rockcheck.ebm.core.extremes import has_met
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
 from rockcheck.ebm.core.names import Ending, Family, Fate, Kind, Pivot, Shape
 from rockcheck.ebm.core.series import NOISE
@@ -53,7 +54,8 @@ def fate_of(block, state):
     if ending != Ending.DONE:
         return Fate.FAILED
     slides_on = block.mu_k == 0.0 and not block.no_slip and abs(motion.vx) > _SLIDES
-    moves = state.repeats or slides_on or not state.control.until_decided
+    goes_on = state.t >= state.t_end or not state.control.until_decided
+    moves = state.repeats or slides_on or goes_on
     return Fate.MOVING if moves and not stands_still(state.mode) else Fate.AT_REST
 
 
@@ -110,6 +112,35 @@ def _by_energy(block, state, ahead):
         return reached
     least = (_MARGIN if block.walls else 1.0) * corner
     return max(peak, _TINIEST) if max(highest, beyond) <= peak and most < least else -1.0
+
+
+@inner_kernel
+def all_is_met(block, state):
+    """Whether none of the extremes of a run can change any more.
+
+    So it is where a block on a quiet base only rocks, and sticks as it lands, with too little
+    energy to overturn. It conserves that up to each impact, and loses some there. Every corner's
+    place is monotone in the rotation to either side: the extremes to come are within those of the
+    upright block and of the farthest rotations that the energy allows. No wall is within these.
+    """
+    mode, motion = state.mode, state.motion
+    if state.t < state.quiet_from or not rocks(mode) or block.e_floor > 0.0:
+        return False
+    side, phi, energy = side_of(block, mode.sense), abs(motion.theta), energy_of(block, motion)
+    corner = min(block.left.radius, block.right.radius) - block.height
+    free = _sticks(block, block.left, energy) and _sticks(block, block.right, energy)
+    if not (free and energy < corner and phi < side.alpha):
+        return False
+    upright = motion.x + mode.sense * (side.arm - side.radius * math.sin(side.alpha - phi))
+    left, right = _highest(block, block.left, energy), _highest(block, block.right, energy)
+    at_left = upright - block.left.arm + block.left.radius * math.sin(block.left.alpha - left)
+    at_right = upright + block.right.arm - block.right.radius * math.sin(block.right.alpha - right)
+    met = state.extremes
+    return (
+        has_met(block, met, upright, 0.0)
+        and has_met(block, met, at_left, left)
+        and has_met(block, met, at_right, -right)
+    )
 
 
 @inner_kernel

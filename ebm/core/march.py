@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import bouc_wen, coulomb, ground, modes, series, settle, steps
+from rockcheck.ebm.core import bouc_wen, coulomb, extremes, ground, modes, series, settle, steps
 from rockcheck.ebm.core.contacts import closed_floor, lean
 from rockcheck.ebm.core.decide import fate_of, given_up_at, quiet_from
 from rockcheck.ebm.core.guards import KIND
@@ -32,7 +32,7 @@ def march(friction, block, base, run):
             steps.rest(block, base, run)
         elif steps.may_go_on(block, base, run):
             step(friction, block, base, run)
-    end(run)
+    end(block, run)
 
 
 @inner_kernel
@@ -72,12 +72,14 @@ def play_rows(friction, rows, states, begins, work, records, found):
             ground.Ground(sideways, samples[sideways.first : sideways.first + sideways.count]),
             ground.Ground(upward, samples[upward.first : upward.first + upward.count]),
         )
-        written = Records(records.out[i], records.out_mode[i], records.log[i])
+        written = Records(records.out[i], records.out_mode[i], records.log[i], records.extremes)
         march(friction, given.setting, base, Run(state, work[0], work[1], written))
         kept = found[i]
         kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
         kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
         kept.fate = fate_of(given.setting, state)
+        if state.control.extremes:
+            records.extremes[i] = state.extremes
         kept.at_rest = rests(state.mode)
 
 
@@ -97,6 +99,8 @@ def begin(block, base, run):
         state.t_end = given_up_at(block, state.quiet_from)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
+    if control.extremes:
+        extremes.begin(block, state)
     stands = lean(motion) == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     if stands and closed_floor(block, motion):
         state.event = Event.RELEASE
@@ -118,13 +122,15 @@ def resolve(block, base, run):
 
 
 @inner_kernel
-def end(run):
+def end(block, run):
     """Checks that the motion is finite, and writes the rows after the last step."""
     state = run.state
     if state.ending == Ending.DONE and not math.isfinite(state.motion.theta):
         state.ending = Ending.NOT_FINITE
     if state.ending == Ending.DONE and not run.state.control.until_decided:
         steps.sample_rest(run, np.inf)
+    if state.control.extremes:
+        extremes.meet(block, state, state.motion, state.t)
 
 
 @kernel
@@ -134,7 +140,7 @@ def play(rows, states, work, records, found):
     `states` is an array of one STATE with its control, `work` a `workspace()`; `found[i]`, a FOUND,
     is what is kept of row i. Of row i `records.out[i]` (n x 6) has the motion at k * output_step,
     `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
-    after, impulse.
+    after, impulse. `records.extremes[i]` are its extremes, where the control asks for them.
     """
     play_rows(coulomb, rows, states, NEW_STATE.copy(), work, records, found)
 

@@ -52,6 +52,9 @@ Row = _rows(
         "Z": 1,
         # The guard that is looked at. Those before it are the series that guards combine.
         "GUARD": 1,
+        # What is followed for its largest value (see ebm.core.extremes), and its slope.
+        "WATCHED": 1,
+        "RATE": 1,
         # What the general solution needs: known terms, forces found, arms, and the walls' push.
         "KNOWN": 1,
         "FOUND": 1,

@@ -120,6 +120,14 @@ def may_top(a, row, rate, n, tau, level):
 
 
 @inner_kernel
+def differentiate(a, row, rate, n):
+    """Writes the slope of c, a polynomial of degree n, as a row."""
+    low, high = _rates(a, row, n)
+    lanes.store(a, rate, 0, low)
+    lanes.store(a, rate, lanes.LANES, high)
+
+
+@inner_kernel
 def size_of(a, one, other, k):
     """The size of two series' coefficients of order k."""
     return abs(a[one, k]) + abs(a[other, k])
@@ -251,13 +259,13 @@ def first_root(a, row, n, h, until, floor, ahead, stack):
 
 
 @called_kernel
-def largest(a, row, rate, scratch, n, tau, stack):
-    """The largest value of c at its start and at its tops up to tau.
+def highest(a, row, rate, scratch, n, tau, stack):
+    """The largest value of c at its start and at its tops up to tau, and where that is.
 
     `rate` is the row of its slope, `scratch` a free one. The slope is followed from one of its
     roots to the next: where it turns negative, c is at a top.
     """
-    top, t, once = a[row, 0], 0.0, only_falls(a, rate, n - 1, tau)
+    top, at, t, once = a[row, 0], 0.0, 0.0, only_falls(a, rate, n - 1, tau)
     for k in range(n):
         a[scratch, k] = a[rate, k]
     for turn in range(n):
@@ -267,14 +275,22 @@ def largest(a, row, rate, scratch, n, tau, stack):
             break
         t += root
         if turn % 2 == 0:
-            top = max(top, value(a, row, n, t))
+            here = value(a, row, n, t)
+            if here > top:
+                top, at = here, t
         if once:
             break
-        for i in range(n):  # seen from there, and with the other sign
-            for k in range(n - 2, i - 1, -1):
-                a[scratch, k] += root * a[scratch, k + 1]
-            a[scratch, i] *= -1.0
-    return top
+        _turn_over(a, scratch, n, root)
+    return top, at
+
+
+@inner_kernel
+def _turn_over(a, row, n, t):
+    """A polynomial of n terms as it is seen from t, and with the other sign."""
+    for i in range(n):
+        for k in range(n - 2, i - 1, -1):
+            a[row, k] += t * a[row, k + 1]
+        a[row, i] *= -1.0
 
 
 @inner_kernel

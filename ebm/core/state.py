@@ -52,6 +52,34 @@ CONTROL = record(
     until_decided="?",
     # Spacing of the rows of the history; with no rows nothing is sampled.
     output_step="f8",
+    # Keep the extremes; a run until it is decided then goes on until none can change.
+    extremes="?",
+)
+#: The extremes of a run, in pairs of the left and the right side (see ebm.core.extremes).
+EXTREMES = record(
+    # Largest rotation to each side, and when.
+    turned=("f8", (2,)),
+    turned_at=("f8", (2,)),
+    # Largest |slip|, and the slip at the end; the largest height of the lower corner.
+    slip="f8",
+    last_slip="f8",
+    hop="f8",
+    # How far outward the top corners are at first; how far outward, and inward, they get, and how
+    # far outward the bottom ones.
+    start=("f8", (2,)),
+    tops=("f8", (2, 2)),
+    bottoms=("f8", (2,)),
+    # Of each wall: strikes, when the first one was, largest speed of approach and impulse; the
+    # speed of the impact that is resolved.
+    strikes=("i8", (2,)),
+    first=("f8", (2,)),
+    speed=("f8", (2,)),
+    impulse=("f8", (2,)),
+    approach=("f8", (2,)),
+    # When it first uplifts and first slips; whether the last step left it upright.
+    uplift="f8",
+    slips="f8",
+    upright="?",
 )
 STATE = record(
     control=CONTROL,
@@ -110,6 +138,8 @@ STATE = record(
     at_once="i8",
     # Normal impulse of an impact, of all contacts together, until its event is noted.
     impulse="f8",
+    # Of the last impact, that of the left and of the right wall.
+    wall_impulse=("f8", (2,)),
     # Bouc-Wen friction: its variable z, and whether that winds, the pivot not having yielded.
     zeta="f8",
     winds="?",
@@ -124,6 +154,7 @@ STATE = record(
     # Scratch: a motion between the ends of a step, and the impact that is resolved.
     sampled=MOTION,
     impact=IMPACT,
+    extremes=EXTREMES,
 )
 
 #: The state before a run: of what is not named there is none.
@@ -191,12 +222,14 @@ class Rows(NamedTuple):
 class Records(NamedTuple):
     """Where a run writes: rows of states, their modes, the log of events.
 
-    Arrays of these where there are several runs.
+    Arrays of these where there are several runs. `extremes` has an EXTREMES for each of them where
+    they are kept.
     """
 
     out: Floats
     out_mode: NDArray[np.int8]
     log: Floats
+    extremes: NDArray[np.void]
 
 
 class Run(NamedTuple):

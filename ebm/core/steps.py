@@ -7,13 +7,14 @@ import math
 
 import numpy as np
 
+from rockcheck.ebm.core import extremes
 from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.decide import decided, energy_of, swing_error, swings_again
+from rockcheck.ebm.core.decide import all_is_met, decided, energy_of, swing_error, swings_again
 from rockcheck.ebm.core.ground import next_exceedance
 from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Rule, Shape
-from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, largest, may_top, slope, value
+from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, highest, may_top, slope, value
 from rockcheck.ebm.core.state import mode_code, note, on_wall, rests, stands_still
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -27,24 +28,40 @@ def may_go_on(block, base, run):
 
     Its time is up, its outcome is certain, or it has taken too many steps.
     """
-    state, motion, decides = run.state, run.state.motion, run.state.control.until_decided
-    verdict = decided(block, base, state) if decides else -1.0
-    if decides and state.repeats:
-        state.ending = Ending.DONE
+    state, decides = run.state, run.state.control.until_decided
+    if decides:
+        _decide(block, base, state)
     elif state.t >= state.t_end:
-        ends = not decides or stands_still(state.mode)
-        state.ending = Ending.DONE if ends else Ending.UNDECIDED
-    elif verdict > 0.0:
-        state.peak = verdict
         state.ending = Ending.DONE
-        if verdict >= 0.5 * math.pi:
-            motion.theta = math.copysign(verdict, float(state.mode.sense))
-            state.ending = Ending.OVERTURNED
-    elif state.steps >= run.state.control.most_steps:
+    if state.ending != Ending.GOING:
+        return False
+    if state.steps >= run.state.control.most_steps:
         state.ending = Ending.TOO_MANY_STEPS
     else:
         state.steps += 1
     return state.ending == Ending.GOING
+
+
+@inner_kernel
+def _decide(block, base, state):
+    """Ends a run whose outcome and peak are certain, or its extremes where these are kept.
+
+    One that nothing decides is given up in time.
+    """
+    watches, late = state.control.extremes, state.t >= state.t_end
+    still = state.t >= state.quiet_from and stands_still(state.mode)
+    if state.repeats or still or (watches and all_is_met(block, state)):
+        state.ending = Ending.DONE
+        return
+    verdict = decided(block, base, state) if late or not watches else -1.0
+    if verdict > 0.0:
+        state.peak = verdict
+        state.ending = Ending.DONE
+        if verdict >= 0.5 * math.pi:
+            state.motion.theta = math.copysign(verdict, float(state.mode.sense))
+            state.ending = Ending.OVERTURNED
+    elif late:
+        state.ending = Ending.UNDECIDED
 
 
 @inner_kernel
@@ -67,7 +84,7 @@ def advance(block, base, run):
     tilts = mode.family == Family.TILT
     # One that rises at the end may have turned twice.
     if tilts and may_top(a, Row.PHI, Row.OMEGA, order, tau, state.peak):
-        top = largest(a, Row.PHI, Row.OMEGA, Row.GUARD, order, tau, run.stack)
+        top, _ = highest(a, Row.PHI, Row.OMEGA, Row.GUARD, order, tau, run.stack)
         state.peak = max(state.peak, top)
     falls = tilts and mode.sense * motion.w < 0.0
     if falls and a[Row.OMEGA, 0] >= 0.0 and run.state.control.until_decided:
@@ -76,6 +93,8 @@ def advance(block, base, run):
     state.swing = max(state.swing, abs(motion.w))
     state.stride = max(tau, INSTANT, _FADES * min(state.stride, state.length))
     state.t = state.smooth_until if state.whole else t + tau
+    if state.control.extremes:
+        extremes.follow(block, run, t)
 
 
 @inner_kernel
@@ -167,7 +186,7 @@ def rest(block, base, run):
         state.t = state.t_end if not control.until_decided else state.t
         state.ending = Ending.DONE
         return
-    state.t, state.stride = until, np.inf
+    state.t, state.stride, state.extremes.upright = until, np.inf, True
     leave(state, Kind.FORCE)
     state.guard, state.event = Guard.NONE, Event.RELEASE
     state.before, state.changing = 0, True

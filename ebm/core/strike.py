@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core import contacts, impacts, modes
+from rockcheck.ebm.core import contacts, extremes, impacts, modes
 from rockcheck.ebm.core.block import side_of, wall_corner
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
-from rockcheck.ebm.core.names import CONTACTS, Event, Family, Guard, Pivot, Rule
+from rockcheck.ebm.core.names import CONTACTS, Contact, Event, Family, Guard, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, rock_on
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -38,12 +38,17 @@ def strike(block, base, run, resting):
         floor = mode.pivot != Pivot.OFF or contacts.closed_floor(block, motion)
         contacts.land_upright(block, motion, float(mode.sense), floor)
     state.event = _EVENTS[which]
+    state.wall_impulse[:] = 0.0
+    if state.control.extremes:
+        extremes.approach(block, state)
     if block.unilateral:
         _strike_all(block, base, run, resting)
     elif state.event == Event.WALL_IMPACT:
         _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
         _floor_impact(block, state, resting)
+    if state.control.extremes:
+        extremes.struck(state)
     if not state.known and not block.unilateral:
         contacts.stand_if_slow(block, motion)
     if motion.theta == 0.0 and abs(motion.w) < SETTLE:
@@ -115,6 +120,12 @@ def _settle_flat(block, state, resting):
 
 
 @inner_kernel
+def _push_by_wall(state, side, impulse):
+    """Notes the normal impulse of the wall on this side."""
+    state.wall_impulse[0 if side > 0 else 1] = impulse
+
+
+@inner_kernel
 def _floor_impact(block, state, resting):
     """Bilateral pivot: the block lands at theta = 0."""
     mode, motion = state.mode, state.motion
@@ -131,8 +142,11 @@ def _floor_impact(block, state, resting):
         state.rules[Rule.FLUSH_LANDING] += 1
         e = side_of(block, -S1).e
         state.impulse = (1.0 + e) * s1 * abs(w1)
+        before = motion.vx
         motion.w = -e * w1 if e * abs(w1) > resting else 0.0
         motion.vx = (-e * v1 if S1 * v1 > 0.0 else v1) - c * motion.w
+        # The closed branch leaves to the wall all that turns the block back.
+        _push_by_wall(state, -S1, abs(motion.vx - before))
         motion.vy = S1 * s1 * motion.w
         return
     mu_s = block.mu_s if not block.no_slip else np.inf
@@ -147,16 +161,19 @@ def _floor_impact(block, state, resting):
 def _wall_impact(block, state, tip, resting):
     """Bilateral pivot: a corner (case I, II) or the side (case III) strikes a wall."""
     mode, motion = state.mode, state.motion
+    side = mode.sense if tip else -mode.sense
     # Wedged: between both walls at once nothing rebounds.
     gaps = contacts.wall_gap(block, motion, 1) + contacts.wall_gap(block, motion, -1)
     if gaps < contacts.CLOSED or on_wall(mode):
         state.rules[Rule.WEDGED] += 1
         state.impulse = abs(motion.vx)
+        _push_by_wall(state, side, state.impulse)
         contacts.stop(motion)
         return
-    e = side_of(block, mode.sense if tip else -mode.sense).e
+    e = side_of(block, side).e
     if mode.family == Family.FLAT:
         state.impulse = (1.0 + e) * abs(motion.vx)
+        _push_by_wall(state, side, state.impulse)
         motion.vx = -e * motion.vx if e * abs(motion.vx) > resting else 0.0
     else:
         _corner_impact(block, state, 1.0 if tip else -1.0, e, resting)
@@ -179,6 +196,7 @@ def _corner_impact(block, state, sw, e, resting):
     corner = impacts.Corner(1.0, sw, s, c, sw * cp, side.share, block.spin)
     branch, w2, xdot2, n, p, v2 = impacts.wall_impact(block, corner, e, w1, xdot1)
     state.impulse = abs(p) + n
+    _push_by_wall(state, sw * sign, n)
     after = xdot2 * xdot2 + (s * w2) ** 2 + w2 * w2 / block.spin
     if after > before * (1.0 + 10.0 * ROUNDING):
         state.gains += 1
@@ -223,6 +241,9 @@ def _strike_all(block, base, run, resting):
         state.rules[Rule.WEDGED] += 1
         impact.e_tip = impact.e_far = 0.0
     contact_impact(block, state)
+    given = impact.given
+    _push_by_wall(state, sign, given[Contact.TIP_TOP] + given[Contact.TIP_BOTTOM])
+    _push_by_wall(state, -sign, given[Contact.FAR_BOTTOM] + given[Contact.FAR_TOP])
     motion.vx, motion.vy, motion.w = sign * v[0], v[1], sign * v[2]
     if floor:
         contacts.stand_if_slow(block, motion)

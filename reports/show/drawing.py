@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.drawers import draw_spectrum
+from rockcheck.reports.drawers import INK, SHADE, draw_block, draw_spectrum
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity
 from rockcheck.validation import Discrepancy, criteria
 from rockcheck.validation.discrepancy import figures
 
-INK, SHADE, ACCENT = "#1b1b1b", "#d5d5d5", "#0072b2"
+ACCENT = "#0072b2"
 #: Limit of the rotation axis where a block overturns, either way, in alpha.
 FALLEN = 1.3
 #: Marker of each kind of event, in the order of their tracks from the top.
@@ -67,31 +66,6 @@ def scene_figure(scene: Scene) -> Figure:
     base.set(xlabel="t, s", ylabel="acceleration of the base, m/s²", title=scene.name)
     base.grid(color=SHADE, linewidth=0.5)
     return figure
-
-
-def draw_block(axes: Any, scene: Scene) -> None:
-    """Draw block (at its initial position and rotation), floor and walls to scale, in m."""
-    block = scene.block
-    x, y, theta = scene.initial_state[:3]
-    turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
-    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * (block.half_width, block.half_height)
-    axes.add_patch(Polygon(corners @ turn.T + (x, y), facecolor=SHADE, edgecolor=INK))
-    if block.centre_of_mass is not None:
-        axes.plot(*(np.array(block.offset) @ turn.T + (x, y)), marker="+", color=INK)
-    reach = 1.4 * block.half_diagonal
-    axes.axhline(0.0, color=INK, linewidth=2)
-    thick = 0.12 * block.half_diagonal
-    for wall in scene.walls:
-        place = block.half_width + wall.gap
-        left = -place - thick if wall.side == "left" else place
-        axes.add_patch(Rectangle((left, 0.0), thick, 2.4 * block.half_height, facecolor=INK))
-    axes.set(
-        xlim=(-reach, reach),
-        ylim=(-0.1 * block.half_height, 2.4 * block.half_height),
-        aspect="equal",
-        xlabel="m",
-    )
-    axes.tick_params(labelsize="small")
 
 
 def history_figure(history: History) -> Figure:

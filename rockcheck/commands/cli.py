@@ -36,7 +36,7 @@ COMMANDS = {
     "compare": ("compare:run", "rockcheck compare ebm.csv mujoco.csv --until 8"),
     "validate": ("validate:run", "rockcheck validate smoke --out rockcheck-report"),
     "accept": ("validate:accept", 'rockcheck accept smoke --reason "MuJoCo 4 steps differently"'),
-    "assess": ("studies:assess", "rockcheck assess shelf.toml records --gaps 0.02,0.05,0.1"),
+    "assess": ("assess:assess", "rockcheck assess shelf.toml records"),
     "spectrum": ("studies:spectrum", "rockcheck spectrum fig8 --size 50 --refine"),
     "benchmark": ("studies:benchmark", "rockcheck benchmark --quick"),
     "conformance": (

@@ -5,13 +5,11 @@ models.
 """
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, NoReturn, get_args
 
-import numpy as np
 import typer
 
 from rockcheck.commands import (
@@ -20,235 +18,19 @@ from rockcheck.commands import (
     JobsOption,
     OutOption,
     Played,
-    chosen_models,
     completing,
     model_names,
     need_installed,
-    scene_names,
     settings_of,
     studied,
-    tell_left_out,
     tell_missing,
     told,
     usable_folder,
 )
-from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.scenes import Scene, errors, files, printable
-from rockcheck.validation.criteria import sampled
+from rockcheck.scenes import errors, files, printable
 from rockcheck.validation.execute import models, store
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
-from rockcheck.validation.studies.population import answers, runs
-from rockcheck.validation.suite import motions
-
-MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
-#: Draws of the numbers of a single run.
-SAMPLES = 1024
-
-
-@dataclass(frozen=True)
-class Tried:
-    """What is varied about the scene, beside its records."""
-
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            "--samples",
-            min=2,
-            max=MOST_SAMPLES,
-            help="Draws of the scene's uncertain numbers for each record (a power of two is taken;"
-            f" default without records: {SAMPLES}).",
-        ),
-    ] = None
-    gaps: Annotated[
-        str | None,
-        typer.Option(
-            "--gaps",
-            metavar="[SIDE:]GAP,GAP...",
-            help="Clear gaps (m) to try, such as 0,0.05,0.1 or left:0.05,0.1.",
-        ),
-    ] = None
-    levels: Annotated[
-        str | None,
-        typer.Option(
-            "--levels",
-            metavar="MEASURE:LOW:HIGH:COUNT",
-            help="Intensities to scale the records to: pga (g), pgv (m/s), pga-ratio, pgv-ratio or"
-            " sa:PERIOD (g), such as pga:0.05:2:40. Without records: pulses, over g tan(alpha).",
-        ),
-    ] = None
-    capacity: Annotated[
-        list[float] | None,
-        typer.Option(
-            "--capacity",
-            help="Peak rotation (alpha) of a fragility curve; repeatable.",
-            min=1e-6,
-            max=1.0,
-        ),
-    ] = None
-
-
-def assess(
-    scene: Annotated[
-        str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)
-    ],
-    records: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[RECORDS]...",
-            help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
-        ),
-    ] = None,
-    models: Annotated[
-        str,
-        typer.Option(
-            "--models",
-            help="The model that plays, and others to compare with it, with commas between.",
-            autocompletion=model_names,
-        ),
-    ] = models.REFERENCE,
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            help="A setting of the first model, such as time_step=1e-4, or MODEL.key=value;"
-            " repeatable.",
-        ),
-    ] = None,
-    tried: Tried = Tried(),
-    read: ReadOption = None,
-    played: Played = Played(OUT / "assess"),
-) -> None:
-    """Does it fall, how far does it move, how sure is that?
-
-    And which gap is safe, and at which intensity does it fall.
-    Plays the scene under its own base motion, or under each record; says what hand methods say
-    beside it. A number that the scene file gives as { value = 0.3, sd = 0.03 } is uncertain.
-    --read also takes scale=1.2 and vertical=true for the records.
-
-    Exit 0: done; of a single run: converged. 1: a single run that is not converged. 3: a model
-    failed.
-    """
-    given = files.load_uncertain_scene(scene)
-    chosen = chosen_models(
-        models,
-        [
-            word if "." in word.partition("=")[0] else f"{models.split(',')[0]}.{word}"
-            for word in settings or ()
-        ],
-    )
-    need_installed(chosen, "--models")
-    clear: tuple[float, ...] = ()
-    sides = tuple(wall.side for wall in given.scene.walls)
-    if tried.gaps is not None:
-        clear, sides = runs.gaps_of(tried.gaps, given.scene)
-    cases, left_out = motions.under_records(
-        {given.scene.name: given}, record_sets(records or (), read or ()), Path()
-    )
-    check_tried(tried, next(iter(cases.values())), given, recorded=bool(records))
-    draws = tried.samples or (0 if records or not given.spreads else SAMPLES)
-    named = {str(getattr(one.scene.excitation, "source", name)): one for name, one in cases.items()}
-    assessment = answers.Assessment(
-        own=given,
-        cases=named if records else cases,
-        models=chosen,
-        gaps=clear,
-        sides=sides,
-        samples=1 << max(1, (draws - 1).bit_length()) if draws else 0,
-        recorded=bool(records),
-        levels=None
-        if tried.levels is None
-        else population_of(tried, given.scene, named if records else {}, chosen),
-        left_out=left_out,
-    )
-    tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
-    studied(assessment, played)
-
-
-def check_tried(
-    tried: Tried, drawn: files.UncertainScene, given: files.UncertainScene, *, recorded: bool
-) -> None:
-    """Raises `InputError` for a scene in which nothing happens, or an option without an effect.
-
-    `drawn` is the scene to be drawn.
-    """
-    scene = given.scene
-    begins = (scene.initial_rotation, scene.initial_angular_velocity, scene.initial_velocity)
-    rests = scene.excitation.kind == scene.vertical.kind == "rest"
-    besides = " besides the excitation that the records replace" if given.spreads else ""
-    errors.refuse(
-        (
-            rests and not (recorded or any(begins) or scene.initial_height),
-            "are needed: the base of the scene is at rest",
-            "records",
-        ),
-        (
-            tried.samples is not None and not drawn.spreads,
-            f"no number of the scene{besides} is uncertain: write one as"
-            " { value = 0.3, sd = 0.03 }",
-            "--samples",
-        ),
-        (
-            tried.capacity and not (recorded and tried.levels),
-            "needs records and --levels",
-            "--capacity",
-        ),
-    )
-
-
-def population_of(
-    tried: Tried,
-    scene: Scene,
-    cases: dict[str, files.UncertainScene],
-    chosen: Mapping[str, Mapping[str, Any]],
-) -> runs.Population:
-    """What --levels asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
-
-    An incremental dynamic analysis of the `cases` under records; without any, the fragility under
-    pulses of the scene's kind. The first of the `chosen` models plays, if runs of it end once they
-    are decided.
-    """
-    text = tried.levels or ""
-    *measures, low, high, count = ["", "", "", *text.split(":")]
-    try:
-        first, last, number = float(low), float(high), float(count)
-    except ValueError:
-        first = last = number = 0.0
-    if not (0.0 < first < last < math.inf and number in range(2, MOST_LEVELS + 1)):
-        raise errors.InputError(
-            printable(
-                "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
-                f" {MOST_LEVELS} of them, not {text!r}",
-                160,
-            ),
-            "--levels",
-        )
-    measure = ":".join(filter(None, measures))
-    values = np.linspace(first, last, int(number))
-    decides = getattr(models.build(next(iter(chosen)), {}), "decides", False)
-    model = next(iter(chosen)) if decides else runs.SWIFT
-    settings = chosen.get(model, {})
-    if not cases:
-        if measure not in ("", "pga-ratio"):
-            raise errors.InputError(
-                f"{measure} needs records; of pulses it is pga-ratio", "--levels"
-            )
-        return runs.fragility(scene, values, FREQUENCIES, model=model, settings=settings)
-    return runs.ida(
-        scene,
-        [(name, sampled(one.scene.excitation, one.scene.duration)) for name, one in cases.items()],
-        values,
-        measure=measure or "pga",
-        capacities=tried.capacity or runs.CAPACITIES,
-        upward={
-            name: one.scene.vertical
-            for name, one in cases.items()
-            if one.scene.vertical != scene.vertical
-        },
-        model=model,
-        settings=settings,
-    )
-
 
 #: Nothing begins later than this; what was left out begins with the next run.
 MINUTES = 25.0

@@ -10,13 +10,14 @@ from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import march
 from rockcheck.ebm.core.names import Family, Pivot
 from rockcheck.ebm.core.series import WIDTH
-from rockcheck.ebm.core.state import FOUND, NEW_STATE, Records, Run, workspace
+from rockcheck.ebm.core.state import EXTREMES, FOUND, NEW_STATE, Records, Run, workspace
 from rockcheck.ebm.natural import pack, state_for
 from rockcheck.scenes import Block, Floor, History, Scene, Wall, kinematics
 
 
 def nothing() -> Records:
-    return Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)))
+    no_extremes = np.empty(0, EXTREMES)
+    return Records(np.empty((0, 6)), np.empty(0, dtype=np.int8), np.empty((0, 5)), no_extremes)
 
 
 def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int) -> Run:
@@ -29,7 +30,7 @@ def run_at(motion: Sequence[float] = (0.0,) * 6, *, t: float = 0.0, **mode: int)
     for name, value in mode.items():
         setattr(state.mode, name, value)
     state.since = t
-    state.control = (1e-10, 100, 100, False, 1.0)
+    state.control = (1e-10, 100, 100, False, 1.0, False)
     return Run(state, *workspace(), nothing())
 
 
@@ -44,7 +45,7 @@ def play(scene: Scene, model: EventBasedModel, work: Any = None) -> Any:
         pack([scene], model),
         states,
         work or workspace(),
-        Records(*(part[None] for part in nothing())),
+        Records(*(part[None] for part in nothing()[:3]), np.empty(0, EXTREMES)),
         np.empty(1, FOUND),
     )
     return states[0]

@@ -100,16 +100,16 @@ def test_a_run_that_fails_is_made_again_at_a_finer_tolerance(monkeypatch):
     a, f = np.array([2.0, 4.0, 6.0]), np.array([1.0, 2.0, 2.0])
     model = EventBasedModel(tolerance=1e-8)
     whole, _ = play_nodes(scene(), a, f, model=model)
-    run, tolerances = batch.run_batch, []
+    run, tolerances = batch.play_batch, []
 
-    def failing(packed, model, **rest):
-        found = run(packed, model, **rest)
+    def failing(packed, model, asked, **rest):
+        found = run(packed, model, asked, **rest)
         tolerances.append((len(packed.given), model.tolerance))
         if len(tolerances) == 1:
             found.runs["ending"][1] = Ending.TOO_MANY_STEPS
         return found
 
-    monkeypatch.setattr(batch, "run_batch", failing)
+    monkeypatch.setattr(batch, "play_batch", failing)
     np.testing.assert_array_equal(play_nodes(scene(), a, f, model=model), [whole, np.zeros(3)])
     assert tolerances == [(3, 1e-8), (1, 1e-10)]
     assert whole[1] != 0

@@ -28,7 +28,13 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.conformance.cards import cards_table
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA
-from rockcheck.validation.studies.population.runs import blocks_of, lines_of
+from rockcheck.validation.studies.population.intensities import (
+    Levels,
+    curve_plot,
+    curve_table,
+    fit_table,
+    line_blocks,
+)
 from rockcheck.validation.studies.spectrum import scene_node
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
@@ -117,8 +123,21 @@ def fragility() -> Finding:
         population.curve_of(label, fell, np.zeros_like(fell), level)
         for label in ("with the wall", "without a wall")
     ]
-    other = {"per_unit": 0.2, "other_unit": "g", "other_label": "peak acceleration, g"}
-    return found(blocks_of(curves, Column("intensity", "peak acceleration / (g tan α)"), other))
+    levels = levels_at(level, Column("intensity", "peak acceleration / (g tan α)"), per_g=0.2)
+    return found([curve_plot(curves, levels), fit_table(curves, levels), curve_table(curves)])
+
+
+def levels_at(levels: np.ndarray, across: Column, per_g: float | None = None) -> Levels:
+    return Levels(
+        cases={},
+        levels=levels,
+        across=across,
+        limits={},
+        model="ebm-unilateral",
+        settings=(),
+        data={},
+        per_g=per_g,
+    )
 
 
 def ida() -> Finding:
@@ -126,9 +145,8 @@ def ida() -> Finding:
     peaks = 0.2 * np.arange(1, 5)[:, None, None] * level * np.ones((4, 2, 1))
     peaks[peaks > 0.7] = np.inf
     peaks[0, :, 5:] = np.nan  # these failed
-    return found(
-        lines_of([f"r{k}" for k in range(4)], peaks, level, Column("intensity", "PGA", "g"))
-    )
+    levels = levels_at(level, Column("intensity", "PGA", "g"))
+    return found(line_blocks([f"r{k}" for k in range(4)], peaks, levels))
 
 
 def spectra(letters: str, *panels: Panel, request: Request | None = None) -> Finding:

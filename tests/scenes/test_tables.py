@@ -10,7 +10,7 @@ from rockcheck.scenes.recordings.headers import facts_of
 from rockcheck.scenes.recordings.layout import has_decimal_commas, is_ambiguous_comma
 from rockcheck.scenes.recordings.order import Shape, are_times, runs_along_rows
 from rockcheck.scenes.recordings.tables import unit_of_name
-from rockcheck.validation.studies.population.runs import measure_of
+from rockcheck.validation.studies.population.intensities import measure_of
 from rockcheck.validation.suite.motions import RecordSet
 
 VALUES = np.sin(0.3 * np.arange(100))
@@ -274,9 +274,9 @@ def test_the_command_shows_a_row_a_file(tmp_path, monkeypatch, typed):
 
 def test_a_record_tells_of_no_period_beyond_its_length(written, fault_of):
     recording = read(written, along_lines(), order="rows", **KNOWN)
-    _, _, value = measure_of("sa:99")
+    value = measure_of("sa:99").of
     assert "sa:99 is not resolved" in str(fault_of(value, recording, None))
-    _, _, value = measure_of("sa:1")
+    value = measure_of("sa:1").of
     assert value(recording, None) > 0.0
 
 

@@ -10,8 +10,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rockcheck.scenes import Extremes, Floats, History, Scene, Side, kinematics
-from rockcheck.scenes.history import STILL
+from rockcheck.ebm import EventBasedModel, fates
+from rockcheck.ebm.extremes import extremes_from
+from rockcheck.ebm.table import table_of
+from rockcheck.scenes import Extremes, Floats, History, ModelFailure, Scene, Side, kinematics
+from rockcheck.scenes.history import OUTCOMES, STILL
 from rockcheck.scenes.scene import MOST_SAMPLES
 from rockcheck.validation.discrepancy.compare import extremes_in
 
@@ -48,6 +51,8 @@ def fate_of(model: Any, scene: Scene) -> Fate:
     The motion goes on for at most `CAP`/p after the base has come to rest. A block that still moves
     then, and cannot be proved to stand, is "undecided". Raises what `simulate` raises.
     """
+    if isinstance(model, EventBasedModel) and model.decides:
+        return _event_based(model, scene)
     quiet = max(scene.excitation.quiet_after, scene.vertical.quiet_after)
     unit = 1.0 / scene.frequency_parameter
     ahead, before = FIRST_LOOK, np.full(6, math.inf)
@@ -64,7 +69,7 @@ def fate_of(model: Any, scene: Scene) -> Fate:
         # It may rest against a wall.
         rests = bool(np.all(np.abs(state[3:]) < STILL) and np.all(np.abs(state - before) < STILL))
         if rests or history.outcome == "at rest" or verdict == "stays":
-            return Fate(history.outcome, extremes, end, history)
+            return Fate("at rest", extremes, end, history)
         if ahead >= CAP:
             break
         ahead, before = min(2.0 * ahead, CAP), state
@@ -72,6 +77,18 @@ def fate_of(model: Any, scene: Scene) -> Fate:
     if verdict == "falls":
         outcome = f"overturned {side_of(history)}"
     return Fate(outcome, extremes, end, history)
+
+
+def _event_based(model: EventBasedModel, scene: Scene) -> Fate:
+    """The fate by the event-based model's own decision; its history lasts as long as the scene."""
+    played = fates.play_fates(table_of(scene), model, extremes=True, jobs=1)
+    outcome = int(played.outcome[0])
+    if outcome == fates.FAILED:
+        raise ModelFailure(f"{model.name}: {played.reasons[0]}")
+    assert played.extremes is not None, "asked for"
+    extremes = extremes_from(scene, {name: float(c[0]) for name, c in played.extremes.items()})
+    words = (*OUTCOMES, "undecided")
+    return Fate(words[outcome], extremes, float(played.time_s[0]), model.simulate(scene))
 
 
 def lasting(scene: Scene, duration: float) -> Scene:

@@ -10,7 +10,6 @@ number matters most.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Floats, InputError, Scene, files, kinematics
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.uncertainty.proportions import exact_interval
 
 if TYPE_CHECKING:
     from rockcheck.ebm.batch import Outcomes
@@ -91,24 +91,18 @@ def curve_of(
 
 
 def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
-    """Share and the ends of its `CONFIDENCE` interval at each intensity, by Wilson (1927).
+    """Share and the ends of its `CONFIDENCE` interval at each intensity.
 
-    The counts of runs are (motion, intensity). Wilson's interval also holds near 0 and 1, where
-    motions drawn anew would all agree. Runs in the two directions of a motion are not independent,
-    so the interval uses an effective number of runs: share (1 - share) over the variance of the
-    share between motions, at least the number of motions and at most that of runs (Korn and
-    Graubard 1998). NaN where no run was decided.
+    The counts of runs are (motion, intensity). The runs in the two directions of a motion are not
+    independent, so the interval is the exact one of the motions (see `proportions`). NaN where no
+    run was decided.
     """
     runs, motions = decided.sum(axis=0), (decided > 0).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         share = hits.sum(axis=0) / runs
-        variance = motions / (motions - 1) * ((hits - share * decided) ** 2).sum(axis=0) / runs**2
-        effective = np.clip(share * (1.0 - share) / variance, motions, runs)
-        count = np.where(variance > 0.0, effective, motions)
-        z2 = NormalDist().inv_cdf(0.5 + 0.5 * measures.CONFIDENCE) ** 2 / count
-        middle = (share + 0.5 * z2) / (1.0 + z2)
-        half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
-    return share, middle - half, middle + half
+    low, high = exact_interval(share, motions)
+    unknown = runs == 0
+    return share, np.where(unknown, np.nan, low), np.where(unknown, np.nan, high)
 
 
 def fit_lognormal(

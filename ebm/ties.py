@@ -1,0 +1,206 @@
+"""Instants at which the mechanics of a rigid block has more than one answer: ties.
+
+In: a scene. Out: what ties, from when on the answers part, and the fates on both sides. Called by
+the horizon of predictability, by assessments and by the stress study.
+
+A scene on a knife edge (friction equal to tan alpha, a base acceleration that just reaches what
+moves the block, a block balanced over its corner, a side that touches a wall) is where two motions
+meet. Rigid-body mechanics then names no one of them, and rounding chooses. Such an equality is
+looked for to rounding; then the scene is played on both sides of it, the number moved by
+`NUDGE`. It is a tie only where the two sides part.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import get_args
+
+import numpy as np
+
+from rockcheck.ebm.model import EventBasedModel
+from rockcheck.ebm.table import table_of
+from rockcheck.scenes import Excitation, History, InputError, ModelFailure, Record, Scene, Side
+from rockcheck.scenes.history import OUTCOMES
+
+#: Relative difference of two numbers that are equal but for rounding.
+EQUAL = 1e-12
+#: Relative change of a number to either side of an equality: beyond the zeros of the event-based
+#: model, and far below what anybody knows of a block.
+NUDGE = 1e-7
+#: Rotations (alpha) and slips (alpha R) that differ by more have parted.
+PARTED = 1e-3
+
+
+@dataclass(frozen=True)
+class Tie:
+    """More than one answer: `what` is equal, and from `from_s` (s) on the answers part.
+
+    `fates` are those on both sides of the equality, and of the scene as it is if that is another.
+    """
+
+    what: str
+    from_s: float
+    fates: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """An equality of a scene, and the scenes on its sides."""
+
+    what: str
+    sides: tuple[Scene, ...]
+
+
+def ties_of(scene: Scene, model: EventBasedModel | None = None) -> tuple[Tie, ...]:
+    """The ties of a scene, by an event-based model (default: the unilateral one).
+
+    Empty where there is no equality, where the sides of one do not part, or where the model cannot
+    play the scene.
+    """
+    model = model or EventBasedModel(pivot="unilateral")
+    ties = []
+    for edge in edges_of(scene):
+        try:
+            parted = _parted(edge, scene, model)
+        except (InputError, ModelFailure):
+            continue
+        if parted is not None:
+            ties.append(parted)
+    return tuple(ties)
+
+
+def edges_of(scene: Scene) -> Iterator[Edge]:
+    """The equalities of a scene."""
+    yield from _friction_edges(scene)
+    yield from _excitation_edges(scene)
+    yield from _balance_edges(scene)
+    yield from _flush_edges(scene)
+    yield from _two_wall_edges(scene)
+
+
+def _friction_edges(scene: Scene) -> Iterator[Edge]:
+    """Friction that equals the slope of a pivot: the block may slide, or rock."""
+    slopes = {pivot.arm / pivot.height for pivot in map(scene.block.pivot, get_args(Side))}
+    for slope in slopes:
+        if _equal(scene.floor.mu_s, slope) or _equal(scene.floor.friction, slope):
+            yield Edge("friction equals B/H", tuple(_with_friction(scene, k) for k in (-1, 1)))
+            return
+
+
+def _with_friction(scene: Scene, sign: int) -> Scene:
+    factor = 1.0 + sign * NUDGE
+    floor = scene.floor
+    static = None if floor.static_friction is None else floor.static_friction * factor
+    return scene.replace(
+        floor=floor.replace(friction=floor.friction * factor, static_friction=static)
+    )
+
+
+def _excitation_edges(scene: Scene) -> Iterator[Edge]:
+    """A base whose largest acceleration just reaches what moves a block at rest."""
+    if scene.vertical.kind != "rest" or any(scene.initial_state[2:]) or scene.initial_height:
+        return
+    largest = largest_accelerations(scene.excitation)
+    mu = scene.floor.mu_s * scene.gravity
+    for side, reached in largest.items():
+        pivot = scene.block.pivot(side)
+        names = {
+            "acceleration equals g tan(alpha)": scene.gravity * pivot.arm / pivot.height,
+            "acceleration equals mu g": mu,
+        }
+        for what, limit in names.items():
+            if _equal(reached, limit):
+                sides = (scene.excitation.scaled(1.0 + k * NUDGE) for k in (-1, 1))
+                yield Edge(what, tuple(scene.replace(excitation=moved) for moved in sides))
+
+
+def largest_accelerations(excitation: Excitation) -> dict[Side, float]:
+    """The largest acceleration of a base (m/s^2) that tips a block to each side.
+
+    A base that moves to the right tips the block to the left.
+    """
+    if excitation.kind == "rest":
+        return {"left": 0.0, "right": 0.0}
+    if isinstance(excitation, Record):
+        values = excitation.samples
+    elif excitation.kind == "sine":
+        values = np.array([excitation.amplitude, -excitation.amplitude])
+    else:
+        t = np.linspace(0.0, excitation.quiet_after, 20_001)
+        values = excitation.acceleration(t)
+    return {"left": float(np.max(values)), "right": float(-np.min(values))}
+
+
+def _balance_edges(scene: Scene) -> Iterator[Edge]:
+    """A block that starts at rest over its corner."""
+    tilt = scene.initial_rotation
+    if tilt == 0.0 or scene.initial_angular_velocity or scene.initial_velocity:
+        return
+    if _equal(abs(tilt), scene.block.pivot("left" if tilt > 0.0 else "right").alpha):
+        moved = tuple(scene.replace(initial_rotation=tilt * (1.0 + k * NUDGE)) for k in (-1, 1))
+        yield Edge("balanced over its corner", moved)
+
+
+def _flush_edges(scene: Scene) -> Iterator[Edge]:
+    """A side that touches a wall at first: from 0 a gap can only grow."""
+    for wall in scene.walls:
+        if wall.gap == 0.0:
+            apart = wall.replace(gap=NUDGE * scene.block.radius)
+            others = [other for other in scene.walls if other is not wall]
+            yield Edge(f"it touches the {wall.side} wall", (scene.replace(walls=[apart, *others]),))
+
+
+def _two_wall_edges(scene: Scene) -> Iterator[Edge]:
+    """Walls at equal gaps of a block that both may touch at once."""
+    if len(scene.walls) < 2:
+        return
+    left, right = scene.walls
+    if left.gap > 0.0 and _equal(left.gap, right.gap):
+        moved = tuple(
+            scene.replace(walls=[left.replace(gap=left.gap * (1.0 + k * NUDGE)), right])
+            for k in (-1, 1)
+        )
+        yield Edge("both walls are equally far", moved)
+
+
+def _equal(one: float, other: float) -> bool:
+    return math.isclose(one, other, rel_tol=EQUAL, abs_tol=0.0)
+
+
+def _parted(edge: Edge, scene: Scene, model: EventBasedModel) -> Tie | None:
+    """The tie of an equality; None where its sides, and the scene, are one motion."""
+    played = [(each, model.simulate(each)) for each in (scene, *edge.sides)]
+    first, *others = [history for _, history in played]
+    times = [_parting_time(scene, first, other) for other in others]
+    times += [_parting_time(scene, *pair) for pair in pairwise(others)]
+    fates = tuple(dict.fromkeys(fate_words(each, model) for each in (scene, *edge.sides)))
+    known = [time for time in times if time is not None]
+    if not known and len(fates) == 1:
+        return None
+    return Tie(edge.what, min(known, default=scene.duration), fates)
+
+
+def _parting_time(scene: Scene, one: History, other: History) -> float | None:
+    """The time (s) of the last row at which two histories are one; None if they do not part."""
+    alpha = scene.block.alpha
+    rows = min(len(one.channels["t"]), len(other.channels["t"]))
+    turned = np.abs(one.channels["theta"][:rows] - other.channels["theta"][:rows]) / alpha
+    moved = np.abs(one.channels["x"][:rows] - other.channels["x"][:rows])
+    apart = np.maximum(turned, moved / (alpha * scene.block.radius)) > PARTED
+    if not apart.any():
+        return None
+    same = np.flatnonzero(
+        np.maximum(turned, moved / (alpha * scene.block.radius))[: int(np.argmax(apart))]
+        <= 10.0 * NUDGE
+    )
+    return float(one.channels["t"][same[-1]]) if len(same) else 0.0
+
+
+def fate_words(scene: Scene, model: EventBasedModel) -> str:
+    """The fate of a scene, in the words of a history's outcome."""
+    from rockcheck.ebm import fates
+
+    outcome = int(fates.play_fates(table_of(scene), model, jobs=1).outcome[0])
+    words: dict[int, str] = dict(enumerate(OUTCOMES))
+    return words.get(outcome, "undecided" if outcome == fates.UNDECIDED else "failed")

@@ -1,0 +1,278 @@
+"""`rockcheck assess`: does it fall, how far does it move, how sure is that?
+
+In: options, a scene, records. Out: a plan, which the study `population` plays and answers.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, get_args
+
+import numpy as np
+import typer
+
+from rockcheck.commands import (
+    OUT,
+    Played,
+    chosen_models,
+    model_names,
+    need_installed,
+    scene_names,
+    studied,
+    tell_left_out,
+)
+from rockcheck.commands.record import ReadOption, record_sets
+from rockcheck.scenes import InputError, Scene, Side, files, printable
+from rockcheck.validation.execute import models
+from rockcheck.validation.paper import FREQUENCIES
+from rockcheck.validation.studies.population import intensities, plan
+from rockcheck.validation.studies.population.study import Assessment
+from rockcheck.validation.suite import motions
+
+MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
+#: Draws of a scene's uncertain numbers under its own motion, and under each of its records.
+OWN_DRAWS, RECORD_DRAWS = 256, 64
+
+
+@dataclass(frozen=True)
+class Varied:
+    """What is varied about the scene, beside its records."""
+
+    samples: Annotated[
+        int | None,
+        typer.Option(
+            "--samples",
+            min=2,
+            max=MOST_SAMPLES,
+            help="Draws of the scene's uncertain numbers (a power of two is taken); default"
+            f" {RECORD_DRAWS} for each record, {OWN_DRAWS} without records.",
+        ),
+    ] = None
+    gaps: Annotated[
+        str | None,
+        typer.Option(
+            "--gaps",
+            metavar="[SIDE][:GAP,GAP...]",
+            help="Clear gaps (m) in place of all up to where the block reaches: 0,0.05,0.1; or a"
+            " side without a wall: left, or left:0,0.05.",
+        ),
+    ] = None
+    levels: Annotated[
+        str | None,
+        typer.Option(
+            "--levels",
+            metavar="MEASURE[:LOW:HIGH:COUNT]",
+            help="The measure of intensity: pga (g), pgv (m/s), pga-ratio, pgv-ratio or sa:PERIOD"
+            " (g); with bounds, as pga:0.05:2:40, all records are scaled to these intensities, too."
+            " Without records: pulses, over g tan(alpha).",
+        ),
+    ] = None
+    capacity: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--capacity",
+            help="Peak rotation (alpha) of a fragility curve; repeatable.",
+            min=1e-6,
+            max=1.0,
+        ),
+    ] = None
+
+
+def assess(
+    scene: Annotated[
+        str, typer.Argument(help="A named scene or a .toml file.", autocompletion=scene_names)
+    ],
+    records: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[RECORDS]...",
+            help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".',
+        ),
+    ] = None,
+    models: Annotated[
+        str,
+        typer.Option(
+            "--models",
+            help="The model that plays, and others to compare with it, with commas between.",
+            autocompletion=model_names,
+        ),
+    ] = models.REFERENCE,
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="A setting of the first model, such as time_step=1e-4, or MODEL.key=value;"
+            " repeatable.",
+        ),
+    ] = None,
+    varied: Varied = Varied(),
+    read: ReadOption = None,
+    played: Played = Played(OUT / "assess"),
+) -> None:
+    """Does it fall, how far does it move, which gap is safe, how sure is that?
+
+    Plays the scene under its own base motion, or under each record, until its outcome is decided;
+    searches the gaps and the intensities at which it falls; says what hand methods say beside it. A
+    number that the scene file gives as { value = 0.3, sd = 0.03 } is uncertain, and drawn.
+    --read also takes scale=1.2 and vertical=true for the records.
+
+    Exit 0: done; of a single run: converged. 1: a single run that is not converged. 3: a model
+    failed.
+    """
+    given = files.load_uncertain_scene(scene)
+    first = models.split(",")[0]
+    chosen = chosen_models(
+        models,
+        [word if "." in word.partition("=")[0] else f"{first}.{word}" for word in settings or ()],
+    )
+    need_installed(chosen, "--models")
+    cases, left_out = motions.under_records(
+        {given.scene.name: given}, record_sets(records or (), read or ()), Path()
+    )
+    if records:
+        cases = {
+            str(getattr(case.scene.excitation, "source", name)): case
+            for name, case in cases.items()
+        }
+    check_varied(varied, next(iter(cases.values())), given, recorded=bool(records))
+    measure = measure_of(varied.levels, recorded=bool(records))
+    planned = plan.Plan(
+        own=given,
+        cases=cases,
+        models=chosen,
+        gaps=gap_ranges_of(varied.gaps, given.scene),
+        draws=draws_of(varied.samples, cases, recorded=bool(records)),
+        recorded=bool(records),
+        measure=measure,
+        left_out=left_out,
+    )
+    if has_bounds(varied.levels, measure):
+        planned = plan.with_levels(
+            planned, levels_of(varied, measure, planned, recorded=bool(records))
+        )
+    _ = planned.numbers  # names a draw that is no scene, before anything is played
+    tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
+    studied(Assessment(plan=planned), played)
+
+
+def draws_of(
+    samples: int | None, cases: Mapping[str, files.UncertainScene], *, recorded: bool
+) -> int:
+    """How many draws: a power of two; 0 where no number is uncertain."""
+    if not any(case.spreads for case in cases.values()):
+        return 0
+    wanted = samples or (RECORD_DRAWS if recorded else OWN_DRAWS)
+    return 1 << max(1, (wanted - 1).bit_length())
+
+
+def check_varied(
+    varied: Varied, drawn: files.UncertainScene, given: files.UncertainScene, *, recorded: bool
+) -> None:
+    """Raises `InputError` for a scene in which nothing happens, or an option without an effect.
+
+    `drawn` is the scene to be drawn.
+    """
+    scene = given.scene
+    begins = any(scene.initial_state[2:]) or scene.initial_height
+    rests = scene.excitation.kind == scene.vertical.kind == "rest"
+    if rests and not recorded and not begins:
+        raise InputError("are needed: the base of the scene is at rest", "records")
+    if varied.samples is not None and not drawn.spreads:
+        besides = " besides the excitation that the records replace" if given.spreads else ""
+        raise InputError(
+            f"no number of the scene{besides} is uncertain: write one as"
+            " { value = 0.3, sd = 0.03 }",
+            "--samples",
+        )
+    if varied.capacity and not (recorded and varied.levels and varied.levels.count(":") > 1):
+        raise InputError("needs records and --levels MEASURE:LOW:HIGH:COUNT", "--capacity")
+
+
+def gap_ranges_of(text: str | None, scene: Scene) -> tuple[plan.GapRange, ...]:
+    """The gaps that `--gaps` asks for; without it those of the scene's walls.
+
+    `0.05,0.1` are gaps (m) of the scene's walls, `left` all of that side, `left:0.05,0.1` gaps on
+    that side, where a wall without rebound is tried if there is none. Raises `InputError`.
+    """
+    sides: tuple[Side, ...] = tuple(wall.side for wall in scene.walls)
+    if text is None:
+        return tuple(plan.GapRange(side) for side in sides)
+    word, colon, numbers = text.partition(":")
+    named = colon or not word[:1].isdigit()
+    if named and word not in get_args(Side):
+        raise InputError(f"{printable(word)!r} is not allowed: left or right", "--gaps")
+    if named:
+        sides = ("left",) if word == "left" else ("right",)
+    listed = numbers if named else text
+    values = gap_values(listed) if listed else ()
+    if not sides:
+        raise InputError(f"the scene has no wall: say on which side, as in left:{listed}", "--gaps")
+    return tuple(plan.GapRange(side, values) for side in sides)
+
+
+def gap_values(text: str) -> tuple[float, ...]:
+    """Clear gaps (m), increasing. Raises `InputError`."""
+    try:
+        gaps = tuple(sorted({float(word) for word in text.split(",")}))
+    except ValueError:
+        gaps = (math.nan,)
+    if not all(0.0 <= gap < math.inf for gap in gaps):
+        raise InputError(
+            f"{printable(text)!r} is not allowed: clear gaps in m, 0 or more, with commas between",
+            "--gaps",
+        )
+    return gaps
+
+
+def measure_of(levels: str | None, *, recorded: bool) -> intensities.Measure:
+    """The measure that `--levels` names. Raises `InputError`.
+
+    Without a name it is PGA; of bounds without records, which scale pulses, over g tan(alpha).
+    """
+    words = (levels or "pga").split(":")
+    if words[0] == "sa":
+        return intensities.measure_of(":".join(words[:2]))
+    if words[0][:1].isdigit():
+        return intensities.measure_of("pga" if recorded else "pga-ratio")
+    return intensities.measure_of(words[0])
+
+
+def has_bounds(levels: str | None, measure: intensities.Measure) -> bool:
+    """Whether `--levels` says more than the measure."""
+    return levels is not None and levels != measure.name
+
+
+def levels_of(
+    varied: Varied, measure: intensities.Measure, planned: plan.Plan, *, recorded: bool
+) -> intensities.Levels:
+    """The population that `--levels` asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
+
+    An incremental dynamic analysis under records; without any, the fragility under pulses of the
+    scene's kind.
+    """
+    text = varied.levels or ""
+    bounds = text.removeprefix(measure.name).removeprefix(":").split(":")
+    try:
+        low, high, count = (float(word) for word in bounds)
+    except ValueError:
+        low = high = count = 0.0
+    if not (0.0 < low < high < math.inf and count in range(2, MOST_LEVELS + 1)):
+        raise InputError(
+            printable(
+                "give MEASURE:LOW:HIGH:COUNT such as pga:0.05:2:40, 0 < LOW < HIGH, 2 to"
+                f" {MOST_LEVELS} of them, not {text!r}",
+                160,
+            ),
+            "--levels",
+        )
+    values = np.linspace(low, high, int(count))
+    model: dict[str, Any] = {"model": planned.batch_model, "settings": planned.batch_settings}
+    if recorded:
+        capacities = varied.capacity or intensities.CAPACITIES
+        return intensities.ida(
+            planned.cases, values, measure, **model, capacities=tuple(capacities)
+        )
+    if measure.name != "pga-ratio":
+        raise InputError(f"{measure.name} needs records; of pulses it is pga-ratio", "--levels")
+    return intensities.fragility(planned.own.scene, values, FREQUENCIES, **model)

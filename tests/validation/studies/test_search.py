@@ -1,0 +1,67 @@
+"""The search of the values at which a run does not stand."""
+
+import numpy as np
+import pytest
+
+from rockcheck.validation.studies.population.search import falls_within
+
+GRID = np.linspace(0.0, 1.0, 101)
+NARROW = 1e-4
+
+
+def searched(*runs, grid=GRID, resolution=NARROW):
+    """The intervals found of runs that fall in the given intervals."""
+
+    def stands(which, values):
+        return np.array(
+            [
+                not any(low <= value <= high for low, high in runs[run])
+                for run, value in zip(which, values, strict=True)
+            ]
+        )
+
+    count = len(grid)
+    seen = np.array([stands(np.full(count, run), grid) for run in range(len(runs))])
+    return falls_within(stands, seen, grid, resolution)
+
+
+def test_the_ends_of_an_island_are_found_to_the_resolution():
+    ((island,),) = searched([(0.2334, 0.2778)])
+    assert island.low == pytest.approx(0.2334, abs=NARROW)
+    assert island.high == pytest.approx(0.2778, abs=NARROW)
+    assert 0.0 <= island.low - island.stands_below <= NARROW
+    assert 0.0 <= island.stands_above - island.high <= NARROW
+
+
+def test_what_falls_at_both_ends_of_the_search_has_no_value_beyond():
+    ((first, last),) = searched([(0.0, 0.1), (0.9, 1.0)])
+    assert first.stands_below is None
+    assert first.low == 0.0
+    assert last.stands_above is None
+    assert last.high == 1.0
+
+
+def test_what_never_falls_has_no_interval():
+    assert searched([]) == [[]]
+
+
+def test_what_always_falls_has_one():
+    (falls,) = searched([(0.0, 1.0)])
+    assert len(falls) == 1
+    assert falls[0].high == 1.0
+
+
+def test_runs_are_searched_side_by_side():
+    first, second = searched([(0.5, 1.0)], [(0.105, 0.155), (0.755, 0.805)])
+    assert [fall.low for fall in first] == pytest.approx([0.5], abs=NARROW)
+    assert [fall.low for fall in second] == pytest.approx([0.105, 0.755], abs=NARROW)
+
+
+def test_what_lies_between_two_values_looked_at_is_missed():
+    assert searched([(0.101, 0.109)]) == [[]]
+
+
+def test_the_resolution_may_grow_with_the_value():
+    grid = np.geomspace(0.1, 10.0, 50)
+    ((fall,),) = searched([(3.3, 10.0)], grid=grid, resolution=0.01 * grid[:-1])
+    assert fall.low == pytest.approx(3.3, rel=0.011)

@@ -1,0 +1,360 @@
+"""The answers of an assessment, of results whose figures can be worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from rockcheck import load_scene
+from rockcheck.scenes import files
+from rockcheck.validation.criteria import CRITERIA
+from rockcheck.validation.studies.population import (
+    certainty as certainty_answers,
+    results,
+    sentences,
+    statistics,
+)
+from rockcheck.validation.studies.population.gathered import Gathered
+from rockcheck.validation.studies.population.plan import GapRange, Plan
+from rockcheck.validation.studies.population.study import finding_of
+from rockcheck.validation.uncertainty import numerical
+
+SCENE = load_scene("fig5a")
+CERTAIN = files.UncertainScene(SCENE, {}, np.eye(0))
+UNCERTAIN = files.UncertainScene(
+    SCENE, {"floor.friction": files.Spread(value=0.4, sd=0.04)}, np.eye(1)
+)
+
+
+def ran(fate, peak=None, slip=None, top=None, speed=None, reach=None):
+    return results.RunResult(
+        fate=fate,
+        peak_rotation=peak,
+        slip=slip,
+        top_displacement=top,
+        wall_speed={} if speed is None else {"left": speed},
+        reach={"left": reach or 0.0, "right": 0.0},
+    )
+
+
+RUNS = {
+    "a": ran("at rest", 0.2, 0.01, 0.3, 0.4),
+    "b": ran("moving", 0.4, 0.03, 0.5),
+    "c": ran("overturned right", 6.0, 1e-7, 2.0, 0.9),
+}
+#: By case, whether the event of each hand method happens, and how far it goes.
+METHODS = {
+    "a": ((True, 0.1), (False, 0.0), (False, 0.5), (True, 0.02), (True, 0.0), (True, None)),
+    "b": ((False, 0.5), (True, 0.05), (True, 1.5), (True, 0.04), (False, 0.01), (False, 0.3)),
+    "c": ((True, 0.3), (True, 0.1), (True, math.inf), (True, 0.1), (True, 0.3), (True, 2.0)),
+}
+
+
+def judged(u_num):
+    peak = numerical.Quantity(
+        name="peak_rotation",
+        unit="alpha",
+        value=0.2,
+        u_num=u_num,
+        verdict="not converged" if u_num is None else "converged",
+    )
+    return numerical.Numerical(method="by hand", quantities=(peak,))
+
+
+def gathered(runs=RUNS, *, given=CERTAIN, recorded=True, draws=0, certainty=None, **played):
+    """The results of runs as they are, and of what else was `played`, by the plan's task groups."""
+    plan = Plan(
+        own=given,
+        cases=dict.fromkeys(runs, given),
+        recorded=recorded,
+        draws=draws,
+        gaps=[GapRange("left", (0.0, 0.05, 0.1))],
+        models={"ebm-unilateral": {}, "cm": {}},
+    )
+    done = {
+        plan.shown[case]: results.Shown(
+            result=run, methods=METHODS.get(case, ()), history="t,theta\n0,0\n1,0.1\n"
+        )
+        for case, run in runs.items()
+    }
+    for case, run in played.get("cm", {}).items():
+        done[plan.others["cm"][case]] = results.Shown(result=run)
+    for case, run in played.get("law", {}).items():
+        done[plan.by_other_law[case]] = results.Shown(result=run)
+    for case, drawn in played.get("drawn", {}).items():
+        done[plan.drawn[case]] = results.Drawn(results=(runs[case], *drawn))
+    for case, free in played.get("free", {}).items():
+        done[plan.free["left"][case]] = results.Drawn(results=(free,))
+    for case, sure in (certainty or {}).items():
+        done[plan.certainty(done)[case]] = sure
+    for case, search in played.get("gaps", {}).items():
+        done[plan.gap_tasks(done)["left"][case]] = search
+    return Gathered(plan, done)
+
+
+# Does it fall?
+
+
+def test_one_of_three_records_falls_with_the_exact_interval_of_few():
+    answer = statistics.fall_answer(gathered())
+    assert answer.overturning.count == 1
+    assert answer.overturning.of == 3
+    # the ends of Clopper and Pearson's interval of 1 of 3
+    assert answer.overturning.low == pytest.approx(0.0084, abs=1e-4)
+    assert answer.overturning.high == pytest.approx(0.9057, abs=1e-4)
+
+
+def test_three_records_are_called_few():
+    everything = gathered()
+    answer = statistics.fall_answer(everything)
+    assert answer.few
+    words = " ".join(sentences.fall_sentences("shelf", answer, everything))
+    assert words.startswith("shelf overturns in 1 of 3 records, 33 % (95 %: 0.84 to 91 %).")
+    assert "3 records are too few" in words
+
+
+def test_what_is_undecided_is_not_among_those_that_stay():
+    answer = statistics.fall_answer(gathered({**RUNS, "d": ran("undecided", 0.9)}))
+    assert answer.runs == 4
+    assert answer.fates["undecided"] == 1
+    assert answer.overturning.of == 3
+
+
+def test_draws_of_one_motion_are_counted_in_the_first_sentence():
+    drawn = [ran("overturned left", 6.0)] * 2 + [ran("at rest", 0.2)] * 6
+    everything = gathered(
+        {"a": RUNS["a"]}, given=UNCERTAIN, recorded=False, draws=8, drawn={"a": drawn}
+    )
+    answer = statistics.fall_answer(everything)
+    first, *more = sentences.fall_sentences("shelf", answer, everything)
+    assert first == "shelf overturns in 2 of 8 draws, 25 % (95 %: 7.1 to 59 %)."
+    assert more == ["With its own numbers it stays."]
+
+
+def test_draws_under_records_count_in_place_of_the_runs_as_they_are():
+    drawn = {"a": [ran("at rest", 0.2)] * 4, "c": [ran("overturned left", 6.0)] * 4}
+    everything = gathered({"a": RUNS["a"], "c": RUNS["c"]}, given=UNCERTAIN, draws=4, drawn=drawn)
+    answer = statistics.fall_answer(everything)
+    assert answer.runs == 8
+    assert answer.overturning.count == 4
+    words = sentences.fall_sentences("shelf", answer, everything)[0]
+    assert "in 4 of 8 runs, 4 draws under each of 2 records, 50 %" in words
+
+
+# How far does it move?
+
+
+def test_quantities_are_of_the_runs_that_stand():
+    answers = {one.name: one for one in statistics.quantity_answers(gathered())}
+    peak = answers["peak_rotation"]
+    assert peak.values == (0.2, 0.4)
+    assert peak.largest_case == "b"
+    assert peak.spread["median"] == pytest.approx(0.3)
+    assert peak.spread["p16"] == pytest.approx(0.232)
+    assert answers["wall_speed"].values == (0.4,)
+
+
+# Which gap is safe?
+
+FREE = {"a": ran("at rest", 0.3, reach=0.1), "b": ran("at rest", 0.3, reach=0.08)}
+
+
+def interval(draw, low, high, below, above):
+    return results.FallInterval(
+        draw=draw, low=low, high=high, stands_below=below, stands_above=above
+    )
+
+
+def row(gap, overturned, *speeds):
+    return results.GapRow(gap=gap, runs=1, overturned=overturned, undecided=0, speeds=speeds)
+
+
+def search(*intervals, fallen=(0, 0, 0)):
+    rows = [row(gap, n, 0.5) for gap, n in zip((0.0, 0.05, 0.1), fallen, strict=True)]
+    return results.GapSearch(intervals=intervals, rows=tuple(rows), undecided=0, runs=9)
+
+
+def gap_answer(**searches):
+    everything = gathered(
+        {case: RUNS[case] for case in searches},
+        free={case: FREE[case] for case in searches},
+        gaps=searches,
+    )
+    (answer,) = statistics.gap_answers(everything)
+    return answer
+
+
+def test_no_run_falls_up_to_where_the_first_one_was_seen_to_stand():
+    island = interval(0, 0.0525, 0.06, 0.0524, 0.0601)
+    answer = gap_answer(a=search(), b=search(island, fallen=(0, 0, 0)))
+    assert answer.safe_up_to == 0.0524
+    assert answer.first.case == "b"
+    words = sentences.gap_sentences([answer])
+    assert words[0].startswith(
+        "No run falls at gaps up to 52.4 mm (looked at every 1 mm); above, b falls first;"
+        " none falls from 60.1 mm on; without the wall it reaches 0.1 m"
+    )
+    assert "not always worse" in words[1]
+
+
+def test_one_that_falls_at_no_gap_leaves_nothing_safe():
+    answer = gap_answer(a=search(interval(0, 0.0, 0.02, None, 0.0201)))
+    assert answer.safe_up_to is None
+    assert sentences.gap_sentences([answer])[0].startswith("It falls already at a gap of 0 mm")
+
+
+def test_what_falls_nowhere_is_told_with_how_finely_was_looked():
+    answer = gap_answer(a=search())
+    assert answer.safe_up_to == 0.1
+    assert sentences.gap_sentences([answer])[0].startswith(
+        "It stands at gaps of 0 mm to 0.1 m (looked at every 1 mm)"
+    )
+
+
+def test_a_wall_beyond_a_fall_that_goes_on_is_never_called_safe_again():
+    answer = gap_answer(a=search(interval(0, 0.03, 0.1, 0.0299, None)))
+    assert sentences.safe_again_from(answer) is None
+
+
+def test_runs_of_all_records_are_counted_at_each_gap():
+    answer = gap_answer(a=search(), b=search(fallen=(0, 1, 1)))
+    assert [one.overturned for one in answer.rows] == [0, 1, 1]
+    assert [one.runs for one in answer.rows] == [2, 2, 2]
+    assert [one.struck for one in answer.rows] == [2, 2, 2]
+    assert answer.rows[0].largest_speed == 0.5
+
+
+def test_a_search_that_did_not_end_gives_no_answer():
+    assert statistics.gap_answers(gathered(free={"a": FREE["a"]})) == []
+
+
+# How sure is that?
+
+
+def contributions(everything):
+    answer = certainty_answers.uncertainty_answer(everything)
+    return answer, {part.source: part.sd for part in answer.contributions}
+
+
+def test_where_some_fall_the_outcome_is_what_is_uncertain():
+    """Of 0, 0, 1 the standard deviation; a converged run errs by nothing in its outcome, one that
+    is not by as much as a coin."""
+    certainty = {
+        "a": results.Certainty(numerical=judged(0.0196)),
+        "b": results.Certainty(numerical=judged(None)),
+        "c": results.Certainty(numerical=judged(0.3)),
+    }
+    answer, sd = contributions(gathered(certainty=certainty))
+    assert answer.of == "outcome"
+    assert sd["records"] == pytest.approx(math.sqrt(1.0 / 3.0))
+    assert sd["numerical error"] == pytest.approx(math.sqrt(0.25 / 3.0))
+
+
+def test_where_all_stand_the_peak_is():
+    standing = {"a": RUNS["a"], "b": RUNS["b"]}
+    certainty = {"a": results.Certainty(numerical=judged(0.0196))}
+    cm = {"a": ran("at rest", 0.25), "b": ran("at rest", 0.3)}
+    answer, sd = contributions(
+        gathered(standing, certainty=certainty, cm=cm, law={"b": ran("at rest", 0.6)})
+    )
+    assert answer.of == "peak rotation"
+    assert sd["records"] == pytest.approx(0.2 / math.sqrt(2.0))
+    assert sd["numerical error"] == pytest.approx(0.01, rel=1e-3)
+    assert sd["model form"] == pytest.approx(math.sqrt((0.05**2 + 0.1**2) / 2.0))
+    assert sd["law of impacts"] == pytest.approx(0.1)
+    assert answer.unknown == ("inputs",)
+
+
+def test_another_model_that_falls_makes_the_outcome_uncertain():
+    answer, sd = contributions(gathered({"a": RUNS["a"]}, cm={"a": ran("overturned left", 6.0)}))
+    assert answer.of == "outcome"
+    assert sd["model form"] == 1.0
+
+
+def test_draws_scatter_within_a_record():
+    drawn = {"a": [ran("at rest", peak) for peak in (0.15, 0.25, 0.25, 0.15)]}
+    _, sd = contributions(
+        gathered({"a": RUNS["a"]}, given=UNCERTAIN, recorded=False, draws=4, drawn=drawn)
+    )
+    assert sd["inputs"] == pytest.approx(0.05)
+
+
+def test_a_tie_is_never_converged():
+    tie = ("friction equals B/H", 0.3, ("at rest", "overturned left"))
+    sure = results.Certainty(numerical=judged(1e-9), ties=(tie,))
+    everything = gathered({"a": RUNS["a"]}, recorded=False, certainty={"a": sure, "": sure})
+    words = sentences.certainty_sentences(
+        everything, certainty_answers.uncertainty_answer(everything)
+    )
+    assert "From 0.3 s on the mechanics has more than one answer" in words[1]
+    assert not sentences.is_converged(sure)
+    assert finding_of(everything).exit_code == 1
+    assert finding_of(everything).data["ties"][0]["fates"] == ["at rest", "overturned left"]
+
+
+# What do hand methods say?
+
+
+def scores(runs=RUNS):
+    methods = [(one.name, one.event) for one in CRITERIA]
+    everything = gathered(runs)
+    return {one.method: one for one in certainty_answers.method_scores(everything, methods)}
+
+
+@pytest.mark.parametrize(
+    ("method", "predicts", "simulated", "agrees", "estimate", "motion", "unsafe"),
+    [
+        ("uplift", 2, 3, 2, 0.3, 0.4, 2),
+        ("sliding", 2, 2, 1, 0.05, 0.01, 1),
+        ("step of velocity", 2, 1, 2, 1.5, 0.4, 0),
+        ("sliding block", 3, 2, 2, 0.04, 0.01, 0),
+        ("reserve sliding", 2, 2, 1, 0.01, 0.01, 2),
+        ("reserve rocking", 2, 1, 2, 0.3, 0.4, 2),
+    ],
+)
+def test_hand_methods_are_held_against_fates(
+    method, predicts, simulated, agrees, estimate, motion, unsafe
+):
+    score = scores()[method]
+    assert score.of == 3
+    assert score.predicts == predicts
+    assert score.simulated == simulated
+    assert score.agrees == agrees
+    assert score.estimate == pytest.approx(estimate)
+    assert score.motion == pytest.approx(motion)
+    assert score.unsafe == unsafe
+
+
+def test_of_one_run_a_method_says_what_happens_not_how_often():
+    everything = gathered({"a": RUNS["a"]})
+    methods = [(one.name, one.event) for one in CRITERIA]
+    words = sentences.method_sentences(
+        certainty_answers.method_scores(everything, methods), [event for _, event in methods]
+    )
+    assert words == ["step of velocity: stays; reserve rocking: overturns."]
+
+
+# The finding
+
+
+def test_a_run_that_failed_ends_with_3():
+    failed = results.RunResult(fate="failed", reason="the cap on steps was reached")
+    found = finding_of(gathered({"a": RUNS["a"], "b": failed}))
+    assert found.exit_code == 3
+    assert found.failures == {"b": "the cap on steps was reached"}
+    assert found.data["runs"] == 1
+
+
+def test_every_question_has_an_answer():
+    found = finding_of(gathered())
+    answers = found.table("answers").records()
+    assert len(answers) == 6
+    assert [row["question"] for row in answers if not row["answer"]] == []
+
+
+def test_the_page_begins_with_what_was_assessed():
+    found = finding_of(gathered())
+    facts = dict(found.blocks[0].facts)
+    assert facts["block"] == "0.794 m wide, 3.11 m high"
+    assert facts["base"] == "3 recorded motions, listed below"
+    assert next(found.plots()).name == "scene"

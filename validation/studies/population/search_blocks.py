@@ -1,0 +1,176 @@
+"""Tables and plots of the searches of an assessment: gaps and intensities.
+
+In: typed answers (`statistics`). Out: blocks of a finding, a function a question. Called by the
+study.
+"""
+
+import numpy as np
+
+from rockcheck.validation.finding import (
+    Axis,
+    Block,
+    Column,
+    Mark,
+    Panel,
+    Plot,
+    Series,
+    Table,
+    text,
+)
+from rockcheck.validation.studies.population.statistics import GapAnswer, IntensityAnswer
+
+
+def gap_blocks(answer: GapAnswer) -> list[Block]:
+    """Which gaps on one side are safe: a plot, the intervals, and the runs at some gaps."""
+    side = answer.side
+    gaps = [row.gap for row in answer.rows]
+    shares = Panel(
+        "share of the runs",
+        [
+            Series("struck", gaps, [row.struck / row.runs for row in answer.rows], style="step"),
+            Series(
+                "overturned", gaps, [row.overturned / row.runs for row in answer.rows], style="step"
+            ),
+        ],
+    )
+    speeds = Panel(
+        "speed at the wall, m/s",
+        [
+            Series("median", gaps, [row.median_speed for row in answer.rows]),
+            Series("largest", gaps, [row.largest_speed for row in answer.rows]),
+        ],
+    )
+    intervals = [
+        [
+            case.case,
+            case.draw,
+            interval.low,
+            interval.high,
+            interval.stands_below,
+            interval.stands_above,
+        ]
+        for case in answer.falls
+        for interval in case.intervals
+    ]
+    rows = [
+        [
+            row.gap,
+            row.runs,
+            Mark(row.overturned, "fail" if row.overturned else "pass"),
+            row.struck,
+            row.median_speed,
+            row.largest_speed,
+        ]
+        for row in answer.rows
+    ]
+    interval_columns = [
+        text("record"),
+        Column("draw", help="0 is the scene as it is"),
+        Column("low", "falls from", "m", digits=4),
+        Column("high", "to", "m", digits=4),
+        Column("stands_below", "stands at", "m", digits=4, brief=False),
+        Column("stands_above", "and again at", "m", digits=4, brief=False),
+    ]
+    row_columns = [
+        Column("gap", "clear gap", "m", digits=4),
+        Column("runs"),
+        Column("overturned"),
+        Column("struck"),
+        Column("median", "speed, median", "m/s"),
+        Column("largest", "largest", "m/s"),
+    ]
+    return [
+        Plot(
+            f"gaps-{side}",
+            f"Which gap on the {side} is safe",
+            panels=[shares, speeds],
+            x=Axis("clear gap, m"),
+            shared=False,
+        ),
+        Table(
+            f"gap_intervals_{side}",
+            interval_columns,
+            intervals,
+            "At which gaps it falls",
+            note=f"Looked at every {1e3 * answer.looked_every:.3g} mm, each change narrowed to"
+            " 0.1 mm. Narrower intervals may be missed.",
+            on="page" if intervals else "file",
+            folded=len(intervals) > 12,
+        ),
+        Table(
+            f"gaps_{side}",
+            row_columns,
+            rows,
+            "Runs by gap",
+            note="Struck: also by runs that then overturn.",
+            on="page",
+            folded=True,
+        ),
+    ]
+
+
+def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
+    """The least intensities, and the curve through them."""
+    if answer is None:
+        return []
+    columns = [
+        text("record"),
+        Column("as_it_is", f"{answer.label} as it is", answer.unit),
+        Column("least", "falls from", answer.unit, digits=4),
+        Column("looked_up_to", "looked at up to", answer.unit, brief=False),
+        text("islands", "stands again after", brief=False),
+    ]
+    rows = [
+        [
+            record.case,
+            record.as_it_is,
+            record.least,
+            record.beyond,
+            ", ".join(f"{low:.3g} to {high:.3g}" for low, high in record.islands),
+        ]
+        for record in answer.records
+    ]
+    table = Table(
+        "intensities",
+        columns,
+        rows,
+        "At which intensity it falls",
+        note="Each motion was scaled in steps of 1 %, each change narrowed to 0.25 %. The curve is"
+        " lognormal, of the greatest likelihood; its interval is from drawing the motions anew.",
+        on="page" if len(rows) > 1 else "file",
+        folded=len(rows) > 12,
+    )
+    return [*_curve_plot(answer), table]
+
+
+def _curve_plot(answer: IntensityAnswer) -> list[Block]:
+    least = sorted(record.least for record in answer.records if record.least is not None)
+    if answer.fit is None or not answer.fit.dispersion > 0.0:
+        return []
+    x = np.geomspace(0.5 * least[0], 2.0 * least[-1], 100)
+    low, high = answer.fit.band(x)
+    steps = [(rank + 1) / len(answer.records) for rank in range(len(least))]
+    series = [
+        Series(
+            "lognormal",
+            x.tolist(),
+            answer.fit.probability(x).tolist(),
+            low.tolist(),
+            high.tolist(),
+            style="smooth",
+        ),
+        Series("records", least, steps, style="step"),
+    ]
+    head = f"{answer.label}, {answer.unit}" if answer.unit else answer.label
+    return [
+        Plot(
+            "intensity",
+            "Probability of overturning",
+            panels=[Panel("", series)],
+            x=Axis(head, log=True),
+            y=Axis("probability", limits=(0.0, 1.0)),
+            note="Share of the records that have overturned it, and the lognormal curve with its"
+            " 95 % band.",
+            live=True,
+        )
+    ]

@@ -1,0 +1,279 @@
+"""The answers of an assessment in words, for an engineer's report.
+
+In: typed answers (`statistics`). Out: sentences. A sentence claims no more than was looked at.
+"""
+
+from collections.abc import Sequence
+
+from rockcheck.validation.studies.population import results
+from rockcheck.validation.studies.population.certainty import (
+    MethodScore,
+    UncertaintyAnswer,
+    leading_number,
+)
+from rockcheck.validation.studies.population.gathered import Gathered
+from rockcheck.validation.studies.population.results import UNDECIDED
+from rockcheck.validation.studies.population.statistics import (
+    FallAnswer,
+    GapAnswer,
+    IntensityAnswer,
+    QuantityAnswer,
+    RecordIntensity,
+)
+
+#: Units as readers know them, where these are other words.
+UNITS = {"alpha": "α"}
+#: Fates of a single run.
+FATE_WORDS = {
+    "at rest": "stays",
+    "moving": "does not fall, and moves on for ever",
+    "overturned left": "overturns to the left",
+    "overturned right": "overturns to the right",
+    UNDECIDED: "is undecided: nothing decides within the time allowed whether it falls",
+    "failed": "has no result: its run failed",
+}
+#: What would change the answer, by source of uncertainty.
+CHANGES = {
+    "records": "Other records",
+    "inputs": "Knowing {number} better",
+    "numerical error": "A smaller step or tolerance",
+    "model form": "Another model",
+    "law of impacts": "Another law of impacts",
+}
+#: A contribution below this changes nothing.
+NEGLIGIBLE = 1e-6
+
+
+def length(metres: float) -> str:
+    """A length: in mm below 0.1 m."""
+    return f"{1e3 * metres:.3g} mm" if metres < 0.1 else f"{metres:.3g} m"
+
+
+def percent(share: float) -> str:
+    """A share in percent: two digits, and no more than it is worth."""
+    return f"{100.0 * share:.2g} %" if share < 0.995 or share == 1.0 else ">99 %"
+
+
+def count_of(number: int, noun: str) -> str:
+    """A number with its noun: 1 record, 2 records."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[str]:
+    """Whether it falls: in how many runs, with the interval of the probability."""
+    if answer.runs == 0:
+        return [f"{name}: no run has a result."]
+    if answer.runs == 1:
+        (_, run) = gathered.all_runs[0]
+        return [f"{name} {FATE_WORDS[run.fate]}."]
+    share = answer.overturning
+    of = runs_words(answer, gathered)
+    sentences = [
+        f"{name} overturns in {share.count} of {of}, {percent(share.probability)}"
+        f" (95 %: {100.0 * share.low:.2g} to {100.0 * share.high:.2g} %)."
+    ]
+    if answer.few:
+        sentences.append(
+            f"{count_of(answer.records, 'record')} are too few for a probability: seven or more"
+            " are asked for."
+        )
+    if answer.fates[UNDECIDED]:
+        sentences.append(f"{count_of(answer.fates[UNDECIDED], 'run')} undecided.")
+    if gathered.drawn and not gathered.plan.recorded:
+        as_it_is = next(iter(gathered.as_it_is.values()), None)
+        if as_it_is is not None:
+            sentences.append(f"With its own numbers it {FATE_WORDS[as_it_is.fate]}.")
+    return sentences
+
+
+def runs_words(answer: FallAnswer, gathered: Gathered) -> str:
+    """Which runs these are: 12 records, 256 draws, 768 runs."""
+    decided = answer.overturning.of
+    if not gathered.plan.recorded:
+        return count_of(decided, "draw")
+    if not gathered.drawn:
+        return count_of(decided, "record")
+    draws = gathered.plan.draws
+    return f"{count_of(decided, 'run')}, {draws} draws under each of {answer.records} records"
+
+
+def motion_sentences(answers: Sequence[QuantityAnswer]) -> list[str]:
+    """How far it moves where it stands."""
+    words = [
+        f"{answer.label} {max(answer.values):.3g} {UNITS.get(answer.unit, answer.unit)}"
+        for answer in answers
+        if answer.values
+    ]
+    return [f"Where it stands, at most: {', '.join(words)}."] if words else ["No run stands."]
+
+
+def gap_sentences(answers: Sequence[GapAnswer]) -> list[str]:
+    """Which gaps are safe, a sentence or two a side."""
+    several = len(answers) > 1
+    return [
+        sentence
+        for answer in answers
+        for sentence in _gap_sentences(answer, f"On the {answer.side}: " if several else "")
+    ]
+
+
+def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
+    looked, reach = looked_words(answer), reach_words(answer)
+    single = answer.free_runs == 1
+    none_falls, first_falls = ("It stands", "it falls") if single else ("No run falls", "")
+    sentences = []
+    if answer.first is None:
+        span = f"{length(answer.low)} to {length(answer.high)}"
+        sentences.append(f"{where}{none_falls} at gaps of {span} ({looked}); {reach}.")
+    elif answer.safe_up_to is None:
+        falls = first_falls.capitalize() or f"{answer.first.case} falls"
+        sentences.append(
+            f"{where}{falls} already at a gap of {length(answer.low)} ({looked})"
+            f"{again_words(answer)}; {reach}."
+        )
+    else:
+        falls = first_falls or f"{answer.first.case} falls first"
+        sentences.append(
+            f"{where}{none_falls} at gaps up to {length(answer.safe_up_to)} ({looked}); above,"
+            f" {falls}{again_words(answer)}; {reach}."
+        )
+    if answer.islands:
+        sentences.append("A wider gap is not always worse: see the intervals.")
+    if answer.undecided:
+        sentences.append(f"{count_of(answer.undecided, 'run')} of the search undecided.")
+    return sentences
+
+
+def reach_words(answer: GapAnswer) -> str:
+    """How far the block reaches without the wall, and whether it then falls."""
+    words = f"without the wall it reaches {length(answer.clearance)}"
+    if answer.free_overturned and answer.free_runs == 1:
+        return f"{words} and falls"
+    if answer.free_overturned:
+        return f"{words}, and {answer.free_overturned} of {answer.free_runs} runs fall"
+    return words
+
+
+def again_words(answer: GapAnswer) -> str:
+    """From where on nothing falls, if it is so."""
+    again = safe_again_from(answer)
+    return "" if again is None else f"; none falls from {length(again)} on"
+
+
+def looked_words(answer: GapAnswer) -> str:
+    """How finely was looked."""
+    if answer.low == answer.high:
+        return "the only gap asked for"
+    words = f"looked at every {length(answer.looked_every)}"
+    if answer.finely_up_to < answer.high:
+        words += f" up to {length(answer.finely_up_to)}"
+    if answer.draws_every is not None:
+        words += f", for draws at every {length(answer.draws_every)}"
+    return words
+
+
+def safe_again_from(answer: GapAnswer) -> float | None:
+    """The gap from which no run was seen to fall, up to the largest one; None if there is none."""
+    ends = [case.intervals[-1].stands_above for case in answer.falls]
+    above = [end for end in ends if end is not None]
+    return max(above) if above and len(above) == len(ends) else None
+
+
+def intensity_sentences(answer: IntensityAnswer | None) -> list[str]:
+    """At which intensity it falls."""
+    if answer is None:
+        return ["It has no motion of the base that could be scaled by a factor."]
+    unit = f" {answer.unit}" if answer.unit else ""
+    falling = [record for record in answer.records if record.least is not None]
+    if not falling:
+        beyond = min(record.beyond for record in answer.records)
+        return [f"It does not overturn up to {answer.label} {beyond:.3g}{unit}."]
+    islands = sum(bool(record.islands) for record in answer.records)
+    if len(answer.records) == 1:
+        sentences = [_single_intensity(answer.records[0], answer.label, unit)]
+    else:
+        weakest = min(falling, key=lambda record: record.least or 0.0)
+        sentences = []
+        if answer.fit is not None:
+            sentences.append(
+                f"Median {answer.label} at which it overturns: {answer.fit.median:.3g}{unit},"
+                f" dispersion {answer.fit.dispersion:.2f},"
+                f" of {count_of(len(answer.records), 'record')}."
+            )
+        sentences.append(f"The least: {weakest.least:.3g}{unit}, {weakest.case}.")
+        if len(falling) < len(answer.records):
+            sentences.append(
+                f"{len(answer.records) - len(falling)} do not overturn it at any factor tried."
+            )
+    if islands:
+        sentences.append(
+            "It stands again at some larger intensities"
+            + (f" of {count_of(islands, 'record')}." if len(answer.records) > 1 else ".")
+        )
+    return sentences
+
+
+def _single_intensity(record: RecordIntensity, label: str, unit: str) -> str:
+    assert record.least is not None, "it falls"
+    factor = record.least / record.as_it_is
+    return f"It overturns first at {label} {record.least:.3g}{unit}, {factor:.3g} times its own."
+
+
+def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[str]:
+    """How sure that is: of the step, of ties, and what would change the answer."""
+    cases = {case: sure for case, sure in gathered.certainty.items() if case}
+    sentences = []
+    converged = [is_converged(sure) for sure in cases.values() if sure.numerical is not None]
+    if len(cases) > 1 and converged:
+        sentences.append(f"{sum(converged)} of {len(converged)} runs are numerically converged.")
+    elif converged:
+        sentences.append(
+            "Numerically converged." if converged[0] else "Not converged: no figure is sure."
+        )
+    else:
+        sentences.append("Its numerical error is not known.")
+    for case, sure in cases.items():
+        for what, when, fates in sure.ties:
+            where = f", {case}" if len(cases) > 1 else ""
+            sentences.append(
+                f"From {when:.3g} s on{where} the mechanics has more than one answer ({what}):"
+                f" {' or '.join(fates)}."
+            )
+    by_law = [sure.depends_on_law_from_s for sure in cases.values()]
+    matters = [when for when in by_law if when is not None]
+    if matters and len(cases) > 1:
+        sentences.append(f"The law of impacts matters in {len(matters)} of {len(cases)} runs.")
+    elif matters:
+        sentences.append(f"From {matters[0]:.3g} s on the law of impacts matters.")
+    largest = next(iter(answer.contributions), None)
+    known = {contribution.source for contribution in answer.contributions}
+    if largest and largest.sd > NEGLIGIBLE and "numerical error" in known:
+        number = leading_number(gathered) or "the uncertain numbers"
+        change = CHANGES[largest.source].format(number=number)
+        sentences.append(f"{change} would change the answer most.")
+    return sentences
+
+
+def is_converged(sure: results.Certainty) -> bool:
+    """Whether a run is numerically converged, and its mechanics has one answer."""
+    if sure.numerical is None or sure.ties or sure.depends_on_law_from_s is not None:
+        return False
+    return sure.numerical.converged
+
+
+def method_sentences(scores: Sequence[MethodScore], events: Sequence[str]) -> list[str]:
+    """Which hand methods let it overturn."""
+    overturning = [
+        score
+        for score, event in zip(scores, events, strict=True)
+        if event == "overturns" and score.of
+    ]
+    if not overturning:
+        return ["They say nothing of it."]
+    if overturning[0].of == 1:
+        words = [
+            f"{score.method}: {'overturns' if score.predicts else 'stays'}" for score in overturning
+        ]
+        return [f"{'; '.join(words)}."]
+    words = [f"{score.method} {score.predicts} of {score.of}" for score in overturning]
+    return [f"They let it overturn in: {', '.join(words)}."]

@@ -1,0 +1,373 @@
+"""The tasks of an assessment: small, frozen, played anywhere, kept.
+
+In: a case, that is a scene under one motion, and what is varied. Out: a record of `results`. Called
+by the runner of studies, in whatever process.
+
+Everything that is varied is played to its fate by the compiled batch, a row of numbers a run. Only
+what the page draws is played as a history.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rockcheck.ebm import EventBasedModel, fates, ties
+from rockcheck.scenes import Floats, History, Scene, Side, files, writing
+from rockcheck.validation.criteria import CRITERIA, base_of
+from rockcheck.validation.discrepancy import impact_laws
+from rockcheck.validation.execute import models
+from rockcheck.validation.execute.fate import fate_of
+from rockcheck.validation.studies.population import results, search
+from rockcheck.validation.studies.population.rows import table_of
+from rockcheck.validation.study import Task
+from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
+
+Numbers = tuple[tuple[str, float], ...]
+Settings = tuple[tuple[str, Any], ...]
+#: Usual time of a run, s, of compiled models and of others; total time of all tasks up to which
+#: separate processes are not worth while.
+COMPILED_RUN, OTHER_RUN, SHORT_STUDY = 5e-4, 1.0, 4.0
+#: Rows of a history that is kept, at the most.
+MOST_ROWS = 2000
+#: A gap (m) and a factor are known to this much: 0.1 mm, and a quarter of a percent.
+GAP_RESOLUTION, FACTOR_RESOLUTION = 1e-4, 2.5e-3
+
+
+@dataclass(frozen=True)
+class CaseTask(Task):
+    """Runs of one case by one model; `about` says which runs, in words."""
+
+    about: tuple[str, ...]
+    scene: Scene = field(repr=False)
+    model: str
+    settings: Settings = ()
+
+    @property
+    def label(self) -> str:
+        """Which runs."""
+        return ", ".join(filter(None, self.about))
+
+    def built(self) -> Any:
+        """The model that plays."""
+        return models.build(self.model, dict(self.settings))
+
+
+def effort(
+    model: str, settings: Mapping[str, Any], runs: float, study_runs: float
+) -> dict[str, Any]:
+    """For a `Task` of so many `runs`: its usual time (s), and the code that it may have to compile.
+
+    It is played in this process where all runs of the study take less time than a worker needs to
+    start.
+    """
+    seconds = COMPILED_RUN if models.family(model).compiled else OTHER_RUN
+    return {
+        "expected": runs * seconds,
+        "compiles": models.compiles(model, settings),
+        "where": "here" if study_runs * seconds < SHORT_STUDY else "worker",
+    }
+
+
+@dataclass(frozen=True)
+class ShownRun(CaseTask):
+    """The case as it is, to its fate; with its history and hand methods where it is `drawn`."""
+
+    drawn: bool = True
+
+    def play(self) -> results.Shown:
+        """The run."""
+        played = fate_of(self.built(), self.scene)
+        result = results.result_of(played.outcome, played.extremes, self.scene.block.alpha)
+        if not self.drawn:
+            return results.Shown(result=result, until_s=played.at_s)
+        base = base_of(self.scene.replace(duration=motion_end(self.scene)))
+        return results.Shown(
+            result=result,
+            until_s=played.at_s,
+            history=history_text(played.history, self.scene.duration),
+            methods=tuple(criterion.says(self.scene, base) for criterion in CRITERIA),
+        )
+
+
+def motion_end(scene: Scene) -> float:
+    """The time (s) at which the base is at rest for good, or that of the scene if that is later."""
+    return max(scene.duration, scene.excitation.quiet_after, scene.vertical.quiet_after)
+
+
+def history_text(history: History, until: float) -> str:
+    """The history up to a time (s) as CSV, in at most `MOST_ROWS` rows."""
+    rows = int(np.searchsorted(history.channels["t"], until * (1.0 + 1e-9), side="right"))
+    every = -(-rows // MOST_ROWS)
+    columns: dict[str, Any] = {
+        name: values[:rows:every] for name, values in history.channels.items()
+    }
+    return writing.columns_text(columns)
+
+
+@dataclass(frozen=True)
+class DrawTask(CaseTask):
+    """Runs of a case as it is, and of draws of its uncertain numbers, by an event-based model."""
+
+    draws: tuple[Numbers, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def scenes(self) -> list[Scene]:
+        """The scene as it is, then a scene a draw."""
+        drawn = [files.with_numbers(self.scene, dict(numbers)) for numbers in self.draws]
+        return [self.scene, *drawn]
+
+    def batch(
+        self,
+        which: NDArray[np.int64],
+        gaps: tuple[Side, Floats | float] | None = None,
+        restitution: float = 0.0,
+        *,
+        factor: Floats | float = 1.0,
+        vertical_factor: Floats | float = 1.0,
+        extremes: bool = False,
+    ) -> fates.Fates:
+        """The fates of rows of `scenes`; see `rows.table_of`."""
+        model: EventBasedModel = self.built()
+        table = table_of(
+            self.scenes,
+            which,
+            gaps=gaps,
+            restitution=restitution,
+            factor=factor,
+            vertical_factor=vertical_factor,
+        )
+        return fates.play_fates(table, model, extremes=extremes, jobs=1)
+
+
+@dataclass(frozen=True)
+class Draws(DrawTask):
+    """The case as it is and its draws, with extremes; `without` the wall of a side."""
+
+    without: Side | None = None
+
+    def play(self) -> results.Drawn:
+        """All runs at once."""
+        gaps = None if self.without is None else (self.without, np.inf)
+        played = self.batch(np.arange(len(self.scenes)), gaps, extremes=True)
+        alphas = [scene.block.alpha for scene in self.scenes]
+        return results.Drawn(results=tuple(results.results_of(played, alphas)))
+
+
+@dataclass(frozen=True)
+class GapTask(DrawTask):
+    """The search over the gap of the wall on one side.
+
+    `fine` are the gaps (m) at which the scene as it is is looked at, `coarse` those for its draws,
+    `tabulated` those at which all runs are counted with their speeds. `reach` and `free_stands` are
+    of each run without the wall: a wall beyond its reach changes nothing.
+    """
+
+    side: Side = "left"
+    restitution: float = 0.0
+    fine: tuple[float, ...] = field(default=(), repr=False)
+    coarse: tuple[float, ...] = field(default=(), repr=False)
+    tabulated: tuple[float, ...] = ()
+    reach: tuple[float, ...] = field(default=(), repr=False)
+    free_stands: tuple[bool, ...] = field(default=(), repr=False)
+
+    def play(self) -> results.GapSearch:
+        """The look, the bisection, and the table."""
+        counter = _Counter()
+
+        def stands(which: NDArray[np.int64], gaps: Floats) -> NDArray[np.bool_]:
+            struck = gaps <= np.array(self.reach)[which]
+            standing = np.array(self.free_stands)[which]
+            if struck.any():
+                played = self.batch(which[struck], (self.side, gaps[struck]), self.restitution)
+                standing[struck] = counter.standing(played)
+            return standing
+
+        as_it_is, draws = np.array([0]), np.arange(1, len(self.scenes))
+        intervals = _searched(stands, as_it_is, np.array(self.fine), GAP_RESOLUTION)
+        intervals += _searched(stands, draws, np.array(self.coarse), GAP_RESOLUTION)
+        return results.GapSearch(
+            intervals=tuple(intervals),
+            rows=self._tabulated(counter),
+            undecided=counter.undecided,
+            runs=counter.runs,
+        )
+
+    def _tabulated(self, counter: "_Counter") -> tuple[results.GapRow, ...]:
+        """The runs that count, at the tabulated gaps: the draws, or the scene as it is."""
+        runs = np.arange(1 if self.draws else 0, len(self.scenes))
+        which = np.tile(runs, len(self.tabulated))
+        gaps = np.repeat(np.array(self.tabulated), len(runs))
+        played = self.batch(which, (self.side, gaps), self.restitution, extremes=True)
+        counter.standing(played)
+        assert played.extremes is not None, "asked for"
+        strikes = played.extremes[f"wall_{self.side}_strikes"].reshape(-1, len(runs))
+        speeds = played.extremes[f"wall_{self.side}_speed"].reshape(-1, len(runs))
+        outcome = played.outcome.reshape(-1, len(runs))
+        return tuple(
+            results.GapRow(
+                gap=gap,
+                runs=len(runs),
+                overturned=int(np.isin(codes, OVERTURNED).sum()),
+                undecided=int((codes >= fates.UNDECIDED).sum()),
+                speeds=tuple(speed[struck > 0].tolist()),
+            )
+            for gap, codes, struck, speed in zip(
+                self.tabulated, outcome, strikes, speeds, strict=True
+            )
+        )
+
+
+@dataclass(frozen=True)
+class FactorTask(DrawTask):
+    """The search over a factor on the base motion, looked at in `factors` (increasing).
+
+    With `both` the vertical motion is scaled, too.
+    """
+
+    factors: tuple[float, ...] = field(default=(), repr=False)
+    both: bool = False
+
+    def play(self) -> results.FactorSearch:
+        """The look and the bisection, of the scene as it is."""
+        counter = _Counter()
+
+        def stands(which: NDArray[np.int64], factor: Floats) -> NDArray[np.bool_]:
+            upward = factor if self.both else 1.0
+            return counter.standing(self.batch(which, factor=factor, vertical_factor=upward))
+
+        grid = np.array(self.factors)
+        resolution = FACTOR_RESOLUTION * grid[:-1]
+        return results.FactorSearch(
+            intervals=tuple(_searched(stands, np.array([0]), grid, resolution)),
+            undecided=counter.undecided,
+            runs=counter.runs,
+        )
+
+
+@dataclass(frozen=True)
+class PeaksTask(DrawTask):
+    """The peak rotations of the scene as it is at factors of its base motion.
+
+    With `both` the vertical motion is scaled, too, by the size of the factor: it is not mirrored.
+    """
+
+    factors: tuple[float, ...] = field(default=(), repr=False)
+    both: bool = False
+
+    def play(self) -> results.Peaks:
+        """The peaks, alpha; infinite where the block overturned, NaN where the run failed."""
+        factor = np.array(self.factors)
+        upward = np.abs(factor) if self.both else 1.0
+        played = self.batch(np.zeros(len(factor), int), factor=factor, vertical_factor=upward)
+        peaks = played.peak / self.scene.block.alpha
+        peaks = np.where(np.isin(played.outcome, OVERTURNED), np.inf, peaks)
+        peaks = np.where(played.outcome >= fates.UNDECIDED, np.nan, peaks)
+        return results.Peaks(peaks=tuple(peaks.tolist()))
+
+
+OVERTURNED = (fates.OVERTURNED_LEFT, fates.OVERTURNED_RIGHT)
+
+
+class _Counter:
+    """Counts the runs of a search, and those that nothing decided."""
+
+    def __init__(self) -> None:
+        self.runs = self.undecided = 0
+
+    def standing(self, played: fates.Fates) -> NDArray[np.bool_]:
+        """Which runs stand for good. One that is not decided is not among them."""
+        self.runs += len(played.outcome)
+        self.undecided += int((played.outcome >= fates.UNDECIDED).sum())
+        return np.isin(played.outcome, (fates.AT_REST, fates.MOVING))
+
+
+def _searched(
+    stands: search.Stands, runs: NDArray[np.int64], grid: Floats, resolution: Floats | float
+) -> list[results.FallInterval]:
+    """The intervals of these runs in which they do not stand."""
+    if not len(runs) or not len(grid):
+        return []
+    seen = stands(np.repeat(runs, len(grid)), np.tile(grid, len(runs))).reshape(len(runs), -1)
+    found = search.falls_within(lambda which, at: stands(runs[which], at), seen, grid, resolution)
+    return [
+        results.FallInterval(
+            draw=int(run),
+            low=fall.low,
+            high=fall.high,
+            stands_below=fall.stands_below,
+            stands_above=fall.stands_above,
+        )
+        for run, falls in zip(runs, found, strict=True)
+        for fall in falls
+    ]
+
+
+@dataclass(frozen=True)
+class CertaintyTask(CaseTask):
+    """How sure the case as it is is."""
+
+    def play(self) -> results.Certainty:
+        """Plays coarser steps or a finer tolerance, the laws of impacts, and both sides of ties."""
+        landing = None
+        if self.scene.floor.restitution < 1.0:  # no event-based model plays a floor without loss
+            landing = impact_laws.parting_landing(self.scene)
+        numerical = numerical_uncertainty(self.built(), self.scene)
+        found = ties.ties_of(self.scene)
+        if numerical is not None and found:
+            numerical = undone_by(found[0], numerical)
+        return results.Certainty(
+            numerical=numerical,
+            depends_on_law_from_s=None if landing is None else landing.t,
+            ties=tuple((tie.what, tie.from_s, tie.fates) for tie in found),
+        )
+
+
+def undone_by(tie: ties.Tie, numerical: Numerical) -> Numerical:
+    """No figure is converged where the mechanics has more than one answer."""
+    reason = f"a tie: {tie.what}"
+    change = {"u_num": None, "order": None, "verdict": "not converged", "reason": reason}
+    return numerical.model_copy(
+        update={"quantities": tuple(one.model_copy(update=change) for one in numerical.quantities)}
+    )
+
+
+@dataclass(frozen=True)
+class SensitivityTask(CaseTask):
+    """Which uncertain number of a scene matters most for its peak rotation."""
+
+    given: files.UncertainScene | None = field(default=None, repr=False, compare=False)
+
+    def depends(self) -> Any:
+        """Also what is not known of the scene."""
+        assert self.given is not None, "a scene with uncertain numbers"
+        spreads = {name: spread.model_dump() for name, spread in self.given.spreads.items()}
+        return super().depends(), spreads
+
+    def play(self) -> results.Sensitivities:
+        """Sobol's indices."""
+        assert self.given is not None, "a scene with uncertain numbers"
+        return results.Sensitivities(indices=population.sensitivities(self.given, self.built()))
+
+
+def draws_of(given: files.UncertainScene, count: int) -> tuple[Numbers, ...]:
+    """Draws of the uncertain numbers of a scene, quasi-random, the same on every call.
+
+    `count` is a power of two. Raises `InputError` where a draw is no scene.
+    """
+    from scipy.stats import qmc
+
+    sobol = qmc.Sobol(len(given.spreads), seed=np.random.default_rng(1))
+    values = given.values(sobol.random(count))
+    for row in values:
+        given.at(row)
+    return tuple(tuple(zip(given.names, row, strict=True)) for row in values.tolist())
+
+
+def sequence_of(values: Sequence[float] | Floats) -> tuple[float, ...]:
+    """Numbers as a field of a task."""
+    return tuple(np.asarray(values, dtype=float).tolist())
