@@ -3,6 +3,7 @@
 A study lists tasks, plays each of them anywhere, and gathers the records into a `Finding`. The
 runner does the rest: it reads results back and keeps them, plays tasks side by side, on a cluster
 or in this process, reports progress and an estimate, and turns an error in a task into a `Failure`.
+A suite is no study: its tasks are played alike (`play_tasks`), and it makes a `Run` of them.
 """
 
 import json
@@ -91,15 +92,14 @@ def _plain(value: object) -> Any:
     return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)
 
 
-class Study(ABC):
-    """A study: `tasks`, `play` and `gather`.
+class TaskSource(ABC):
+    """What is played: tasks, and how their records are found and kept in a store.
 
-    `record` is the type of its results, a dataclass or a `Stored` model. `memory_mb` limits a
-    worker. `done` maps each task that has ended to its record, or to its `Failure`.
+    `memory_mb` limits a worker. `done` maps each task that has ended to its record, or to its
+    `Failure`.
     """
 
     name: str
-    record: Any
     memory_mb: float | None = None
     #: Kinds of results that its folder keeps; see `execute.store`.
     kinds: tuple[str, ...] = (RECORDS,)
@@ -112,6 +112,26 @@ class Study(ABC):
     def play(task: Any) -> Any:
         """The record of a task, in whatever process; by default the task plays itself."""
         return task.play()
+
+    @abstractmethod
+    def find(self, store: Store, task: Any) -> Any:
+        """The kept record of a task, None if there is none that fits."""
+
+    @abstractmethod
+    def keep(self, store: Store, task: Any, record: Any) -> None:
+        """Keep the record of a task."""
+
+    def on_end(self, task: Any, outcome: Any) -> None:  # noqa: B027 (most do nothing)
+        """Hear that a task has ended, or was read back, with its record or `Failure`."""
+
+
+class Study(TaskSource):
+    """A study: its tasks are played, and `gather` makes a finding of the records.
+
+    `record` is the type of its results, a dataclass or a `Stored` model.
+    """
+
+    record: Any
 
     @abstractmethod
     def gather(self, done: Mapping[Any, Any]) -> Finding:
@@ -150,39 +170,33 @@ def run(
     played is gathered; the exit code is then `INTERRUPTED`, unless the finding has another. Raises
     `InputError` where the folder cannot be used or no cluster answers.
     """
-    provenance.code_digest.cache_clear()
-    if scheduler is not None and not pool.local_workers(scheduler):
-        with pool.connected(scheduler):  # raises where none answers
-            pass
-    jobs = os.cpu_count() or 1 if jobs is None else jobs
     began = time.monotonic()
-    going = _Run(study, folder, jobs, scheduler, force, on_progress)
-    ended = 0
-    with going.stack, progress.within(pool.THREADS, jobs):
-        try:
-            going.play(began + 60.0 * minutes if minutes else math.inf)
-        except KeyboardInterrupt:
-            ended = progress.INTERRUPTED
-    complete = not ended and len(going.done) == len(going.known)
-    if minutes and not (ended or complete):
-        progress.announce(f"{study.name}: its {minutes:g} minutes are over")
-    # In the order of the tasks: a finding must not depend on which ended first.
-    found = study.gather({task: going.done[task] for task in going.known if task in going.done})
-    going.store.prune()
+    played = play_tasks(
+        study,
+        folder,
+        jobs=jobs,
+        scheduler=scheduler,
+        force=force,
+        minutes=minutes,
+        on_progress=on_progress,
+    )
+    finding = study.gather(played.done)
+    Store(folder, study.kinds).prune()
+    failures = {
+        task.label: outcome.reason
+        for task, outcome in played.done.items()
+        if isinstance(outcome, pool.Failure)
+    }
+    interrupted = progress.INTERRUPTED if played.interrupted else 0
     return replace(
-        found,
-        failures={
-            task.label: one.reason
-            for task, one in going.done.items()
-            if isinstance(one, pool.Failure)
-        }
-        | {**found.failures},
-        verdict=found.verdict if complete or found.verdict != "pass" else "incomplete",
-        exit_code=found.exit_code or ended,
-        complete=complete and found.complete,
+        finding,
+        failures={**failures, **finding.failures},
+        verdict=finding.verdict if played.complete or finding.verdict != "pass" else "incomplete",
+        exit_code=finding.exit_code or interrupted,
+        complete=played.complete and finding.complete,
         made=Made(
             created=datetime.now(UTC).isoformat(timespec="seconds"),
-            jobs=jobs,
+            jobs=played.jobs,
             wall_seconds=time.monotonic() - began,
             versions=provenance.versions(),
             hardware=provenance.hardware(),
@@ -190,19 +204,65 @@ def run(
     )
 
 
+@dataclass(frozen=True)
+class PlayedTasks:
+    """The tasks that have ended, in the order of their source, with their records or failures.
+
+    `complete` is False where some were left out, or it was `interrupted`; `jobs` is the number of
+    processes.
+    """
+
+    done: Mapping[Any, Any]
+    complete: bool
+    interrupted: bool
+    jobs: int
+
+
+def play_tasks(
+    source: TaskSource,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    force: bool = False,
+    minutes: float | None = None,
+    on_progress: progress.OnProgress = progress.unheard,
+) -> PlayedTasks:
+    """Play what is not up to date in `folder`, and keep each record as it comes; see `run`."""
+    provenance.code_digest.cache_clear()
+    if scheduler is not None and not pool.local_workers(scheduler):
+        with pool.connected(scheduler):  # raises where none answers
+            pass
+    jobs = os.cpu_count() or 1 if jobs is None else jobs
+    until = time.monotonic() + 60.0 * minutes if minutes else math.inf
+    going = _Run(source, folder, jobs, scheduler, force, on_progress)
+    interrupted = False
+    with going.stack, progress.within(pool.THREADS, jobs):
+        try:
+            going.play(until)
+        except KeyboardInterrupt:
+            interrupted = True
+    complete = not interrupted and len(going.done) == len(going.known)
+    if minutes and not (interrupted or complete):
+        progress.announce(f"{source.name}: its {minutes:g} minutes are over")
+    # In the order of the tasks: a finding must not depend on which ended first.
+    done = {task: going.done[task] for task in going.known if task in going.done}
+    return PlayedTasks(done, complete, interrupted, jobs)
+
+
 class _Run:
     def __init__(
         self,
-        study: Study,
+        source: TaskSource,
         folder: Path,
         jobs: int,
         scheduler: str | None,
         force: bool,
         heard: progress.OnProgress,
     ) -> None:
-        self.study, self.folder, self.jobs, self.scheduler = study, folder, jobs, scheduler
+        self.source, self.folder, self.jobs, self.scheduler = source, folder, jobs, scheduler
         self.force, self.heard = force, heard
-        self.store = Store(folder, study.kinds)
+        self.store = Store(folder, source.kinds)
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
         self.stack = ExitStack()
@@ -214,9 +274,9 @@ class _Run:
     @cached_property
     def _workers(self) -> pool.Pool:
         return self.stack.enter_context(
-            pool.Pool(self.jobs, self.study.memory_mb)
+            pool.Pool(self.jobs, self.source.memory_mb)
             if self.scheduler is None
-            else pool.Cluster(self.scheduler, self.study.memory_mb)
+            else pool.Cluster(self.scheduler, self.source.memory_mb)
         )
 
     def play(self, until: float) -> None:
@@ -228,11 +288,15 @@ class _Run:
                 if task.where in self.elsewhere:
                     calls.append(
                         pool.Call(
-                            pool.guarded, (self.study.play, task), task.seconds, task.compiles, task
+                            pool.guarded,
+                            (self.source.play, task),
+                            task.seconds,
+                            task.compiles,
+                            task,
                         )
                     )
                 elif time.monotonic() < until:
-                    self._end(task, pool.guarded(self.study.play, task))
+                    self._end(task, pool.guarded(self.source.play, task))
             if calls:
                 ends = self._workers.run(calls, until=until, on_playing=self._hear_playing)
                 for ended in ends:
@@ -242,13 +306,16 @@ class _Run:
 
     def _next(self) -> list[Task]:
         while new := [
-            task for task in dict.fromkeys(self.study.tasks(self.done)) if task not in self.known
+            task for task in dict.fromkeys(self.source.tasks(self.done)) if task not in self.known
         ]:
             self.known.update(dict.fromkeys(new))
             for task in new:
-                if not self.force and (record := self.study.find(self.store, task)) is not None:
+                if not self.force and (record := self.source.find(self.store, task)) is not None:
                     self.done[task] = record
             self.heard(len(self.done), len(self.known), f"{len(self.done)} up to date")
+            for task in new:
+                if task in self.done:
+                    self.source.on_end(task, self.done[task])
             if waiting := [task for task in new if task not in self.done]:
                 return waiting
         return []
@@ -267,7 +334,8 @@ class _Run:
                 traceback.encode(errors="backslashreplace"),
             )
         if not isinstance(result, pool.Failure):
-            self.study.keep(self.store, task, result)
+            self.source.keep(self.store, task, result)
+        self.source.on_end(task, result)
         self.heard(len(self.done), len(self.known), task.label)
 
     def _estimate(self, waiting: Sequence[Task]) -> None:
@@ -276,6 +344,6 @@ class _Run:
         )
         if seconds >= LONG:
             progress.announce(
-                f"{self.study.name}: {len(waiting)} tasks, about "
+                f"{self.source.name}: {len(waiting)} tasks, about "
                 + (f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min")
             )

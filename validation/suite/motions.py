@@ -37,7 +37,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -279,6 +279,11 @@ class Ensemble(Frozen):
         if self.pulse is not None and self.noise is not None:
             raise errors.InputError("cannot be given together with pulse", "noise")
         return self
+
+    def batches(self) -> Iterator[range]:
+        """The numbers of the scenes of each batch."""
+        for first in range(0, self.count, self.batch):
+            yield range(first, min(first + self.batch, self.count))
 
     def drawn(self, base: Scene, number: int) -> Scene:
         """Scene number 0, 1, ... of the ensemble; it does not depend on `count`."""

@@ -62,6 +62,7 @@ FAILS: Mapping[Strict, tuple[CheckVerdict, ...]] = {
     True: ("fail", "changed"),
     "both": ("fail", "changed", "better"),
 }
+Status = Literal["done", "failed", "absent", "unavailable"]
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
 SEVERITY = tuple(VERDICTS)
@@ -69,8 +70,8 @@ SEVERITY = tuple(VERDICTS)
 #: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
 #: closed form. "absolute": a figure of the cell itself against its expected value.
 Kind = Literal["numerical", "model form", "measured", "exact", "absolute"]
-#: What is said of a measure.
-Said = Literal["name", "label", "unit", "formula", "source"]
+#: What a run tells of a measure.
+MeasureField = Literal["name", "label", "unit", "formula", "source"]
 
 
 class Check(Stored):
@@ -145,7 +146,7 @@ class Cell(Stored):
     model: str
     settings: dict[str, Any] = Field(default_factory=dict)
     key: str = ""
-    status: Literal["done", "failed", "absent", "unavailable"]
+    status: Status
     reason: str = ""
     traceback: str = ""
     unexpected: bool = False
@@ -253,7 +254,7 @@ class Run(Stored):
     cells: tuple[Cell, ...]
     faults: tuple[str, ...] = ()
     #: How each measure is defined, for the pages: see `validation.discrepancy.measures`.
-    measures: tuple[Annotated[dict[Said, str], Field(min_length=5)], ...] = ()
+    measures: tuple[Annotated[dict[MeasureField, str], Field(min_length=5)], ...] = ()
     versions: dict[str, str] = Field(default_factory=dict)
     hardware: dict[str, str] = Field(default_factory=dict)
     wall_seconds: float = 0.0

@@ -77,7 +77,7 @@ from rockcheck.validation.suite import motions, results
 from rockcheck.validation.suite.tolerances import (
     HORIZON,
     OWN_FIGURES,
-    Place,
+    ToleranceKey,
     Tolerances,
     accepted_in,
     measure_of,
@@ -152,7 +152,7 @@ class Suite:
     name: str
     path: Path
     #: The keys of its file, such as the limits, and what it requires.
-    given: SuiteFile = field(repr=False)
+    config: SuiteFile = field(repr=False)
     scenes: Mapping[str, Scene]
     models: Mapping[str, Work]
     tolerances: Tolerances = field(repr=False)
@@ -170,26 +170,26 @@ class Suite:
     judged: bool = True
 
     @cached_property
-    def _judged(self) -> dict[tuple[str, str], list[Place]]:
-        found: dict[tuple[str, str], list[Place]] = {}
+    def _judged(self) -> dict[tuple[str, str], list[ToleranceKey]]:
+        found: dict[tuple[str, str], list[ToleranceKey]] = {}
         for place in self.tolerances:
             found.setdefault((place.scene, place.model), []).append(place)
         return found
 
     @property
-    def parts(self) -> tuple[Suite, ...]:
+    def members(self) -> tuple[Suite, ...]:
         """The suites that it joins, or the suite itself."""
         return self.included or (self,)
 
     @property
     def owners(self) -> dict[str, Suite]:
         """The part that each scene or ensemble comes from."""
-        return {place: part for part in self.parts for place in (*part.scenes, *part.ensembles)}
+        return {place: part for part in self.members for place in (*part.scenes, *part.ensembles)}
 
     def cells(self) -> Iterator[tuple[Scene, Work, motions.Ensemble | None]]:
         """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
         for kind in ("scenes", "ensembles"):
-            for part in self.parts:
+            for part in self.members:
                 for name, model in _played(getattr(part, kind), part.models):
                     ensemble, scene = part.ensembles.get(name) or (None, part.scenes[name])
                     yield scene, part.models[model], ensemble
@@ -202,7 +202,7 @@ class Suite:
             ("model", model, [label for _, label in _played([scene], own.models)]),
         ):
             errors.one_of(f"{what} of the suite", name, known)
-        yardstick = own.given.reference, OWN_FIGURES  # if it is as expected itself
+        yardstick = own.config.reference, OWN_FIGURES  # if it is as expected itself
         tolerances = {
             place: line
             for place, line in own.tolerances.items()
@@ -217,16 +217,16 @@ class Suite:
             tolerances=tolerances,
         )
 
-    def required(self, place: str, model: str) -> dict[Place, results.Kind]:
+    def required(self, place: str, model: str) -> dict[ToleranceKey, results.Kind]:
         """The checks of a cell, with their kinds: those required or given a tolerance.
 
         `place` is a scene or an ensemble of this very suite, not of one that it joins.
         """
-        given, require = self.given, self.given.require
+        given, require = self.config, self.config.require
         if place in self.ensembles:
             require = Require(difference=require.ensemble)
         places = [
-            Place(place, model, against, text)
+            ToleranceKey(place, model, against, text)
             for against, texts in (
                 (OWN_FIGURES, require.figures),
                 (given.reference, require.difference),
@@ -237,18 +237,18 @@ class Suite:
         ]
         return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
 
-    def yardsticks(self, checks: Iterable[Place]) -> list[str]:
+    def yardsticks(self, checks: Iterable[ToleranceKey]) -> list[str]:
         """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
-        usual = OWN_FIGURES, self.given.reference, self.given.model_form
+        usual = OWN_FIGURES, self.config.reference, self.config.model_form
         return list(dict.fromkeys((*usual, *(place.against for place in checks))))
 
-    def kind(self, place: Place) -> results.Kind:
+    def kind(self, place: ToleranceKey) -> results.Kind:
         """The kind of a check.
 
         Where the block may fly, a model that cannot differs in form from one that can.
         """
         if place.against == OWN_FIGURES:
-            return "exact" if measure_of(place.what).exact else "absolute"
+            return "exact" if measure_of(place.windowed).exact else "absolute"
         families = [self.models[label].family for label in (place.model, place.against)]
         if "measured" in families:
             return "measured"
@@ -332,7 +332,7 @@ def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[st
     return Suite(
         name=errors.inert(path.stem),
         path=path,
-        given=given,
+        config=given,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
@@ -397,7 +397,7 @@ def accept(
             nested=part.tolerances_path == part.path,
             write=write,
         )
-        for part in suite.parts
+        for part in suite.members
     ]
     changes, refused = (
         list(itertools.chain.from_iterable(lines)) for lines in zip(*found, strict=True)
@@ -485,7 +485,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         for part in load_suite(
             path.parent / name if Path(name).suffix.lower() == ".toml" else name,
             allow_code=allow_code,
-        ).parts
+        ).members
     ]
     first = included[0]
     names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
@@ -503,7 +503,7 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
         ),
         *(
             (
-                one.given.reference != first.given.reference,
+                one.config.reference != first.config.reference,
                 f"{one.name} and {first.name} have different references",
                 "include",
             )
@@ -526,10 +526,10 @@ def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
     return Suite(
         name=errors.inert(path.stem),
         path=path,
-        given=given.model_copy(
+        config=given.model_copy(
             update={
-                "reference": first.given.reference,
-                "model_form": next(filter(None, (s.given.model_form for s in included)), ""),
+                "reference": first.config.reference,
+                "model_form": next(filter(None, (s.config.model_form for s in included)), ""),
             }
         ),
         tolerances_path=path,

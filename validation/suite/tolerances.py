@@ -99,19 +99,29 @@ class Tolerance(Frozen):
     why: str = ""
 
 
-class Place(NamedTuple):
-    """The place of a tolerance: scene, model, reference or "figures", and "measure@window"."""
+class ToleranceKey(NamedTuple):
+    """What a tolerance is for: scene, model, reference or "figures", and "measure@window"."""
 
     scene: str
     model: str
     against: str
-    what: str
+    windowed: str
+
+    @property
+    def measure(self) -> str:
+        """The name of the measure."""
+        return self.windowed.partition("@")[0]
+
+    @property
+    def window(self) -> str:
+        """The window, such as "8s"; empty for the whole time."""
+        return self.windowed.partition("@")[2]
 
     def __str__(self) -> str:
-        return f"[{self.scene}.{self.model}.{self.against}] {self.what}"
+        return f"[{self.scene}.{self.model}.{self.against}] {self.windowed}"
 
 
-Tolerances = dict[Place, Tolerance]
+Tolerances = dict[ToleranceKey, Tolerance]
 
 
 def parse_tolerances(
@@ -125,7 +135,7 @@ def parse_tolerances(
     found: Tolerances = {}
     for place, line in _spread(dict(_lines(tables)), list(cells)):
         try:
-            measure = measure_of(place.what)
+            measure = measure_of(place.windowed)
             tolerance = Tolerance(**line)
             if (measure.name in measures.FIGURES) != (place.against == OWN_FIGURES):
                 raise InputError(
@@ -140,8 +150,8 @@ def parse_tolerances(
 
 
 def _spread(
-    lines: Mapping[Place, Mapping[str, Any]], cells: Sequence[tuple[str, str]]
-) -> Iterator[tuple[Place, Mapping[str, Any]]]:
+    lines: Mapping[ToleranceKey, Mapping[str, Any]], cells: Sequence[tuple[str, str]]
+) -> Iterator[tuple[ToleranceKey, Mapping[str, Any]]]:
     """The lines, with those for every scene repeated for each cell of the model.
 
     A scene's own line takes precedence; what it leaves out comes from the line for every scene.
@@ -159,17 +169,23 @@ def _spread(
         yield from ((one, line) for one in every if one not in own)
 
 
-def _lines(tables: Mapping[str, Any], *above: str) -> Iterator[tuple[Place, Mapping[str, Any]]]:
+def _lines(
+    tables: Mapping[str, Any], *above: str
+) -> Iterator[tuple[ToleranceKey, Mapping[str, Any]]]:
+    """The lines of nested tables; `above` are the names of the tables that these lie in."""
     for name, inner in tables.items():
         path = (*above, str(name))
-        whole = len(path) == len(Place._fields)
+        is_line = len(path) == len(ToleranceKey._fields)
         if not isinstance(inner, Mapping):
-            raise InputError(
-                f"{printable(Place(*path))}: must be a table {{ expected, limit, drift, why }}"
-                if whole
-                else f"{printable('.'.join(path))}: must be tables [scene.model.reference]"
-            )
-        yield from [(Place(*path), inner)] if whole else _lines(inner, *path)
+            if is_line:
+                key = printable(ToleranceKey(*path))
+                raise InputError(f"{key}: must be a table {{ expected, limit, drift, why }}")
+            table = printable(".".join(path))
+            raise InputError(f"{table}: must be tables [scene.model.reference]")
+        if is_line:
+            yield ToleranceKey(*path), inner
+        else:
+            yield from _lines(inner, *path)
 
 
 def floor_of(measure: figures.Measure, scene: Scene, numerical: Numerical | None) -> float:
@@ -334,7 +350,7 @@ def accepted_in(
     try:
         for cell, check in checks:
             against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
-            where = Place(cell.scene, cell.model, against, check.figure.windowed)
+            where = ToleranceKey(cell.scene, cell.model, against, check.figure.windowed)
             old = {name: getattr(check, name) for name in Tolerance.model_fields}
             if isinstance(line, str):
                 refused.append(f"{where}: {line}")

@@ -22,7 +22,7 @@ from rockcheck import (
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import experience, files
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import across, results, runner, suites, tables
+from rockcheck.validation.suite import across, explain, results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.uncertainty import numerical, population
 
@@ -310,7 +310,7 @@ def test_two_outcomes_are_explained_by_inputs_that_decide_them(inputs, ends, ver
         for end, t in ends
     )
     assert [
-        one.verdict for one in runner.explanations(BOOKCASE, own, [other], {"ebm": {}}, inputs)
+        one.verdict for one in explain.explanations(BOOKCASE, own, [other], {"ebm": {}}, inputs)
     ] == verdicts
 
 

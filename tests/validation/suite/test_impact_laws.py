@@ -7,7 +7,7 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite import results, runner, suites, tables
+from rockcheck.validation.suite import comparing, results, scene_results, suites, tables
 from rockcheck.validation.suite.runner import run_suite
 
 FLAT = "moreau or leading-first"
@@ -133,15 +133,15 @@ def test_the_summary_names_the_laws_and_nothing_depends_on_them(run, suite_file,
 
 def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file, tmp_path, monkeypatch):
     scene, store = suites.load_suite(suite_file).scenes["of the law"], Store(tmp_path)
-    first = runner.landing_of(store, scene)
+    first = scene_results.landing_of(store, scene)
     (kept,) = (tmp_path / COMPARISONS).iterdir()
     with monkeypatch.context() as patched:
         patched.setattr(
             "rockcheck.validation.discrepancy.impact_laws.parting_landing", lambda scene: None
         )
-        assert runner.landing_of(store, scene) == first
+        assert scene_results.landing_of(store, scene) == first
     store.put(COMPARISONS, kept.stem, {"kept": {"t": 1.0}})
-    assert runner.landing_of(store, scene) == first
+    assert scene_results.landing_of(store, scene) == first
 
 
 @pytest.mark.parametrize(
@@ -156,14 +156,14 @@ def test_a_landing_is_kept_and_what_was_kept_is_not_trusted(suite_file, tmp_path
 def test_only_a_reference_with_a_law_to_choose_has_another(suite_file, name, others):
     suite = suites.load_suite(suite_file)
     model = suite.models.get(name, models.Work(label="paper", family="ebm", settings={}))
-    assert list(runner.under_other_laws(suite.scenes["of the law"], model)) == others
+    assert list(comparing.histories_under_other_laws(suite.scenes["of the law"], model)) == others
 
 
 def test_the_reference_itself_counts_where_it_is_nearer(suite_file):
     scene = suites.load_suite(suite_file).scenes["of the law"]
-    one, other = (
-        EventBasedModel(pivot="unilateral", impacts=law).simulate(scene)
-        for law in ("moreau", "floor-first")
-    )
-    found = runner.by_any(one, one, {"floor-first": other}, scene, ["outcome_agrees", "peak_ratio"])
-    assert [(figure.value, gap) for figure, gap, _ in found] == [(1.0, ""), (1.0, "")]
+    usual = EventBasedModel(pivot="unilateral", impacts="moreau").simulate(scene)
+    other = EventBasedModel(pivot="unilateral", impacts="floor-first").simulate(scene)
+    reference = comparing.Reference(usual, {"floor-first": other})
+    compared = comparing.figures_against(usual, reference, scene, ["outcome_agrees", "peak_ratio"])
+    assert [one.figure.value for one in compared] == [1.0, 1.0]
+    assert [one.gap for one in compared] == ["", ""]

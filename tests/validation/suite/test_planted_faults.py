@@ -41,7 +41,7 @@ def with_faults(name: str, faults: Sequence[str], places: Sequence[str]) -> suit
     """A shipped suite with faulty models in the places of shipped ones, beside the references."""
     shipped = suites.load_suite(name)
     # what is not judged against the paper's model need not be compared with it either
-    model_form = shipped.given.model_form if shipped.given.require.model_form else ""
+    model_form = shipped.config.model_form if shipped.config.require.model_form else ""
     references = [REFERENCE, *filter(None, [model_form])]
     models = {reference: shipped.models[reference] for reference in references}
     tolerances = {at: line for at, line in shipped.tolerances.items() if at.model in references}
@@ -57,8 +57,8 @@ def with_faults(name: str, faults: Sequence[str], places: Sequence[str]) -> suit
                 search_path=(str(Path(planted.__file__).parent),),
             )
     # the numerical error of a fault takes three more runs, and nobody reads it
-    given = shipped.given.model_copy(update={"uncertainty": False, "model_form": model_form})
-    return replace(shipped, given=given, models=models, tolerances=tolerances)
+    config = shipped.config.model_copy(update={"uncertainty": False, "model_form": model_form})
+    return replace(shipped, config=config, models=models, tolerances=tolerances)
 
 
 def out_of_tolerance(

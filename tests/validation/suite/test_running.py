@@ -17,7 +17,8 @@ import pytest
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite import results, suites, tables
-from rockcheck.validation.suite.runner import SuiteStudy, run_suite
+from rockcheck.validation.suite.playing import SuiteTasks
+from rockcheck.validation.suite.runner import run_suite
 
 OWN_NAMES = ("Still", "Segfault", "Hang", "Hog", "Fails", "Bug", "NotFinite")
 OWN = [f"faulty:{name}" for name in OWN_NAMES]
@@ -305,8 +306,8 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
     longer."""
-    cells = SuiteStudy(suites.load_suite("paper"), tmp_path).tasks({})
-    begun = [(cell.variant.label, cell.place) for cell in cells]
+    cells = SuiteTasks(suites.load_suite("paper"), tmp_path).tasks({})
+    begun = [(cell.variant.label, cell.scene_name) for cell in cells]
     assert begun[:3] == [(model, "fig4a") for model in ("mujoco", "ebm-unilateral", "cm")]
     assert {model for model, _ in begun[3:10]} == {"mujoco", "pybullet"}
     assert [scene[:4] for _, scene in begun[3:10]] == 4 * ["fig5"] + 3 * ["fig4"]
@@ -329,5 +330,6 @@ def test_time_to_compile_does_not_count_for_a_cells_limit(
 ):
     """Of the cells whose model compiles the same code the first has `COMPILING` s more."""
     path = write_suite(tmp_path, {"a": f'model = "{model}"\n{settings}'})
-    cells = SuiteStudy(suites.load_suite(path, allow_code=OWN), tmp_path / "out").items
+    suite = suites.load_suite(path, allow_code=OWN)
+    cells = SuiteTasks(suite, tmp_path / "out").plan.tasks()
     assert {cell.compiles for cell in cells if cell.variant.label == "a"} == {compiled}

@@ -27,7 +27,7 @@ def test_scenes_by_name_by_table_and_by_file_and_models_by_labels_of_their_own(s
     ]
     middle = written("middle.toml", 'include = ["smoke"]\n').name
     joined = suite(f'include = ["{middle}"]\n')  # those that it joins are its own parts
-    assert ([part.name for part in joined.parts], found.scenes["shelf"].block.half_width) == (
+    assert ([member.name for member in joined.members], found.scenes["shelf"].block.half_width) == (
         ["smoke"],
         0.1,
     )

@@ -92,10 +92,12 @@ def accepted(written):
             scenes={"s": {}},
             cells=(results.Cell(scene="s", model="m", status="done", checks=checks),),
         )
-        part = SimpleNamespace(
+        member = SimpleNamespace(
             path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
         )
-        return *suites.accept(SimpleNamespace(parts=[part]), run, reason), kept.read_text("utf-8")
+        return *suites.accept(SimpleNamespace(members=[member]), run, reason), kept.read_text(
+            "utf-8"
+        )
 
     return accept_of
 
