@@ -3,7 +3,7 @@
 import re
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import Any
 from unicodedata import category
 
@@ -14,10 +14,12 @@ class InputError(ValueError):
     """Unusable input; the message is one line: where, what, and what is allowed.
 
     `key` is the dotted path of the offending setting within its object, empty if there is none.
+    `file` is the file that the message begins with, None if it names none yet.
     """
 
-    def __init__(self, message: str, key: str = "") -> None:
+    def __init__(self, message: str, key: str = "", *, file: Path | None = None) -> None:
         self.key = key
+        self.file = file
         self.reason = message
         super().__init__(f"{key}: {message}" if key else message)
 

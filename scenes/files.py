@@ -70,7 +70,7 @@ def load_uncertain_scene(source: str | Path) -> UncertainScene:
     try:
         return uncertain_scene_from(data, folder=path.parent, default_name=path.stem)
     except InputError as error:
-        raise InputError(f"{printable(path)}: {error}") from None
+        raise InputError(f"{printable(path)}: {error}", file=path) from None
 
 
 def uncertain_scene_from(
@@ -110,11 +110,13 @@ def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file, or an `InputError` that names file and line."""
     text = read_text(path, MOST_BYTES)
     if _DEEP_KEY.search(text):
-        raise InputError(f"{printable(path)}: a key of more than 50 parts")
+        raise InputError(f"{printable(path)}: a key of more than 50 parts", file=path)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # an integer may have too many digits to read
-        raise InputError(f"{printable(path)}: not valid TOML: {printable(error)}") from None
+        raise InputError(
+            f"{printable(path)}: not valid TOML: {printable(error)}", file=path
+        ) from None
 
 
 def tables_of(scene: Scene) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, cast
 
-from rockcheck.scenes.errors import InputError, inert, printable, refuse
+from rockcheck.scenes.errors import InputError, inert, printable
 from rockcheck.scenes.writing import mapped
 
 if TYPE_CHECKING:
@@ -49,24 +49,20 @@ def open_regular(path: Path, most: int = MOST_BYTES) -> Iterator[IO[bytes]]:
     shown = printable(path)
     try:
         if not stat.S_ISREG(os.stat(path).st_mode):
-            raise InputError(f"{shown}: cannot be read: not a file")
+            raise InputError(f"{shown}: cannot be read: not a file", file=path)
         at_once = getattr(os, "O_NONBLOCK", 0)
         with open(path, "rb", opener=lambda name, how: os.open(name, how | at_once)) as stream:
             about = os.fstat(stream.fileno())
-            refuse(
-                (
-                    not stat.S_ISREG(about.st_mode),
-                    f"{shown}: cannot be read: not a file",
-                    "",
-                ),
-                (about.st_size > most, f"{shown}: larger than {most} bytes", ""),
-            )
+            if not stat.S_ISREG(about.st_mode):
+                raise InputError(f"{shown}: cannot be read: not a file", file=path)
+            if about.st_size > most:
+                raise InputError(f"{shown}: larger than {most} bytes", file=path)
             yield stream
     except InputError:
         raise
     except (OSError, ValueError) as error:  # a path that holds a null character is a ValueError
         raise InputError(
-            f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}"
+            f"{shown}: cannot be read: {getattr(error, 'strerror', None) or error}", file=path
         ) from None
 
 
@@ -75,7 +71,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
     with open_regular(path, most) as stream:
         content = stream.read(most + 1)
     if len(content) > most:  # it has grown
-        raise InputError(f"{printable(path)}: larger than {most} bytes")
+        raise InputError(f"{printable(path)}: larger than {most} bytes", file=path)
     return content
 
 
@@ -116,7 +112,7 @@ def read_text(path: Path, most: int = MOST_BYTES, *, latin: bool = False) -> str
         )
     except UnicodeDecodeError:
         if not latin or _CONTROLS.search(content):
-            raise InputError(f"{printable(path)}: not a text file") from None
+            raise InputError(f"{printable(path)}: not a text file", file=path) from None
         text = content.decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")
 

@@ -100,9 +100,9 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
         names = [one.component for one in found]
         return [found[place_of("component", asked.component, names, _listed(found))]]
     except Contradiction as error:
-        raise Contradiction(_placed(path, error), error.option) from None
+        raise Contradiction(_placed(path, error), error.option, file=path) from None
     except InputError as error:
-        raise InputError(_placed(path, error)) from None
+        raise InputError(_placed(path, error), file=path) from None
 
 
 def _placed(path: Path, error: InputError) -> str:
@@ -140,7 +140,8 @@ def read_record(path: Path, reading: Reading | None = None) -> Recording:
     if len(found) > 1:
         raise InputError(
             f"{printable(path)}: {len(found)} components, {_listed(found)}; give one:"
-            f" {option('component', 1)}"
+            f" {option('component', 1)}",
+            file=path,
         )
     return found[0]
 

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, StringConstraints, model_validator
@@ -112,9 +113,11 @@ class Recording:
 class Contradiction(InputError):
     """An option that contradicts what the file states; `option` is its name."""
 
-    def __init__(self, message: str, option: str, key: str = "") -> None:
+    def __init__(
+        self, message: str, option: str, key: str = "", *, file: Path | None = None
+    ) -> None:
         self.option = option
-        super().__init__(message, key)
+        super().__init__(message, key, file=file)
 
 
 def fault(said: str, line: int | None = None) -> InputError:

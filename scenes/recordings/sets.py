@@ -61,7 +61,7 @@ def files_of(words: Sequence[str | Path], folder: Path = Path()) -> dict[Path, b
         )
         inside = sorted(one for one in listed if one.is_file() and not one.name.startswith("."))
         if not inside:
-            raise InputError(f"{printable(path)}: {none}")
+            raise InputError(f"{printable(path)}: {none}", file=path)
         found |= {one: found.get(one, False) for one in inside}
     return found
 

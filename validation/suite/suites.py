@@ -50,13 +50,12 @@ table `[tolerances]` in the file or a file `<suite>.tolerances.toml` beside it. 
 from __future__ import annotations
 
 import itertools
-import os
 from collections import Counter
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import Field
 
@@ -83,6 +82,9 @@ from rockcheck.validation.suite.tolerances import (
     measure_of,
     parse_tolerances,
 )
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
 
 #: Time limit (s) of a simulation without a suite.
 UNJUDGED_SECONDS = 900.0
@@ -170,11 +172,11 @@ class Suite:
     judged: bool = True
 
     @cached_property
-    def _judged(self) -> dict[tuple[str, str], list[ToleranceKey]]:
-        found: dict[tuple[str, str], list[ToleranceKey]] = {}
-        for place in self.tolerances:
-            found.setdefault((place.scene, place.model), []).append(place)
-        return found
+    def _keys_by_cell(self) -> dict[tuple[str, str], list[ToleranceKey]]:
+        keys: dict[tuple[str, str], list[ToleranceKey]] = {}
+        for key in self.tolerances:
+            keys.setdefault((key.scene, key.model), []).append(key)
+        return keys
 
     @property
     def members(self) -> tuple[Suite, ...]:
@@ -183,80 +185,81 @@ class Suite:
 
     @property
     def owners(self) -> dict[str, Suite]:
-        """The part that each scene or ensemble comes from."""
-        return {place: part for part in self.members for place in (*part.scenes, *part.ensembles)}
+        """The member that each scene or ensemble comes from."""
+        return {
+            name: member for member in self.members for name in (*member.scenes, *member.ensembles)
+        }
 
     def cells(self) -> Iterator[tuple[Scene, Work, motions.Ensemble | None]]:
         """All cells, scene by scene; then the ensembles with the scene that they are drawn from."""
-        for kind in ("scenes", "ensembles"):
-            for part in self.members:
-                for name, model in _played(getattr(part, kind), part.models):
-                    ensemble, scene = part.ensembles.get(name) or (None, part.scenes[name])
-                    yield scene, part.models[model], ensemble
+        for member in self.members:
+            for name, model in _cells(member.scenes, member.models):
+                yield member.scenes[name], member.models[model], None
+        for member in self.members:
+            for name, model in _cells(member.ensembles, member.models):
+                ensemble, scene = member.ensembles[name]
+                yield scene, member.models[model], ensemble
 
     def only(self, scene: str, model: str) -> Suite:
         """The suite with one cell, and the references that it is compared with."""
-        own = self.owners.get(scene, self)
-        for what, name, known in (
-            ("scene", scene, self.scenes),
-            ("model", model, [label for _, label in _played([scene], own.models)]),
-        ):
-            errors.one_of(f"{what} of the suite", name, known)
-        yardstick = own.config.reference, OWN_FIGURES  # if it is as expected itself
+        owner = self.owners.get(scene, self)
+        errors.one_of("scene of the suite", scene, self.scenes)
+        labels = [label for _, label in _cells([scene], owner.models)]
+        errors.one_of("model of the suite", model, labels)
+        # the reference's own figures count where it is as expected itself
+        of_reference = (owner.config.reference, OWN_FIGURES)
         tolerances = {
-            place: line
-            for place, line in own.tolerances.items()
-            if place.scene == scene and (place.model == model or place[1:3] == yardstick)
+            key: line
+            for key, line in owner.tolerances.items()
+            if key.scene == scene
+            and (key.model == model or (key.model, key.against) == of_reference)
         }
-        needed = {model, *own.yardsticks(tolerances)}
+        needed = {model, *owner.yardsticks(tolerances)}
         return replace(
-            own,
-            scenes={scene: own.scenes[scene]},
+            owner,
+            scenes={scene: owner.scenes[scene]},
             ensembles={},
-            models={label: variant for label, variant in own.models.items() if label in needed},
+            models={label: variant for label, variant in owner.models.items() if label in needed},
             tolerances=tolerances,
         )
 
-    def required(self, place: str, model: str) -> dict[ToleranceKey, results.Kind]:
+    def required(self, name: str, model: str) -> dict[ToleranceKey, results.Kind]:
         """The checks of a cell, with their kinds: those required or given a tolerance.
 
-        `place` is a scene or an ensemble of this very suite, not of one that it joins.
+        `name` is that of a scene or an ensemble of this very suite, not of one that it joins.
         """
-        given, require = self.config, self.config.require
-        if place in self.ensembles:
-            require = Require(difference=require.ensemble)
-        places = [
-            ToleranceKey(place, model, against, text)
-            for against, texts in (
-                (OWN_FIGURES, require.figures),
-                (given.reference, require.difference),
-                (given.model_form, require.model_form),
-            )
-            if against == OWN_FIGURES or (against and model not in (given.reference, against))
-            for text in texts
-        ]
-        return {one: self.kind(one) for one in (*places, *self._judged.get((place, model), ()))}
+        require, reference = self.config.require, self.config.reference
+        model_form = self.config.model_form
+        difference = require.ensemble if name in self.ensembles else require.difference
+        keys: list[ToleranceKey] = []
+        if name not in self.ensembles:
+            keys += [ToleranceKey(name, model, OWN_FIGURES, text) for text in require.figures]
+        if reference and model != reference:
+            keys += [ToleranceKey(name, model, reference, text) for text in difference]
+        if name not in self.ensembles and model_form and model not in (reference, model_form):
+            keys += [ToleranceKey(name, model, model_form, text) for text in require.model_form]
+        keys += self._keys_by_cell.get((name, model), [])
+        return {key: self.kind(key) for key in keys}
 
-    def yardsticks(self, checks: Iterable[ToleranceKey]) -> list[str]:
+    def yardsticks(self, required: Iterable[ToleranceKey]) -> list[str]:
         """`OWN_FIGURES`, then the models that cells with these checks are compared with."""
         usual = OWN_FIGURES, self.config.reference, self.config.model_form
-        return list(dict.fromkeys((*usual, *(place.against for place in checks))))
+        return list(dict.fromkeys((*usual, *(key.against for key in required))))
 
-    def kind(self, place: ToleranceKey) -> results.Kind:
+    def kind(self, key: ToleranceKey) -> results.Kind:
         """The kind of a check.
 
         Where the block may fly, a model that cannot differs in form from one that can.
         """
-        if place.against == OWN_FIGURES:
-            return "exact" if measure_of(place.windowed).exact else "absolute"
-        families = [self.models[label].family for label in (place.model, place.against)]
+        if key.against == OWN_FIGURES:
+            return "exact" if measure_of(key.windowed).exact else "absolute"
+        families = [self.models[label].family for label in (key.model, key.against)]
         if "measured" in families:
             return "measured"
-        scene = (
-            self.ensembles[place.scene][1]
-            if place.scene in self.ensembles
-            else self.scenes[place.scene]
-        )
+        if key.scene in self.ensembles:
+            _, scene = self.ensembles[key.scene]
+        else:
+            scene = self.scenes[key.scene]
         differ = len({family(name).flies for name in families}) > 1
         return "model form" if differ and may_fly(scene) else "numerical"
 
@@ -284,63 +287,77 @@ def load_suite(source: str | Path, *, allow_code: Container[str] = ()) -> Suite:
     if "block" in tables:
         raise errors.InputError(
             f"{printable(path)}: is a scene, not a suite; `rockcheck validate` plays a scene, and"
-            f" a suite is a file with scenes = [{printable(path.name)!r}], and tables [models.NAME]"
+            f" a suite is a file with scenes = [{printable(path.name)!r}], and tables"
+            " [models.NAME]",
+            file=path,
         )
     try:
         return _suite(SuiteFile(**tables), path, shipped, allow_code)
     except RecursionError:
-        raise errors.InputError(f"{printable(path)}: include: the suite joins itself") from None
+        raise errors.InputError(
+            f"{printable(path)}: include: the suite joins itself", file=path
+        ) from None
     except errors.InputError as error:
-        # What begins with the name of a file, this one or one beside it, has no key and no quote.
-        file, beside = str(error).partition(": ")[0], f"{printable(path.parent)}{os.sep}"
-        told = file.startswith(beside) or not (error.key or "'" in file)
-        raise errors.InputError(str(error) if told else f"{printable(path)}: {error}") from None
+        if error.file is not None:
+            raise
+        raise errors.InputError(f"{printable(path)}: {error}", file=path) from None
 
 
-def _suite(given: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
-    if given.include:
-        return _joined(given, path, allow_code)
+def _suite(config: SuiteFile, path: Path, shipped: bool, allow_code: Container[str]) -> Suite:
+    if config.include:
+        return _joined(config, path, allow_code)
+    folder = path.parent
     models = {
-        label: _variant(label, settings, path.parent, allow_code)
-        for label, settings in given.models.items()
+        label: _variant(label, settings, folder, allow_code)
+        for label, settings in config.models.items()
     }
-    uncertain, left_out = motions.under_records(
-        _scenes(given, path.parent), given.records, path.parent
-    )
-    scenes = {name: found.scene for name, found in uncertain.items()}
+    uncertain, left_out = motions.under_records(_scenes(config, folder), config.records, folder)
+    scenes = {name: uncertain_scene.scene for name, uncertain_scene in uncertain.items()}
     ensembles = {
-        e.name: (e, files.scene_from(e.scene, folder=path.parent, default_name=e.name))
-        for e in given.ensemble
+        ensemble.name: (
+            ensemble,
+            files.scene_from(ensemble.scene, folder=folder, default_name=ensemble.name),
+        )
+        for ensemble in config.ensemble
     }
-    _check_names(given, models, scenes, ensembles)
-    beside = (
-        DATA / "tolerances" / path.name
-        if shipped
-        else path.with_name(f"{path.stem}.tolerances.toml")
-    )
-    tables, tolerances_path = given.tolerances, path
-    if tables is None:
-        tables, tolerances_path = files.read_toml(beside) if beside.exists() else {}, beside
+    _check_references(config, models)
+    _check_names(config, models, scenes, ensembles)
+    _check_measures(config.require)
+    tables, tolerances_path = _tolerance_tables(config, path, shipped)
     try:
-        tolerances = parse_tolerances(tables, _played(scenes, models))
-        for at in tolerances:
+        tolerances = parse_tolerances(tables, _cells(scenes, models))
+        for key in tolerances:
             errors.one_of(
-                f"reference of [{at.scene}.{at.model}]", at.against, [OWN_FIGURES, *models]
+                f"reference of [{key.scene}.{key.model}]", key.against, [OWN_FIGURES, *models]
             )
     except errors.InputError as error:
-        raise errors.InputError(f"{printable(tolerances_path)}: {error}") from None
+        raise errors.InputError(
+            f"{printable(tolerances_path)}: {error}", file=tolerances_path
+        ) from None
     return Suite(
         name=errors.inert(path.stem),
         path=path,
-        config=given,
+        config=config,
         scenes=scenes,
         ensembles=ensembles,
         models=models,
         tolerances=tolerances,
         tolerances_path=tolerances_path,
-        uncertain={name: one for name, one in uncertain.items() if one.spreads},
+        uncertain={name: scene for name, scene in uncertain.items() if scene.spreads},
         left_out=tuple(left_out),
     )
+
+
+def _tolerance_tables(
+    config: SuiteFile, path: Path, shipped: bool
+) -> tuple[Mapping[str, Any], Path]:
+    """The tables of tolerances and their file: the suite's own, or one beside it."""
+    if config.tolerances is not None:
+        return config.tolerances, path
+    beside = path.with_name(f"{path.stem}.tolerances.toml")
+    if shipped:
+        beside = DATA / "tolerances" / path.name
+    return (files.read_toml(beside) if beside.exists() else {}), beside
 
 
 def scene_suite(
@@ -356,23 +373,23 @@ def scene_suite(
     model without it. User-defined models are looked for in the working folder. Raises `InputError`
     as `load_suite`.
     """
-    known = files.named_scenes()
-    path = Path(f"{source}.toml" if source in known else source)
+    shipped = source in files.named_scenes()
+    path = Path(f"{source}.toml" if shipped else source)
     reference = REFERENCE if REFERENCE in models else next(iter(models))
-    given = SuiteFile(
+    config = SuiteFile(
         reference=reference,
         model_form=PAPER_MODEL if PAPER_MODEL in models and reference == REFERENCE else "",
-        scenes=(source if source in known else path.name,),
+        scenes=(source if shipped else path.name,),
         records=tuple(records),
         models={name: dict(settings) for name, settings in models.items()},
         require=Require(difference=(f"theta_rms@{HORIZON}",)),
         limits=Limits(seconds=UNJUDGED_SECONDS),
         tolerances={},
     )
-    suite = _suite(given, path, source in known, allow_code)
+    suite = _suite(config, path, shipped, allow_code)
     variants = {
-        name: replace(one, search_path=(str(Path.cwd()),)) if one.search_path else one
-        for name, one in suite.models.items()
+        label: replace(variant, search_path=(str(Path.cwd()),)) if variant.search_path else variant
+        for label, variant in suite.models.items()
     }
     return replace(suite, models=variants, judged=False)
 
@@ -388,20 +405,24 @@ def accept(
     now, is always refused; a figure that is not defined needs no line. Without `write` the file
     stays as it is.
     """
-    checks = [pair for pair in run.checks() if pair[1].verdict != "not defined"]
-    found = [
-        accepted_in(
-            part.tolerances_path,
-            [(c, one) for c, one in checks if c.scene in part.scenes or c.scene in part.ensembles],
+    changes: list[str] = []
+    refused: list[str] = []
+    for member in suite.members:
+        checks = [
+            (cell, check)
+            for cell, check in run.checks()
+            if check.verdict != "not defined"
+            and (cell.scene in member.scenes or cell.scene in member.ensembles)
+        ]
+        member_changes, member_refused = accepted_in(
+            member.tolerances_path,
+            checks,
             reason,
-            nested=part.tolerances_path == part.path,
+            nested=member.tolerances_path == member.path,
             write=write,
         )
-        for part in suite.members
-    ]
-    changes, refused = (
-        list(itertools.chain.from_iterable(lines)) for lines in zip(*found, strict=True)
-    )
+        changes += member_changes
+        refused += member_refused
     return changes, refused
 
 
@@ -417,177 +438,190 @@ def is_scene(source: str) -> bool:
     )
 
 
+def _check_references(config: SuiteFile, models: Mapping[str, Work]) -> None:
+    """Raise `InputError` where a reference is no model of the suite."""
+    labels = ", ".join(models) or "none"
+    for key, label in (("reference", config.reference), ("model_form", config.model_form)):
+        if label and label not in models:
+            raise errors.InputError(f"{label!r} is not among the suite's models: {labels}", key)
+    if config.require.model_form and not config.model_form:
+        raise errors.InputError(
+            "needs the key model_form, which says against which model", "require.model_form"
+        )
+    if not models:
+        raise errors.InputError("no model; at least the reference is needed", "models")
+
+
 def _check_names(
-    given: SuiteFile,
+    config: SuiteFile,
     models: Mapping[str, Work],
     scenes: Collection[str],
     ensembles: Collection[str],
 ) -> None:
-    known = ", ".join(models) or "none"
-    count = Counter((*scenes, *(one.name for one in given.ensemble)))
-    errors.refuse(
-        *(
-            (one and one not in models, f"{one!r} is not among the suite's models: {known}", key)
-            for key, one in (("reference", given.reference), ("model_form", given.model_form))
-        ),
-        (
-            given.require.model_form and not given.model_form,
-            "needs the key model_form, which says against which model",
-            "require.model_form",
-        ),
-        (not models, "no model; at least the reference is needed", "models"),
-        (not scenes and not ensembles, "no scene; at least one is needed", "scenes"),
-        *((n > 1, f"{one!r} is named twice", "ensemble.name") for one, n in count.items()),
-        *(
-            (
-                scene not in scenes,
-                str(errors.unknown_name("scene", scene, scenes)),
-                f"models.{label}.files",
-            )
-            for label, model in models.items()
-            if model.family == "measured"
-            for scene in model.settings["files"]
-        ),
-    )
-    for key, texts in given.require:
-        book = {"figures": measures.FIGURES, "ensemble": measures.STATISTICS}.get(
-            key, measures.DIFFERENCES
-        )
+    """Raise `InputError` for scenes that are missing, named twice or unknown."""
+    if not scenes and not ensembles:
+        raise errors.InputError("no scene; at least one is needed", "scenes")
+    names = Counter((*scenes, *(ensemble.name for ensemble in config.ensemble)))
+    for name, count in names.items():
+        if count > 1:
+            raise errors.InputError(f"{name!r} is named twice", "ensemble.name")
+    for label, model in models.items():
+        if model.family != "measured":
+            continue
+        for scene in model.settings["files"]:
+            if scene not in scenes:
+                unknown = errors.unknown_name("scene", scene, scenes)
+                raise errors.InputError(str(unknown), f"models.{label}.files")
+
+
+def _check_measures(require: Require) -> None:
+    """Raise `InputError` for a measure that is not of the kind that its key requires."""
+    for key, texts, book in (
+        ("difference", require.difference, measures.DIFFERENCES),
+        ("model_form", require.model_form, measures.DIFFERENCES),
+        ("figures", require.figures, measures.FIGURES),
+        ("ensemble", require.ensemble, measures.STATISTICS),
+    ):
         for text in texts:
             if measure_of(text).name not in book:
                 raise errors.unknown_name(f"measure of require.{key}", text, book)
 
 
-def _played(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
+def _cells(scenes: Iterable[str], models: Mapping[str, Work]) -> Iterator[tuple[str, str]]:
     """Names of scene and model of each cell; a measured history plays only its own scenes."""
-    return (
-        (scene, label)
-        for scene in scenes
-        for label, model in models.items()
-        if model.family != "measured" or scene in model.settings["files"]
-    )
+    for scene in scenes:
+        for label, model in models.items():
+            if model.family != "measured" or scene in model.settings["files"]:
+                yield scene, label
 
 
-def _joined(given: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
-    errors.refuse(
-        *(
-            (
-                key,
-                "cannot be given together with include: each suite that is joined has its own",
-                key,
-            )
-            for key in sorted(given.model_fields_set - {"include", "description"})
+def _joined(config: SuiteFile, path: Path, allow_code: Container[str]) -> Suite:
+    """A suite that joins others; of one that joins others itself, its members."""
+    forbidden = sorted(config.model_fields_set - {"include", "description"})
+    if forbidden:
+        raise errors.InputError(
+            "cannot be given together with include: each suite that is joined has its own",
+            forbidden[0],
         )
-    )
-    included = [
-        part  # of a suite that joins others, these: only they say what is required
-        for name in given.include
-        for part in load_suite(
-            path.parent / name if Path(name).suffix.lower() == ".toml" else name,
-            allow_code=allow_code,
-        ).members
-    ]
-    first = included[0]
-    names = Counter(name for suite in included for name in (*suite.scenes, *suite.ensembles))
-    own = {
-        place
-        for suite in included
-        for model in suite.models.values()
-        if is_own(model.family)
-        for place in provenance.reachable(family(model.family).module, model.search_path).items()
-    }
-    errors.refuse(
-        *(
-            (count > 1, f"scene {name!r} is in two of the suites", "include")
-            for name, count in names.items()
-        ),
-        *(
-            (
-                one.config.reference != first.config.reference,
-                f"{one.name} and {first.name} have different references",
-                "include",
-            )
-            for one in included
-        ),
-        *(  # a process imports one module of a name
-            (
-                one == other,
-                f"module {one} is {printable(path)} and {printable(place)}: give one of them"
-                " another name",
-                "include",
-            )
-            for (one, path), (other, place) in itertools.combinations(sorted(own), 2)
-        ),
-    )
-    whole: dict[str, Any] = {
-        what: {key: one for suite in included for key, one in getattr(suite, what).items()}
-        for what in ("scenes", "ensembles", "models", "tolerances", "uncertain")
+    members: list[Suite] = []
+    for name in config.include:
+        source = path.parent / name if Path(name).suffix.lower() == ".toml" else name
+        members += load_suite(source, allow_code=allow_code).members
+    _check_members(members)
+    _check_modules(members)
+    model_forms = [member.config.model_form for member in members if member.config.model_form]
+    joined = {
+        "reference": members[0].config.reference,
+        "model_form": model_forms[0] if model_forms else "",
     }
     return Suite(
         name=errors.inert(path.stem),
         path=path,
-        config=given.model_copy(
-            update={
-                "reference": first.config.reference,
-                "model_form": next(filter(None, (s.config.model_form for s in included)), ""),
-            }
-        ),
+        config=config.model_copy(update=joined),
+        scenes=_merged_mappings(member.scenes for member in members),
+        ensembles=_merged_mappings(member.ensembles for member in members),
+        models=_merged_mappings(member.models for member in members),
+        tolerances=_merged_mappings(member.tolerances for member in members),
+        uncertain=_merged_mappings(member.uncertain for member in members),
+        left_out=tuple(name for member in members for name in member.left_out),
         tolerances_path=path,
-        left_out=tuple(name for suite in included for name in suite.left_out),
-        included=tuple(included),
-        **whole,
+        included=tuple(members),
     )
+
+
+def _merged_mappings(mappings: Iterable[Mapping[Key, Value]]) -> dict[Key, Value]:
+    """One mapping with the items of all, in their order; a later value replaces an earlier one."""
+    merged: dict[Key, Value] = {}
+    for mapping in mappings:
+        merged.update(mapping)
+    return merged
+
+
+def _check_members(members: Sequence[Suite]) -> None:
+    """Raise `InputError` where a scene is in two suites, or their references differ."""
+    names = Counter(name for member in members for name in (*member.scenes, *member.ensembles))
+    for name, count in names.items():
+        if count > 1:
+            raise errors.InputError(f"scene {name!r} is in two of the suites", "include")
+    first = members[0]
+    for member in members:
+        if member.config.reference != first.config.reference:
+            raise errors.InputError(
+                f"{member.name} and {first.name} have different references", "include"
+            )
+
+
+def _check_modules(members: Sequence[Suite]) -> None:
+    """Raise `InputError` where two user-defined modules have one name.
+
+    A process imports one module of a name.
+    """
+    paths: dict[str, set[Path]] = {}
+    for member in members:
+        for model in member.models.values():
+            if not is_own(model.family):
+                continue
+            modules = provenance.reachable(family(model.family).module, model.search_path)
+            for module, file in modules.items():
+                paths.setdefault(module, set()).add(file)
+    for module in sorted(paths):
+        if len(paths[module]) > 1:
+            first, second = sorted(paths[module])[:2]
+            raise errors.InputError(
+                f"module {module} is {printable(first)} and {printable(second)}: give one of them"
+                " another name",
+                "include",
+            )
 
 
 def _variant(
     label: str, settings: Mapping[str, Any], folder: Path, allow_code: Container[str]
 ) -> Work:
+    """A model of a suite that lies in `folder`, with validated settings."""
     settings = dict(settings)
     name = str(settings.pop("model", label))
-    if name == "measured" and isinstance(settings.get("files"), dict):
-        settings["files"] = {
-            scene: [str(folder / str(one)) for one in files]
-            if isinstance(files, list)
-            else str(folder / str(files))
-            for scene, files in settings["files"].items()
-        }
-    own = is_own(name)
     try:
         check_allowed(name, allow_code)
     except errors.InputError as error:
         raise errors.InputError(error.reason, f"models.{printable(label)}") from None
-    if not own:
-        build(name, settings)
-    path = (str(folder.absolute()),) if own else ()
-    return Work(label=label, family=name, settings=settings, search_path=path)
+    if is_own(name):
+        search_path = (str(folder.absolute()),)
+        return Work(label=label, family=name, settings=settings, search_path=search_path)
+    if name == "measured" and isinstance(settings.get("files"), dict):
+        settings["files"] = {
+            scene: _files_beside(folder, given) for scene, given in settings["files"].items()
+        }
+    build(name, settings)
+    return Work(label=label, family=name, settings=settings)
 
 
-def _scenes(given: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
-    found: dict[str, files.UncertainScene] = {}
-    for scene in itertools.chain(
-        (
-            files.load_uncertain_scene(
-                name
-                if name in files.named_scenes() or Path(name).suffix != ".toml"
-                else folder / name
-            )
-            for name in given.scenes
-        ),
-        (
-            files.uncertain_scene_from(table, folder=folder, default_name=f"scene {n}")
-            for n, table in enumerate(given.scene, 1)
-        ),
-        (
-            files.uncertain_scene(_combined(grid.scene, choice, folder), {}, {})
-            for grid in given.grid
-            for choice in itertools.product(*grid.axes)
-        ),
-    ):
+def _files_beside(folder: Path, given: Any) -> str | list[str]:
+    """The paths of measured histories, which are given relative to the suite's folder."""
+    if isinstance(given, list):
+        return [str(folder / str(file)) for file in given]
+    return str(folder / str(given))
+
+
+def _scenes(config: SuiteFile, folder: Path) -> dict[str, files.UncertainScene]:
+    """The scenes of a suite by name: named or in files, written out, and of grids."""
+    scenes: dict[str, files.UncertainScene] = {}
+    for scene in _all_scenes(config, folder):
         name = scene.scene.name
-        if name in found:
+        if name in scenes:
             raise errors.InputError(f"scene {name!r} is named twice", "scenes")
-        found[name] = scene
-    return found
+        scenes[name] = scene
+    return scenes
+
+
+def _all_scenes(config: SuiteFile, folder: Path) -> Iterator[files.UncertainScene]:
+    for name in config.scenes:
+        is_file = Path(name).suffix == ".toml" and name not in files.named_scenes()
+        yield files.load_uncertain_scene(folder / name if is_file else name)
+    for number, table in enumerate(config.scene, 1):
+        yield files.uncertain_scene_from(table, folder=folder, default_name=f"scene {number}")
+    for grid in config.grid:
+        for choice in itertools.product(*grid.axes):
+            yield files.uncertain_scene(_combined(grid.scene, choice, folder), {}, {})
 
 
 def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]], folder: Path) -> Scene:

@@ -127,26 +127,29 @@ Tolerances = dict[ToleranceKey, Tolerance]
 def parse_tolerances(
     tables: Mapping[str, Any], cells: Iterable[tuple[str, str]] = ()
 ) -> Tolerances:
-    """The tolerances in the tables of a file, by place.
+    """The tolerances in the tables of a file.
 
     A line for every scene becomes one for each of `cells` (scene, model). Raises `InputError`
     naming the place of an unusable line.
     """
-    found: Tolerances = {}
-    for place, line in _spread(dict(_lines(tables)), list(cells)):
+    tolerances: Tolerances = {}
+    for key, line in _spread(dict(_lines(tables)), list(cells)):
         try:
-            measure = measure_of(place.windowed)
-            tolerance = Tolerance(**line)
-            if (measure.name in measures.FIGURES) != (place.against == OWN_FIGURES):
-                raise InputError(
-                    f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}"
-                )
-            if tolerance.expected is None and not measure.is_error:
-                raise InputError("is missing", "expected")
+            tolerances[key] = _tolerance(key, line)
         except InputError as error:
-            raise InputError(f"{printable(place)}: {error}") from None
-        found[place] = tolerance
-    return found
+            raise InputError(f"{printable(key)}: {error}") from None
+    return tolerances
+
+
+def _tolerance(key: ToleranceKey, line: Mapping[str, Any]) -> Tolerance:
+    """A validated line."""
+    measure = measure_of(key.windowed)
+    tolerance = Tolerance(**line)
+    if (measure.name in measures.FIGURES) != (key.against == OWN_FIGURES):
+        raise InputError(f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}")
+    if tolerance.expected is None and not measure.is_error:
+        raise InputError("is missing", "expected")
+    return tolerance
 
 
 def _spread(
@@ -156,17 +159,19 @@ def _spread(
 
     A scene's own line takes precedence; what it leaves out comes from the line for every scene.
     """
-    own = {place: line for place, line in lines.items() if place.scene != EVERY}
-    for place, line in own.items():
-        yield place, {**lines.get(place._replace(scene=EVERY), {}), **line}
-    completed = {place[1:] for place in own}
-    for place, line in lines.items():
-        if place in own or (place[1:] in completed and "limit" not in line):
+    of_a_scene = {key: line for key, line in lines.items() if key.scene != EVERY}
+    for key, line in of_a_scene.items():
+        yield key, {**lines.get(key._replace(scene=EVERY), {}), **line}
+    completed = {key[1:] for key in of_a_scene}
+    for key, line in lines.items():
+        if key.scene != EVERY or (key[1:] in completed and "limit" not in line):
             continue
-        scenes = [scene for scene, model in cells if model == place.model]
         # Without a cell the line stays as it is, and is reported as a tolerance without a cell.
-        every = (place._replace(scene=scene) for scene in scenes or [EVERY])
-        yield from ((one, line) for one in every if one not in own)
+        scenes = [scene for scene, model in cells if model == key.model] or [EVERY]
+        for scene in scenes:
+            cell_key = key._replace(scene=scene)
+            if cell_key not in of_a_scene:
+                yield cell_key, line
 
 
 def _lines(
@@ -344,36 +349,44 @@ def accepted_in(
     `nested`: into the table `[tolerances]` of a suite file. Raises `InputError` for a file whose
     form cannot be kept.
     """
-    changes, refused = list[str](), list[str]()
+    changes: list[str] = []
+    refused: list[str] = []
     document = tomlkit.parse(reading.read_text(path)) if path.exists() else tomlkit.document()
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if nested else document
     try:
         for cell, check in checks:
-            against, line = check.figure.against or OWN_FIGURES, _accepted(check, reason)
-            where = ToleranceKey(cell.scene, cell.model, against, check.figure.windowed)
-            old = {name: getattr(check, name) for name in Tolerance.model_fields}
+            against = check.figure.against or OWN_FIGURES
+            key = ToleranceKey(cell.scene, cell.model, against, check.figure.windowed)
+            old_line = {name: getattr(check, name) for name in Tolerance.model_fields}
+            line = _accepted(check, reason)
             if isinstance(line, str):
-                refused.append(f"{where}: {line}")
-            elif line != old:
-                changes.append(f"{where}: {_named(check, line)}: {_shown(old)} -> {_shown(line)}")
-                entry = tomlkit.inline_table()
-                entry.update(line)
-                table = (
-                    tables.setdefault(cell.scene, tomlkit.table(is_super_table=True))
-                    .setdefault(cell.model, tomlkit.table(is_super_table=True))
-                    .setdefault(against, tomlkit.table())
-                )
-                table[check.figure.windowed] = entry
+                refused.append(f"{key}: {line}")
+            elif line != old_line:
+                change = f"{_shown(old_line)} -> {_shown(line)}"
+                changes.append(f"{key}: {_named(check, line)}: {change}")
+                _write_line(tables, key, line)
         text = tomlkit.dumps(document)
-        errors.refuse((tomllib.loads(text) != document.unwrap(), "is broken", str(path)))
+        is_kept = tomllib.loads(text) == document.unwrap()
     except ValueError:  # tables in one line, or keys with points
+        is_kept = False
+    if not is_kept:
         raise InputError(
             f"{printable(path)}: cannot be changed: write a table a scene, model and reference,"
-            " [scene.model.reference]"
-        ) from None
+            " [scene.model.reference]",
+            file=path,
+        )
     if write and changes:
         writing.write_whole(path, re.sub(r"}\n+\[", "}\n\n[", text), named=True)
     return changes, refused
+
+
+def _write_line(tables: Any, key: ToleranceKey, line: Mapping[str, Any]) -> None:
+    """Put a line into the tables of a file."""
+    of_scene = tables.setdefault(key.scene, tomlkit.table(is_super_table=True))
+    of_model = of_scene.setdefault(key.model, tomlkit.table(is_super_table=True))
+    entry = tomlkit.inline_table()
+    entry.update(line)
+    of_model.setdefault(key.against, tomlkit.table())[key.windowed] = entry
 
 
 def _accepted(check: results.Check, reason: str | None) -> dict[str, Any] | str:

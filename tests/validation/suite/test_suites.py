@@ -2,6 +2,7 @@
 
 import pytest
 
+from rockcheck.scenes import InputError
 from rockcheck.validation.suite import suites
 
 MODELS = 'reference = "ebm"\n[models.ebm]\n'
@@ -160,3 +161,22 @@ def test_a_fault_names_one_file_also_in_a_folder_called_like_a_key_and_in_the_wo
         ["gone.toml", "cannot be read"],
         ["outer.toml", "include"],
     ]
+
+
+def test_a_fault_in_a_scene_file_names_that_file_alone(suite, tmp_path):
+    folder = tmp_path / "o'brien"
+    folder.mkdir()
+    scene = folder / "shelf.toml"
+    scene.write_text("duration = -1.0\n")
+    with pytest.raises(InputError) as caught:
+        suite(f'scenes = ["{scene}"]\n' + MODELS)
+    assert str(caught.value).startswith(f"{scene}: ")
+    assert "mine.toml" not in str(caught.value)
+    assert caught.value.file == scene
+
+
+def test_a_fault_of_the_suite_itself_names_the_suite(suite, tmp_path):
+    with pytest.raises(InputError) as caught:
+        suite('scenes = ["fig4a"]\nreference = "cm"\n[models.ebm]\n')
+    assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}: reference: 'cm' is not")
+    assert caught.value.file == tmp_path / "mine.toml"

@@ -232,7 +232,7 @@ def test_a_line_for_every_scene():
         tomllib.loads(EVERYWHERE), [("a", "m"), ("b", "m"), ("c", "m"), ("a", "r")]
     )
     assert {
-        (place.scene, str(place.what)): (line.limit, line.why) for place, line in lines.items()
+        (place.scene, str(place.windowed)): (line.limit, line.why) for place, line in lines.items()
     } == {
         ("a", "theta_rms"): (0.002, "the step"),
         ("b", "theta_rms"): (0.004, "another"),
