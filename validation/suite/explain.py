@@ -39,24 +39,36 @@ def explanations(
         if falls and cell.outcome != reference.outcome:
             yield _outcome_verdict(reference.model, both_errors, inputs)
             continue
-        for quantity, unit in QUANTITIES.items():
-            difference = _difference(quantity, cell, reference)
-            if difference is None:
-                continue
-            u_num, reason = _combined_u_num(quantity, both_errors)
-            size = scene.block.alpha if unit == "alpha" else 1.0
-            scatter = scatters[cell.model].get(quantity, 0.0) / size
-            reference_scatter = scatters[reference.model].get(quantity, 0.0) / size
-            yield numerical.explain(
-                quantity,
-                unit,
-                difference,
-                u_num,
-                _u_input(quantity, inputs),
-                math.hypot(scatter, reference_scatter),
-                reason=reason,
-                against=reference.model,
-            )
+        yield from _quantity_verdicts(scene, cell, reference, both_errors, scatters, inputs)
+
+
+def _quantity_verdicts(
+    scene: Scene,
+    cell: results.Cell,
+    reference: results.Cell,
+    both_errors: Sequence[numerical.Numerical],
+    scatters: Mapping[str, Mapping[str, float]],
+    inputs: population.Inputs | None,
+) -> Iterator[numerical.Explanation]:
+    """The verdict on each quantity that differs in a comparable way."""
+    for quantity, unit in QUANTITIES.items():
+        difference = _difference(quantity, cell, reference)
+        if difference is None:
+            continue
+        u_num, reason = _combined_u_num(quantity, both_errors)
+        size = scene.block.alpha if unit == "alpha" else 1.0
+        scatter = scatters[cell.model].get(quantity, 0.0) / size
+        reference_scatter = scatters[reference.model].get(quantity, 0.0) / size
+        yield numerical.explain(
+            quantity,
+            unit,
+            difference,
+            u_num,
+            _u_input(quantity, inputs),
+            math.hypot(scatter, reference_scatter),
+            reason=reason,
+            against=reference.model,
+        )
 
 
 def _u_input(quantity: str, inputs: population.Inputs | None) -> float:
