@@ -81,6 +81,11 @@ def _first_fall(
     return min(falls, key=lambda item: item[1].low, default=None)
 
 
+def _both_sides(fall: results.FallInterval) -> list[float]:
+    """The last value at which it stands, if there is one, and the first at which it does not."""
+    return [value for value in (fall.stands_below, fall.low) if value is not None]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Plan:
     """What is assessed.
@@ -300,11 +305,7 @@ class Plan:
         """
         searches: dict[Side, dict[str, GapTask]] = {}
         for asked in self.gaps:
-            free = {
-                case: cast(results.Drawn, done[task])
-                for case, task in self.free.get(asked.side, {}).items()
-                if task in done and not isinstance(done[task], Failure)
-            }
+            free = self._without_wall(asked.side, done)
             reach = clearance_of(free, asked.side)
             if reach is None:
                 continue
@@ -331,6 +332,14 @@ class Plan:
             }
         return searches
 
+    def _without_wall(self, side: Side, done: Mapping[Any, Any]) -> dict[str, results.Drawn]:
+        """By case, the runs without the wall on a side that have ended and did not fail."""
+        return {
+            case: cast(results.Drawn, done[task])
+            for case, task in self.free.get(side, {}).items()
+            if task in done and not isinstance(done[task], Failure)
+        }
+
     def thresholds(self, done: Mapping[Any, Any]) -> list[Threshold]:
         """Runs by the first model on both sides of what the batch found, where that is another.
 
@@ -344,13 +353,11 @@ class Plan:
             first = _first_fall(tasks, done)
             if first is not None:
                 case, fall = first
-                gaps = [gap for gap in (fall.stands_below, fall.low) if gap is not None]
-                found += [self._at_gap(case, side, gap) for gap in gaps]
+                found += [self._at_gap(case, side, gap) for gap in _both_sides(fall)]
         first = _first_fall(self.factors, done)
         if first is not None:
             case, fall = first
-            factors = [at for at in (fall.stands_below, fall.low) if at is not None]
-            found += [self._at_factor(case, factor) for factor in factors]
+            found += [self._at_factor(case, factor) for factor in _both_sides(fall)]
         return found
 
     def _at_gap(self, case: str, side: Side, gap: float) -> Threshold:

@@ -3,7 +3,7 @@
 In: typed answers (`statistics`). Out: sentences. A sentence claims no more than was looked at.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.certainty import (
@@ -222,29 +222,7 @@ def _single_intensity(record: RecordIntensity, label: str, unit: str) -> str:
 def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[str]:
     """How sure that is: of the step, of ties, and what would change the answer."""
     cases = {case: sure for case, sure in gathered.certainty.items() if case}
-    sentences = []
-    converged = [is_converged(sure) for sure in cases.values() if sure.numerical is not None]
-    if len(cases) > 1 and converged:
-        sentences.append(f"{sum(converged)} of {len(converged)} runs are numerically converged.")
-    elif converged:
-        sentences.append(
-            "Numerically converged." if converged[0] else "Not converged: no figure is sure."
-        )
-    else:
-        sentences.append("Its numerical error is not known.")
-    for case, sure in cases.items():
-        for what, when, fates in sure.ties:
-            where = f", {case}" if len(cases) > 1 else ""
-            sentences.append(
-                f"From {when:.3g} s on{where} the mechanics has more than one answer ({what}):"
-                f" {' or '.join(fates)}."
-            )
-    by_law = [sure.depends_on_law_from_s for sure in cases.values()]
-    matters = [when for when in by_law if when is not None]
-    if matters and len(cases) > 1:
-        sentences.append(f"The law of impacts matters in {len(matters)} of {len(cases)} runs.")
-    elif matters:
-        sentences.append(f"From {matters[0]:.3g} s on the law of impacts matters.")
+    sentences = [_convergence_sentence(cases), *_tie_sentences(cases), *_law_sentences(cases)]
     largest = next(iter(answer.contributions), None)
     known = {contribution.source for contribution in answer.contributions}
     if largest and largest.sd > NEGLIGIBLE and "numerical error" in known:
@@ -252,6 +230,34 @@ def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[s
         change = CHANGES[largest.source].format(number=number)
         sentences.append(f"{change} would change the answer most.")
     return sentences
+
+
+def _convergence_sentence(cases: Mapping[str, results.Certainty]) -> str:
+    converged = [is_converged(sure) for sure in cases.values() if sure.numerical is not None]
+    if len(cases) > 1 and converged:
+        return f"{sum(converged)} of {len(converged)} runs are numerically converged."
+    if converged:
+        return "Numerically converged." if converged[0] else "Not converged: no figure is sure."
+    return "Its numerical error is not known."
+
+
+def _tie_sentences(cases: Mapping[str, results.Certainty]) -> Iterator[str]:
+    for case, sure in cases.items():
+        for what, when, fates in sure.ties:
+            where = f", {case}" if len(cases) > 1 else ""
+            yield (
+                f"From {when:.3g} s on{where} the mechanics has more than one answer ({what}):"
+                f" {' or '.join(fates)}."
+            )
+
+
+def _law_sentences(cases: Mapping[str, results.Certainty]) -> Iterator[str]:
+    by_law = [sure.depends_on_law_from_s for sure in cases.values()]
+    matters = [when for when in by_law if when is not None]
+    if matters and len(cases) > 1:
+        yield f"The law of impacts matters in {len(matters)} of {len(cases)} runs."
+    elif matters:
+        yield f"From {matters[0]:.3g} s on the law of impacts matters."
 
 
 def is_converged(sure: results.Certainty) -> bool:
