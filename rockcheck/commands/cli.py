@@ -27,7 +27,7 @@ from rockcheck.validation.suite import results
 #: The commands, in the order of the help: module and function below this package; an example.
 COMMANDS = {
     "scenes": ("simulate:scenes", "rockcheck scenes"),
-    "new": ("simulate:new", "rockcheck new bookcase.toml"),
+    "new": ("simulate:new", "rockcheck new cabinet.toml"),
     "record": ("record:run", "rockcheck record station.V2 --read component=1 --plot station.png"),
     "simulate": (
         "simulate:run",

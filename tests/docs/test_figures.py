@@ -56,8 +56,8 @@ def test_the_front_picture():
 
 
 def test_the_tutorials_bookcase(tmp_path, told):
-    told("new", str(tmp_path / "bookcase.toml"))
-    scene = load_scene(tmp_path / "bookcase.toml")
+    told("new", str(tmp_path / "cabinet.toml"))
+    scene = load_scene(tmp_path / "cabinet.toml")
     reference = UNILATERAL.simulate(scene)
     assert (rounded(reference.peak_rotation / reference.alpha, 2), reference.outcome) == (
         0.72,
