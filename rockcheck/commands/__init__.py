@@ -28,7 +28,7 @@ from rich.progress import (
 )
 
 from rockcheck.reports.style import ENDINGS, kind_of
-from rockcheck.scenes import InputError, errors, named_scenes, printable, writing
+from rockcheck.scenes import InputError, Record, Scene, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
 from rockcheck.scenes.recordings import sets
 from rockcheck.validation.execute.models import FAMILIES, build, compiles, is_own, not_installed
@@ -128,6 +128,19 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
     odd = sets.grouped(name for name in names if isinstance(name, sets.Odd))
     for line in [*([said] if vertical else []), *odd]:
         console().print(f"left out: {line}", style="yellow", soft_wrap=True)
+
+
+def tell_record_notes(scenes: Iterable[Scene]) -> None:
+    """Print what readers of the scenes' records assumed or overrode, a line a note."""
+    notes = [
+        f"{excitation.source}: {note}"
+        for scene in scenes
+        for excitation in (scene.excitation, scene.vertical)
+        if isinstance(excitation, Record)
+        for note in excitation.notes
+    ]
+    for line in sets.grouped(dict.fromkeys(notes)):
+        console().print(f"note: {printable(line, 500)}", style="yellow", soft_wrap=True)
 
 
 def answer(value: Any) -> None:

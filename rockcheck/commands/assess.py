@@ -21,6 +21,7 @@ from rockcheck.commands import (
     scene_names,
     studied,
     tell_left_out,
+    tell_record_notes,
 )
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, Scene, Side, files, printable
@@ -153,6 +154,7 @@ def assess(
         )
     _ = planned.numbers  # names a draw that is no scene, before anything is played
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
+    tell_record_notes(case.scene for case in cases.values())
     studied(Assessment(plan=planned), played)
 
 

@@ -26,6 +26,7 @@ from rockcheck.commands import (
     progress,
     tell_left_out,
     tell_missing,
+    tell_record_notes,
     told,
     usable_folder,
 )
@@ -198,6 +199,7 @@ def _scene(
         suite.left_out,
         "--read vertical=true plays such a component together with the horizontal ones",
     )
+    tell_record_notes(suite.scenes.values())
     return suite, folder
 
 

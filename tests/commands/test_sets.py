@@ -166,6 +166,15 @@ def test_a_suite_has_tables_of_records(typed):
     typed("validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict")
 
 
+def test_what_a_reader_assumed_is_told(typed):
+    Path("rows.txt").write_text("0.1 0.2 0.3\n0.2 0.1 0.0\n0.1 0.1 0.2\n", "utf-8")
+    typed(
+        *("assess", "rack.toml", "rows.txt", "--read", "unit=m/s2", "--read", "time_step=0.1"),
+        *("--read", "column=2"),
+        holds=["note: rows: column 2 of 3, 3 samples, 0.3 s at 0.1 s; along the lines there are 9"],
+    )
+
+
 def test_a_population_takes_the_same_sets(told):
     found = told("assess", "rack.toml", "--levels", "1:2:2", "records")
     assert ([one["motion"] for one in found["tables"]["motions"]], names(found["left_out"])) == (
