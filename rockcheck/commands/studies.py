@@ -190,20 +190,19 @@ def stress(
     An interrupted run resumes where it ended.
     Exit 1 where an event-based model breaks an invariant.
     """
-    from rockcheck.validation.studies.stress.runs import PLAYERS
-    from rockcheck.validation.studies.stress.study import Stress, What, places
+    from rockcheck.validation.studies.stress.maps import map_points
+    from rockcheck.validation.studies.stress.players import PLAYERS
+    from rockcheck.validation.studies.stress.study import Stress, What
 
     part: What = errors.one_of("stress", what, get_args(What))
     families = (errors.one_of("model", name, PLAYERS).split()[0] for name in model or ())
     need_installed(families, "--model")
-    errors.refuse(
-        (part == "maps" and runs, "is of random scenes, not of maps", "--runs"),
-        (
-            part == "maps" and not places(quick, model or ()),
-            "maps are of engines and cm: an event-based model has no step",
-            "--model",
-        ),
-    )
+    if part == "maps" and runs:
+        raise errors.InputError("is of random scenes, not of maps", "--runs")
+    if part == "maps" and not map_points(quick, model or ()):
+        raise errors.InputError(
+            "maps are of engines and cm: an event-based model has no step", "--model"
+        )
     tell_missing()
     studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
 

@@ -20,7 +20,7 @@ from rockcheck.scenes import (
     kinematics,
     load_scene,
 )
-from rockcheck.validation.studies.stress.invariants import check_run
+from rockcheck.validation.studies.stress.checks import check_run
 
 PIVOTS = ["bilateral", "unilateral"]
 SLOPE = 9.81 * math.tan(PAPER_BLOCK.alpha)

@@ -22,20 +22,19 @@ from rockcheck import (
     Wall,
 )
 from rockcheck.scenes import PAPER_BLOCK
-from rockcheck.validation.studies.stress import invariants, runs
-from rockcheck.validation.studies.stress.invariants import (
+from rockcheck.validation.studies.stress import checks, energy, horizon, players
+from rockcheck.validation.studies.stress.checks import audited, check_run, similar
+from rockcheck.validation.studies.stress.energy import (
     BOOLE,
-    INVARIANTS,
-    Motion,
-    audited,
-    check_run,
     energy_error,
     energy_without_source,
     integrals,
-    similar,
-    tilted_forces,
 )
-from rockcheck.validation.studies.stress.runs import PLAYERS, Chunk
+from rockcheck.validation.studies.stress.forces import tilted_forces
+from rockcheck.validation.studies.stress.invariants import INVARIANTS
+from rockcheck.validation.studies.stress.motion import Motion
+from rockcheck.validation.studies.stress.players import PLAYERS
+from rockcheck.validation.studies.stress.runs import Chunk
 
 SLIDES_AND_HITS = Scene(
     name="hits",
@@ -74,11 +73,11 @@ def test_a_similar_scene_has_another_size():
 def test_disturbed_scenes_differ_a_little():
     most = 0.4**2 + 1.2**2 - 0.1**2 - 0.3**2  # as much as there can be
     full = LOADED.replace(block=LOADED.block.replace(moment_of_inertia=most))
-    usual, fewer = ([*invariants._disturbed(one, 1)] for one in (LOADED, full))
-    assert 0 < len(fewer) < len(usual) == invariants.DISTURBED
+    usual, fewer = ([*horizon.disturbed(one, 1)] for one in (LOADED, full))
+    assert 0 < len(fewer) < len(usual) == horizon.DISTURBED
     news = np.array([(*one.block.offset, one.block.moment_of_inertia) for one in usual])
     off = np.abs(news / (*LOADED.block.offset, LOADED.block.moment_of_inertia) - 1.0)
-    assert 0.0 < off.min() < off.max() <= 1.01 * invariants.DISTURBANCE
+    assert 0.0 < off.min() < off.max() <= 1.01 * horizon.DISTURBANCE
 
 
 @pytest.mark.parametrize("block", [LOADED.block, PAPER_BLOCK], ids=["loaded", "plain"])
@@ -137,12 +136,12 @@ FAULTS = {
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_each_invariant_notices_its_fault(name, monkeypatch):
-    plain, play, pack = EventBasedModel.simulate, invariants.batch.run_batch, invariants.batch.pack
+    plain, play, pack = EventBasedModel.simulate, checks.batch.run_batch, checks.batch.pack
     monkeypatch.setattr(
         EventBasedModel, "simulate", lambda *given: spoilt(plain(*given), **FAULTS[name])
     )
     monkeypatch.setattr(
-        invariants.batch,
+        checks.batch,
         "run_batch",
         lambda given, model, **how: play(
             pack([SLIDES_AND_HITS.replace(excitation=Rest())], model)
@@ -218,7 +217,7 @@ def test_energy_that_cannot_be_judged_is_not_said_to_hold(monkeypatch):
         energy_error(model, Motion(rough, model.simulate(rough))) is None
     )  # five kinks between two rows
     assert energy_error(model, Motion(audited(rough), model.simulate(audited(rough)))) < 1e-9
-    monkeypatch.setattr(invariants, "RESOLVED", 0.0)
+    monkeypatch.setattr(energy, "RESOLVED", 0.0)
     played = check_run(model, SLIDES_AND_HITS, audit=True)
     assert (played.unjudged, "energy" in played.figures, played.broken) == (("energy",), False, [])
     assert check_run(model, SLIDES_AND_HITS, audit=True, only="energy").figures == {}
@@ -263,7 +262,7 @@ def test_of_an_engine_that_gains_energy_half_the_step_is_told(monkeypatch):
     player = PLAYERS["mujoco"]
     scene = player.scene(1, 2)
     monkeypatch.setattr(
-        runs,
+        players,
         "energy_without_source",
         lambda motion: 0.08 * motion.scene.output_step / scene.output_step,
     )

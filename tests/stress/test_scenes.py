@@ -7,6 +7,7 @@ import pytest
 
 from rockcheck import EventBasedModel, load_scene
 from rockcheck.scenes import files
+from rockcheck.validation.studies.stress.checks import check_run
 from rockcheck.validation.studies.stress.generator import (
     ALPHA,
     FRICTION,
@@ -14,7 +15,6 @@ from rockcheck.validation.studies.stress.generator import (
     exact_scene,
     random_scene,
 )
-from rockcheck.validation.studies.stress.invariants import check_run
 
 #: What must occur among random scenes: that of a scene, or of one of its walls.
 OCCURS = {

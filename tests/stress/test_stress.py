@@ -14,27 +14,27 @@ from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import Finding
 from rockcheck.validation.studies.stress.generator import random_scene
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
+from rockcheck.validation.studies.stress.maps import (
+    CASES,
+    SETUPS,
+    MapPoint,
+    MapResult,
+    fault_of,
+    map_points,
+    scene_at,
+    stand_still,
+)
+from rockcheck.validation.studies.stress.players import PLAYERS
 from rockcheck.validation.studies.stress.runs import (
     MOST_FILES,
-    PLAYERS,
     Broken,
     Chunk,
     RunTotals,
     Shrinking,
     parts,
-    shrink,
 )
-from rockcheck.validation.studies.stress.study import (
-    CASES,
-    SETUPS,
-    Found,
-    Place,
-    Stress,
-    fault_of,
-    places,
-    scene_at,
-    stand_still,
-)
+from rockcheck.validation.studies.stress.shrinking import shrink
+from rockcheck.validation.studies.stress.study import Stress
 from rockcheck.validation.study import run
 
 
@@ -161,7 +161,7 @@ def test_where_an_engine_breaks_is_found():
         fault_of(SETUPS[setup], scene_at("size", 1e-3), 0.01)
         for setup in ("mujoco default", "mujoco")
     ] == ["sinks", ""]
-    found = Place("mujoco default", "size", 1e-3, quick=True).play()
+    found = MapPoint("mujoco default", "size", 1e-3, quick=True).play()
     assert (found.step, found.fault) == (0.0, "sinks")
     assert stand_still("mujoco default", "pushed", 5.0).moves["creep"] > 1e-4
     assert stand_still("mujoco adaptive", "pushed", 5.0).moves["creep"] < 1e-6
@@ -172,13 +172,13 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     """Of what was played; where a process was lost there is no cell."""
     study = Stress("maps", quick=True)
     work = study.tasks({})
-    assert (work, study.gather({}).verdict) == (places(quick=True), "")
+    assert (work, study.gather({}).verdict) == (map_points(quick=True), "")
     only = Stress("all", quick=True, runs=1, models=("ebm", "cm")).tasks({})
-    assert {one.line for one in only if isinstance(one, Place)} == {"cm", "cm paper"}
+    assert {one.line for one in only if isinstance(one, MapPoint)} == {"cm", "cm paper"}
     done: dict = {
-        task: Found(5.0, 5e-3, {"creep": 1e-3})
-        if task.at in CASES
-        else Found(task.value, 0.1, fault="sinks")
+        task: MapResult(5.0, 5e-3, {"creep": 1e-3})
+        if task.map_name in CASES
+        else MapResult(task.value, 0.1, fault="sinks")
         for task in work
     }
     done[work[-1]] = pool.Failure("did not end")
@@ -193,7 +193,7 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     assert "(0.001, with adaptive steps 0.01)" in (tmp_path / "index.html").read_text()
     rows = (tmp_path / "stable-steps.csv").read_text().splitlines()
     assert len(rows) == 1 + sum(
-        isinstance(one, Found) and task.at not in CASES for task, one in done.items()
+        isinstance(one, MapResult) and task.map_name not in CASES for task, one in done.items()
     )
 
 

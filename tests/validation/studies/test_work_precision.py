@@ -10,7 +10,7 @@ import pytest
 
 from rockcheck.reports.document import publish
 from rockcheck.validation.execute import models, pool, provenance
-from rockcheck.validation.studies.stress import runs, study
+from rockcheck.validation.studies.stress import maps, runs
 from rockcheck.validation.studies.work_precision.runs import (
     DURATION,
     FAMILIES,
@@ -235,7 +235,7 @@ def test_errors_fall_against_the_unilateral_model_and_stall_against_the_papers(m
         (runs.Chunk("ebm-unilateral floor-first", 1, 0, 9), "ebm-unilateral", False),
         (runs.Chunk("pybullet", 1, 0, 9), "pybullet", False),
         (runs.Shrinking(runs.Broken("cm", "source", 1, 2, 0.3), 9), "cm", False),
-        (study.Place("mujoco default", "size", 1.0), "mujoco", False),
+        (maps.MapPoint("mujoco default", "size", 1.0), "mujoco", False),
     ],
 )
 def test_a_result_depends_on_the_code_of_its_model_and_a_time_on_the_machine(
