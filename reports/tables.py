@@ -380,10 +380,9 @@ def entry(run: results.Run, cells: Mapping[str, results.Cell], model: str) -> En
     of = "theta_rms", against
     found = [f for f in figures if (f.measure, f.against) == of and f.value is not None]
     whole = next((f for f in found if not f.window), None)
-    done = (one for one in (cell, cells.get(against)) if one and one.status == "done")
-    sides = {
-        ("left" in said) - ("right" in said) for one in done for said in (outcome_of(run, one),)
-    }
+    compared = (cell, cells.get(against))
+    outcomes = [outcome_of(run, one) for one in compared if one and one.status == "done"]
+    sides = {("left" in outcome) - ("right" in outcome) for outcome in outcomes}
     return {
         "cell": cell,
         "rms": min(found, key=lambda figure: figure.until or math.inf, default=None),
@@ -413,14 +412,11 @@ def outcome_of(run: results.Run, cell: results.Cell) -> str:
     turns = (f for f in cell.figures if f.unit == "alpha")
     last = results.value_of(turns, "last_rotation") or 0.0
     side: Side = "left" if last > 0.0 else "right"
-    return (
-        f"falling {side}"
-        if cell.outcome == "moving"
-        and abs(last) > FALL
-        and abs(last) > fall_to(side, (scene := run.load_scene(cell.scene)).block)
-        and not scene.wall(side)
-        else cell.fate
-    )
+    if cell.outcome != "moving" or abs(last) <= FALL:
+        return cell.fate
+    scene = run.load_scene(cell.scene)
+    falls = abs(last) > fall_to(side, scene.block) and not scene.wall(side)
+    return f"falling {side}" if falls else cell.fate
 
 
 def alike(run: results.Run, cells: Sequence[results.Cell]) -> list[list[results.Cell]]:

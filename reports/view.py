@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rockcheck.reports.style import Look, looks
 from rockcheck.scenes import (
@@ -39,6 +40,14 @@ MEASURED = {"file", "offset"}
 def fall_to(side: Side, block: Block) -> float:
     """`FALL` of a block that tilts to a side, in its own alpha, that of the weaker pivot."""
     return FALL * (block.pivot(side).alpha / block.alpha)
+
+
+def rows_beyond(theta: Floats, left: float, right: float) -> NDArray[np.int64]:
+    """The last rows of a rotation: from where it passes its side's limit, and is never back."""
+    size, limit = np.abs(theta), np.where(theta > 0.0, left, right)
+    last_within = np.max(np.flatnonzero(size <= limit), initial=-1)
+    beyond = np.flatnonzero(size > limit)
+    return beyond[beyond > last_within]
 
 
 @dataclass(frozen=True)
@@ -206,25 +215,19 @@ class SceneView(View):
 
         One that is beyond it at the end, and may lean on a wall there, does not.
         """
-        left, right = fall_to("left", self.scene.block), fall_to("right", self.scene.block)
-        beyond = {
-            model: rows[rows > np.max(np.flatnonzero(turned <= most), initial=-1)]
-            for model, columns in self.values.items()
-            for turned in (np.abs(columns["theta"]),)
-            for most in (np.where(columns["theta"] > 0.0, left, right),)
-            for rows in (np.flatnonzero(turned > most),)
-        }
-        return {
-            model: float(self.t[rows[0]])
-            for model, rows in beyond.items()
-            if len(rows)
-            and (
-                self.histories[model].overturned_at is not None
-                or not self.scene.wall(
-                    "left" if self.values[model]["theta"][rows[-1]] > 0.0 else "right"
-                )
-            )
-        }
+        block = self.scene.block
+        limits = fall_to("left", block), fall_to("right", block)
+        falls = {}
+        for model, columns in self.values.items():
+            theta = columns["theta"]
+            rows = rows_beyond(theta, *limits)
+            if not len(rows):
+                continue
+            side: Side = "left" if theta[rows[-1]] > 0.0 else "right"
+            overturned = self.histories[model].overturned_at is not None
+            if overturned or not self.scene.wall(side):
+                falls[model] = float(self.t[rows[0]])
+        return falls
 
     @property
     def measured(self) -> dict[str, list[int]]:
@@ -243,11 +246,13 @@ class SceneView(View):
     @cached_property
     def drawn(self) -> dict[str, dict[str, Floats]]:
         """The `values` up to the fall, NaN from there on."""
-        return {
-            model: {name: np.where(stands, column, math.nan) for name, column in columns.items()}
-            for model, columns in self.values.items()
-            for stands in (self.t <= self.falls.get(model, math.inf),)
-        }
+        drawn = {}
+        for model, columns in self.values.items():
+            stands = self.t <= self.falls.get(model, math.inf)
+            drawn[model] = {
+                name: np.where(stands, column, math.nan) for name, column in columns.items()
+            }
+        return drawn
 
     @cached_property
     def active(self) -> tuple[float, float]:
