@@ -9,10 +9,11 @@
 | networks: China, GeoNet, SMC, CSMIP V1, RENADIC, USC, BHRC, ... | any | see `networks` |
 | `name`, `npts dt`, values | any | the unit by `Reading` |
 | CSV | any | `time_s` and `acceleration_g`, `_m_s2`, `_cm_s2`, `_gal`, `_mm_s2` or `_ft_s2` |
+| SAC, miniSEED | any | all but the unit; needs ObsPy, see `waveforms` |
 | columns of text | any | nothing: options of `Reading` supply the rest |
 
 A format is recognised by the file's content; `.AT2` and `.csv` by the name. Every reader takes time
-in proportion to the file. ObsPy reads K-NET among these, but neither PEER, V2, ESM nor tables.
+in proportion to the file. ObsPy reads SAC, miniSEED and K-NET among these, none of the others.
 """
 
 from collections.abc import Callable
@@ -20,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rockcheck.scenes.errors import InputError, printable
-from rockcheck.scenes.reading import read_text
+from rockcheck.scenes.reading import open_regular, read_bytes, read_text
 from rockcheck.scenes.recordings.formats import (
     AT2_HEADER,
     AT2_HEADER_PLAIN,
@@ -42,6 +43,7 @@ from rockcheck.scenes.recordings.recording import (
 )
 from rockcheck.scenes.recordings.stated import size_notes
 from rockcheck.scenes.recordings.tables import read_table
+from rockcheck.scenes.recordings.waveforms import HEADER_BYTES, read_waveforms, waveform_format
 
 __all__ = [
     "GRAVITY_OF_RECORDS",
@@ -76,8 +78,14 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     value that is not finite. Where something is not known, the message shows the option that
     supplies it. A component that its file calls "down" is turned: up is positive.
     """
-    asked, lines = reading or Reading(), read_text(path, latin=True).split("\n")
+    asked = reading or Reading()
+    with open_regular(path) as stream:
+        binary_form = waveform_format(stream.read(HEADER_BYTES))
     try:
+        if binary_form:
+            _check_options("a file of waveforms", asked)
+            return _chosen(read_waveforms(read_bytes(path), binary_form, asked), asked)
+        lines = read_text(path, latin=True).split("\n")
         head = [line[:200] for line in lines[:_LOOKED_AT]]
         by_content: dict[Reader, bool] = {
             read_knet: head[0].startswith("Origin Time"),
@@ -94,15 +102,20 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
         read = _BY_NAME.get(path.suffix.lower(), fits)
         if read in _WITH_HEADER:
             _check_options(_WITH_HEADER[read], asked)
-        found = [_finished(recording, asked) for recording in read(lines, asked)]
-        if asked.component is None:
-            return found
-        names = [one.component for one in found]
-        return [found[place_of("component", asked.component, names, _listed(found))]]
+        return _chosen(read(lines, asked), asked)
     except Contradiction as error:
         raise Contradiction(_placed(path, error), error.option, file=path) from None
     except InputError as error:
         raise InputError(_placed(path, error), file=path) from None
+
+
+def _chosen(recordings: list[Recording], reading: Reading) -> list[Recording]:
+    """The finished recordings, or the one that `reading` names."""
+    finished = [_finished(recording, reading) for recording in recordings]
+    if reading.component is None:
+        return finished
+    names = [recording.component for recording in finished]
+    return [finished[place_of("component", reading.component, names, _listed(finished))]]
 
 
 def _placed(path: Path, error: InputError) -> str:

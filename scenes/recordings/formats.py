@@ -9,7 +9,7 @@ Only the blocks of acceleration are read. Source: COSMOS Strong Motion Data Form
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice, takewhile
 
 import numpy as np
@@ -42,6 +42,8 @@ _UNITS = re.compile(
 _OTHER_KIND = re.compile(r"\b(?:VELOCITY|DISPLACEMENT)\s++TIME\s++(?:SERIES|HIST)", re.IGNORECASE)
 _ESM_LINE = re.compile(r"([A-Z][A-Z0-9_^/]*+)\s*+:(.*+)")
 _KNET_SCALE = re.compile(rf"({NUMBER})\s*+\(gal\)\s*+/\s*+({NUMBER})", re.IGNORECASE)
+#: The channels of KiK-net down the borehole; 4, 5 and 6 are at the surface.
+_BELOW_GROUND = ("1", "2", "3")
 _KNET_RATE = re.compile(rf"({NUMBER})\s*+(?:Hz)?", re.IGNORECASE)
 
 #: How many characters of a line may be a header.
@@ -66,6 +68,10 @@ _CHANNEL = re.compile(r"\bChan\s*+(\d++):\s*+([A-Za-z0-9]++(?: Deg\b)?)", re.IGN
 _PEAK = re.compile(
     rf"(?:\bPeak\s++accel\w*+\s*+=|\bProcessed:.{{0,60}}\bMax\s*+=)\s*+({NUMBER})\s*+([a-z/0-9^]++)",
     re.IGNORECASE,
+)
+#: Where the sensor stands, in the text of COSMOS.
+_DOWNHOLE = re.compile(
+    r"\bLocation\s*+:.{0,60}?\b(?:down-?\s?hole|bore-?\s?hole|depth)", re.IGNORECASE
 )
 _COSMOS_UNITS = {"2": "g", "02": "g", "4": "cm/s2", "04": "cm/s2"}
 _DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down", 402: "vertical"}
@@ -227,11 +233,10 @@ def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
     )
     note = f"the mean, {mean:.4g} gal, is taken out: the offset of the digitiser"
     component = printable(header.get("Dir.", (0, ""))[1], 30)
-    return [
-        recording_of(
-            gals - mean, facts, reading, form="K-NET ASCII", component=component, notes=(note,)
-        )
-    ]
+    recording = recording_of(
+        gals - mean, facts, reading, form="K-NET ASCII", component=component, notes=(note,)
+    )
+    return [replace(recording, borehole=component in _BELOW_GROUND)]
 
 
 @dataclass
@@ -252,6 +257,7 @@ class _Block:
     width: int = 10
     peak: Fact[float] | None = None
     peak_within: float = 0.0
+    borehole: bool = False
 
     @property
     def height(self) -> int:
@@ -303,6 +309,8 @@ def _take_text(line: str, n: int, block: _Block) -> None:
     """Take the channel's name and its peak from a line of text, number `n`."""
     if named := _CHANNEL.search(line):
         block.name = named[2]
+    if _DOWNHOLE.search(line):
+        block.borehole = True
     peak = _PEAK.search(line)
     unit = known_unit(peak[2]) if peak else ""
     if peak and unit:
@@ -380,4 +388,5 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
         peak=about.peak,
         peak_within=about.peak_within,
     )
-    return recording_of(values, facts, reading, form="V2", component=printable(about.name, 30))
+    recording = recording_of(values, facts, reading, form="V2", component=printable(about.name, 30))
+    return replace(recording, borehole=about.borehole)

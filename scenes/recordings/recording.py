@@ -99,7 +99,7 @@ class Recording:
 
     `time_step` is in s. `unit` and `form` are the file's unit and format, `component` is the
     direction or channel ("" where the file names none). `notes` say what was changed in the samples
-    or assumed.
+    or assumed. `borehole`: the channel is one below the ground.
     """
 
     samples: Floats
@@ -108,6 +108,7 @@ class Recording:
     form: str
     component: str = ""
     notes: tuple[str, ...] = ()
+    borehole: bool = False
 
 
 class Contradiction(InputError):

@@ -231,11 +231,8 @@ def _supplied(path: Path, reading: Reading) -> list[Recording]:
 
 
 def _is_borehole(found: Sequence[tuple[str, Recording]]) -> bool:
-    """Whether the file holds a channel down the borehole of a KiK-net station: 1, 2, 3 of 6."""
-    return all(
-        recording.form.startswith("K-NET") and recording.component in ("1", "2", "3")
-        for _, recording in found
-    )
+    """Whether the file holds channels down a borehole alone."""
+    return all(recording.borehole for _, recording in found)
 
 
 def _vertical_file(path: Path, alone: Iterable[Path]) -> Path | None:

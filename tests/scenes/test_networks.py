@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.scenes import Floats, InputError, recordings
+from rockcheck.scenes.recordings import sets
 
 GRAVITY = recordings.GRAVITY_OF_RECORDS
 
@@ -371,6 +372,28 @@ def test_a_k_net_file_has_the_count_step_and_peak_that_it_states(written):
     expected = motion(400, 3.0)
     np.testing.assert_allclose(recording.samples, expected - expected.mean(), rtol=0, atol=1e-5)
     assert recording.time_step == 0.01
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["GeoNet V1A", "NSMN", "CWB", "SCEC BBP", "CSMIP V1, fields of 9", "RENADIC", "UNAM"],
+)
+def test_the_vertical_component_of_a_file_moves_the_base_beside_the_others(name, written):
+    write, names, _, _, _ = FORMATS[name]
+    path = written("record.txt", write(96, 0.01, 3.0).encode())
+    pairs, left_out = sets.pairs_of([path], recordings.Reading())
+    assert len(pairs) == len(names) - 1
+    assert left_out == []
+
+
+def test_a_downhole_channel_of_cosmos_is_left_out_of_a_folder(written):
+    text = cosmos_v1(96, 0.01, 3.0)
+    written("surface.V1", text.encode())
+    deep = text.replace("text line 9", "Sta Chan  1: 90 deg (Rcrdr Chan  1) Location:Downhole 30m")
+    path = written("deep.V1", deep.encode())
+    motions, left_out = sets.motions_of(sets.files_of([path.parent]), recordings.Reading())
+    assert [name for name, _ in motions] == ["surface.V1"]
+    assert "a borehole channel" in left_out[0]
 
 
 #: What a format cannot tell, and why: its numbers are free, or no peak, or no count is stated.
