@@ -59,11 +59,26 @@ class Track:
             breaks=self.breaks[self.breaks <= end],
         )
 
+    def since(self, start: float) -> "Track":
+        """The motion from `start` (s) on, where it has a state of its own."""
+        if not self.t[0] < start < self.t[-1]:
+            return self
+        rows = int(np.searchsorted(self.t, start, side="right"))
+        first = self.states_at(np.array([start]))
+        return Track(
+            t=np.insert(self.t[rows:], 0, start),
+            states=np.concatenate([first, self.states[rows:]]),
+            breaks=self.breaks[self.breaks > start],
+        )
+
     def states_at(self, times: Floats) -> Floats:
-        """States (..., 6) at times inside the motion: positions cubic, rates linear.
+        """States (..., 6) at times inside the motion: positions cubic, rates their slopes.
 
         Beside an impact both follow the nearer side: positions its rates, rates its value.
+        Positions without rates, and rates without positions, are linear.
         """
+        if len(self.t) < 2:
+            return np.repeat(self.states, len(times), axis=0)
         right = np.clip(np.searchsorted(self.t, times, side="right"), 1, len(self.t) - 1)
         left = right - 1
         before, after = times - self.t[left], self.t[right] - times
@@ -73,16 +88,25 @@ class Track:
         positions = hermite(
             share, first[:, :3], last[:, :3], length * first[:, 3:], length * last[:, 3:]
         )
-        rates = first[:, 3:] + share * (last[:, 3:] - first[:, 3:])
-        past_rows = np.searchsorted(self.breaks, self.t[left])
+        slopes = slope(
+            share, first[:, :3], last[:, :3], length * first[:, 3:], length * last[:, 3:]
+        )
+        line = first[:, 3:] + share * (last[:, 3:] - first[:, 3:])
+        rates = np.where(np.isnan(slopes), line, slopes / length)
+        # A row at the time of an impact comes after it.
+        past_rows = np.searchsorted(self.breaks, self.t[left], side="right")
         past_times = np.searchsorted(self.breaks, times, side="right")
-        past_next = np.searchsorted(self.breaks, self.t[right])
+        past_next = np.searchsorted(self.breaks, self.t[right], side="right")
         broken = past_next > past_rows
         on_left = broken & (past_times == past_rows)
         on_right = broken & ~on_left
         positions[on_left] = (first[:, :3] + before[:, None] * first[:, 3:])[on_left]
         positions[on_right] = (last[:, :3] - after[:, None] * last[:, 3:])[on_right]
         rates[on_left], rates[on_right] = first[on_left, 3:], last[on_right, 3:]
+        chord = first[:, :3] + share * (last[:, :3] - first[:, :3])
+        positions = np.where(np.isnan(positions), chord, positions)
+        at_last = times == self.t[right]
+        positions[at_last], rates[at_last] = last[at_last, :3], last[at_last, 3:]
         return np.concatenate([positions, rates], axis=1)
 
 
@@ -92,6 +116,14 @@ def hermite(share: Any, first: Any, last: Any, first_rate: Any, last_rate: Any) 
     square = 3.0 * gain - 2.0 * first_rate - last_rate
     cube = first_rate + last_rate - 2.0 * gain
     return first + share * (first_rate + share * (square + share * cube))
+
+
+def slope(share: Any, first: Any, last: Any, first_rate: Any, last_rate: Any) -> Any:
+    """The rate (per interval) of that cubic at `share` of the way."""
+    gain = last - first
+    square = 3.0 * gain - 2.0 * first_rate - last_rate
+    cube = first_rate + last_rate - 2.0 * gain
+    return first_rate + share * (2.0 * square + 3.0 * share * cube)
 
 
 def largest(
@@ -220,6 +252,27 @@ def track_of(channels: Mapping[str, NDArray[Any]], events: Sequence[Event]) -> T
     return Track.of(np.asarray(channels["t"], dtype=float), states, events)
 
 
+#: The rates of the columns of a history.
+RATES = {"x": "x_dot", "y": "y_dot", "theta": "theta_dot", "slip": "slip_rate"}
+
+
+def column_at(
+    channels: Mapping[str, NDArray[Any]], events: Sequence[Event], name: str, times: Floats
+) -> Floats:
+    """A column of a history at times inside it.
+
+    Places follow the cubics of their rates, and are linear without; rates are linear, too, and
+    jump at impacts.
+    """
+    t = np.asarray(channels["t"], dtype=float)
+    states = np.full((len(t), 6), math.nan)
+    is_place = name in RATES
+    states[:, 0 if is_place else 3] = channels[name]
+    if is_place and RATES[name] in channels:
+        states[:, 3] = channels[RATES[name]]
+    return Track.of(t, states, events).states_at(times)[:, 0 if is_place else 3]
+
+
 def _above(value: float, least: float) -> float:
     """The value where it is more than rounding; NaN stays."""
     return 0.0 if value <= least else value
@@ -234,7 +287,7 @@ def _rotations(
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
         peak, when = largest(track.t, sign * theta, sign * theta_dot, track.breaks)
         # What does not overturn stays above the floor, whatever a cubic over a long step shows.
-        rotations[side] = (min(peak, 0.5 * math.pi), when) if peak > 0.0 else (0.0, 0.0)
+        rotations[side] = (0.0, 0.0) if peak <= 0.0 else (min(peak, 0.5 * math.pi), when)
         if outcome == f"overturned {side}":
             fallen = [event.t for event in events if event.kind == outcome]
             rotations[side] = 0.5 * math.pi, fallen[0] if fallen else float(track.t[-1])

@@ -14,9 +14,8 @@ from rockcheck.scenes.scene import Scene
 
 #: Size from which a note warns of lengths in mm, m.
 LARGE = 100.0
-#: Time between rows, times p, from which a note says that they miss peaks (by 0.01 alpha);
 #: |theta| times its rate (rad^2/s) from which a block turns further.
-COARSE, FALLING = 0.3, 0.01
+FALLING = 0.01
 STATE = ("x", "y", "theta", "x_dot", "y_dot", "theta_dot")
 
 
@@ -77,12 +76,8 @@ def observe(
 
 def scene_notes(scene: Scene) -> tuple[str, ...]:
     """Notes for a reader of any history of this scene."""
-    size, apart = 2.0 * max(scene.block.half_width, scene.block.half_height), scene.output_step
-    coarse = f"rows are {apart:g} s apart, too far for peaks and for speeds at a wall"
-    notes = {
-        f"the block is {size:g} m large: lengths are in m, not mm": size > LARGE,
-        coarse: scene.frequency_parameter * apart > COARSE,
-    }
+    size = 2.0 * max(scene.block.half_width, scene.block.half_height)
+    notes = {f"the block is {size:g} m large: lengths are in m, not mm": size > LARGE}
     for which, excitation in (("horizontal", scene.excitation), ("vertical", scene.vertical)):
         if excitation.kind == "record":
             end = f"{excitation.quiet_after:g} s, before the scene's {scene.duration:g} s"

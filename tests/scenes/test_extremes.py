@@ -168,3 +168,34 @@ def test_from_a_scene_that_rests_nothing_moves():
     rows = interpolation.Track(t=np.array([0.0, 0.5, 1.0]), states=track, breaks=np.empty(0))
     found = interpolation.extremes_of(rows, scene.block, (), (), "at rest", source="model")
     assert found.top_displacement == 0.0
+
+
+def test_a_cut_motion_keeps_its_cubic():
+    history = swing(0.3)
+    track = interpolation.track_of(history.channels, ()).until(0.85)
+    assert track.states[-1, 5] == pytest.approx(0.1 * 6.75 * (1.7 - 3.0 * 0.85**2), rel=1e-9)
+
+
+def test_a_motion_cut_at_its_start_keeps_its_cubic():
+    history = swing(0.3)
+    track = interpolation.track_of(history.channels, ()).since(0.65)
+    theta, rate = track.states[:, 2], track.states[:, 5]
+    assert interpolation.largest(track.t, theta, rate, track.breaks)[0] == pytest.approx(0.1)
+
+
+def kept(history):
+    """The same history with extremes that no row shows."""
+    shown = replace(history.extremes, rotation_left=0.123, source="model")
+    return replace(history, model_extremes=shown)
+
+
+def test_a_loaded_history_reads_its_rows(tmp_path):
+    kept(swing(0.1)).save(tmp_path / "swing.csv")
+    assert History.load(tmp_path / "swing.csv").extremes.source == "rows"
+
+
+def test_a_result_that_is_read_back_keeps_what_its_model_kept(tmp_path):
+    history = kept(swing(0.1))
+    history.save(tmp_path / "swing.csv.gz")
+    found = History.load_with_extremes(tmp_path / "swing.csv.gz")
+    assert found.extremes == history.extremes

@@ -15,13 +15,11 @@ import numpy as np
 
 from rockcheck.scenes import (
     Block,
-    Extremes,
     History,
     Scene,
     Shown,
     Side,
     errors,
-    interpolation,
 )
 from rockcheck.validation.discrepancy.figures import (
     TURNS,
@@ -30,6 +28,7 @@ from rockcheck.validation.discrepancy.figures import (
     Pair,
     Unavailable,
     WindowedHistory,
+    extremes_in,
 )
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.finding import Column
@@ -89,7 +88,7 @@ def compare(
     """Compare two histories over their common time, up to `until` (s).
 
     `measures` are names from `validation.discrepancy.measures`; by default all but those that are
-    `on_request`. The candidate is interpolated linearly onto the reference's times. Both are
+    `on_request`. The candidate is interpolated onto the reference's times, with its rates. Both are
     measured with `scene`, which also gives the gravity (9.81 m/s^2 otherwise). A measure that
     cannot be computed is NaN, and its note says why. Raises `InputError` if a measure is unknown,
     the histories have no time in common, two different blocks without a `scene`, or others than it.
@@ -270,20 +269,6 @@ QUANTITIES = (
         help="largest speed with which the block strikes a wall",
     ),
 )
-
-
-def extremes_in(history: History, scene: Scene | None) -> Extremes:
-    """The extremes of a history, with the walls of its scene where the model did not keep any."""
-    if scene is None or history.model_extremes is not None:
-        return history.extremes
-    return interpolation.from_rows(
-        history.channels,
-        history.event_list,
-        scene.block,
-        history.outcome,
-        scene.walls,
-        scene.gravity,
-    )
 
 
 def motion_of(history: History, scene: Scene | None = None) -> dict[str, float | None]:

@@ -14,7 +14,18 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rockcheck.scenes import Block, Event, Floats, Frozen, History, Scene, history, kinematics
+from rockcheck.scenes import (
+    Block,
+    Event,
+    Extremes,
+    Floats,
+    Frozen,
+    History,
+    Scene,
+    history,
+    interpolation,
+    kinematics,
+)
 
 #: Start of the note of a figure that is undefined here, such as a ratio to zero.
 NOT_DEFINED = "not defined here"
@@ -138,16 +149,44 @@ def between_rows(unit: str, frequency_parameter: float, gravity: float, step: fl
     return {"angle": frequency_parameter**2 * share, "m": gravity * share, "s": step}.get(unit, 0.0)
 
 
+def extremes_in(history: History, scene: Scene | None) -> Extremes:
+    """The extremes of a history, with the walls of its scene where the model did not keep any."""
+    if scene is None or history.model_extremes is not None:
+        return history.extremes
+    return interpolation.from_rows(
+        history.channels,
+        history.event_list,
+        scene.block,
+        history.outcome,
+        scene.walls,
+        scene.gravity,
+    )
+
+
+def end_of(history: History) -> float:
+    """When a block is down, or else its history ends, s."""
+    fallen = history.overturned_at
+    return float(history.channels["t"][-1]) if fallen is None else fallen
+
+
+def last_slip_of(history: History) -> float:
+    """The slip at the end of a run, m: from the model, or in the last row; NaN where unknown."""
+    if history.model_extremes is not None:
+        return history.model_extremes.last_slip
+    return float(history.channels["slip"][-1]) if "slip" in history.channels else math.nan
+
+
 @dataclass(frozen=True)
 class WindowedHistory:
     """One history as the figures see it: cut to a window, with the scene if it is known.
 
-    The scene gives the block, gravity and walls.
+    The scene gives the block, gravity and walls. The window is from `since` to `until` (s).
     """
 
     history: History
     scene: Scene | None = None
     until: float = math.inf
+    since: float = -math.inf
 
     @property
     def block(self) -> Block:
@@ -167,8 +206,50 @@ class WindowedHistory:
         """One column within the window."""
         if name not in self.history.channels:
             raise Unavailable(f"{self.history.model} has no column {name}")
-        inside = self.history.channels["t"] <= self.until + 1e-9
+        t = self.history.channels["t"]
+        inside = (t >= self.since - 1e-9) & (t <= self.until + 1e-9)
         return np.asarray(self.history.channels[name][inside], dtype=float)
+
+    @property
+    def end(self) -> float:
+        """When the window ends, or before that the history or the fall of its block, s."""
+        return min(self.until, end_of(self.history))
+
+    def at_end(self, name: str) -> float:
+        """A column's value at the end of the window; in the last row where that is earlier."""
+        last = min(self.until, float(self.history.channels["t"][-1]))
+        return float(self.at(name, np.array([last]))[0])
+
+    def at(self, name: str, times: Floats) -> Floats:
+        """A column at times (s) inside the history, with its rates."""
+        channels = self.history.channels
+        if name not in channels:
+            raise Unavailable(f"{self.history.model} has no column {name}")
+        return interpolation.column_at(channels, self.history.event_list, name, times)
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the window holds the whole run."""
+        begins = self.since <= float(self.history.channels["t"][0]) + 1e-9
+        return begins and self.until >= end_of(self.history) - 1e-9
+
+    @cached_property
+    def extremes(self) -> Extremes:
+        """The extremes of the whole run, or between the rows in the window."""
+        if self.is_whole:
+            return extremes_in(self.history, self.scene)
+        inside = [one for one in self.history.event_list if self.since <= one.t <= self.until]
+        fell = [one.kind for one in inside if one.kind in TURNS]
+        track = interpolation.track_of(self.history.channels, self.history.event_list)
+        return interpolation.extremes_of(
+            track.since(self.since).until(self.until),
+            self.history.block if self.scene is None else self.scene.block,
+            () if self.scene is None else self.scene.walls,
+            inside,
+            fell[0] if fell else "moving",
+            source="rows",
+            gravity=self.gravity,
+        )
 
     def events(self, *kinds: str, start: float = -math.inf) -> list[Event]:
         """Events of these kinds within the window, from `start` (s) on.
@@ -211,9 +292,10 @@ def _joined(events: Sequence[Event]) -> list[Event]:
 class Pair:
     """Reference and candidate over their common time up to `until` (s).
 
-    `time` are the reference's times within it; the candidate is interpolated linearly. `start` and
-    `end` bound the common time within the window. `known` is the history whose block is known, the
-    reference's where both are. `alpha` is that block's slenderness angle, rad; None if unknown.
+    `time` are the reference's times within it; the candidate is interpolated, with its rates.
+    `start` and `end` bound the common time within the window. `known` is the history whose block is
+    known, the reference's where both are. `alpha` is that block's slenderness angle, rad; None if
+    unknown.
     """
 
     def __init__(
@@ -227,6 +309,7 @@ class Pair:
         t, other = (np.asarray(one.channels["t"], float) for one in (reference, candidate))
         self.start = max(float(t[0]), float(other[0]))
         self.end = min(float(t[-1]), float(other[-1]), until)
+        self.scene = scene
         self.time: Floats = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
         known = candidate if reference.alpha is None else reference
         self.known = WindowedHistory(known, scene)
@@ -234,8 +317,8 @@ class Pair:
 
     def channels(self, name: str) -> Floats:
         """One column of both on `time`: reference and candidate, a row each."""
-        both = (WindowedHistory(one) for one in (self.reference, self.candidate))
-        return np.array([np.interp(self.time, one.channel("t"), one.channel(name)) for one in both])
+        both = WindowedHistory(self.reference), WindowedHistory(self.candidate)
+        return np.array([one.at(name, self.time) for one in both])
 
     @cached_property
     def theta(self) -> Floats:
@@ -245,18 +328,20 @@ class Pair:
     @property
     def rocking(self) -> Floats:
         """`theta`; raises `Unavailable` where the reference's peak is too small to divide by."""
-        floor = Measure.resolution
-        if self.alpha is not None and len(self.time) > 1:
-            g, step = self.known.gravity, float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
-            floor = max(
-                floor,
-                between_rows(
-                    "angle", self.known.block.weaker_pivot.frequency_parameter(g), g, step
-                ),
-            )
-        if np.max(np.abs(self.theta[0])) <= floor:
+        if np.max(np.abs(self.theta[0])) <= Measure.resolution:
             raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
         return self.theta
+
+    @property
+    def peaks(self) -> tuple[float, float]:
+        """Largest |theta| of both, rad; raises `Unavailable` as `rocking`."""
+        peaks = [
+            WindowedHistory(one, self.scene, until=self.end, since=self.start).extremes
+            for one in (self.reference, self.candidate)
+        ]
+        if peaks[0].peak_rotation <= Measure.resolution * (self.alpha or 1.0):
+            raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
+        return peaks[0].peak_rotation, peaks[1].peak_rotation
 
     @cached_property
     def energies(self) -> Floats:

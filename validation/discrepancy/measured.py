@@ -12,7 +12,17 @@ from typing import ClassVar
 import numpy as np
 import scipy  # it loads its parts as they are used
 
-from rockcheck.scenes import Cost, Finite, Frozen, History, InputError, Scene, errors, printable
+from rockcheck.scenes import (
+    Cost,
+    Finite,
+    Frozen,
+    History,
+    InputError,
+    Scene,
+    errors,
+    interpolation,
+    printable,
+)
 from rockcheck.scenes.history import outcome_of
 from rockcheck.validation.discrepancy.figures import TURNS
 
@@ -131,6 +141,7 @@ def shifted(history: History, offset: float) -> History:
         event_list=tuple(
             dataclasses.replace(event, t=event.t + offset) for event in history.event_list
         ),
+        model_extremes=None,
     )
 
 
@@ -165,7 +176,9 @@ def mean_history(
     if len(t) < 2:
         raise InputError("the tests have no time in common", "files")
     stacked = {
-        name: np.array([np.interp(t, test.channels["t"], test.channels[name]) for test in tests])
+        name: np.array(
+            [interpolation.column_at(test.channels, test.event_list, name, t) for test in tests]
+        )
         for name in sorted(AVERAGED)
         if all(name in test.channels for test in tests)
     }
@@ -184,6 +197,7 @@ def mean_history(
         first,
         channels=channels,
         event_list=(),
+        model_extremes=None,
         outcome=fell[0] or outcome_of(channels),
         uncertainty={name: factor * value for name, value in scatter.items()},
         notes=(*first.notes, f"the mean of {len(tests)} tests"),

@@ -17,7 +17,7 @@ import numpy as np
 import scipy  # it loads its parts as they are used
 from numpy.typing import NDArray
 
-from rockcheck.scenes import Event, Floats, Pivot, Scene, kinematics
+from rockcheck.scenes import Event, Floats, Pivot, Scene, interpolation, kinematics
 from rockcheck.validation.criteria import quarter_period
 from rockcheck.validation.discrepancy import figures
 
@@ -259,7 +259,7 @@ DIFFERENCES = figures.by_name(
         "ratio of peak rotations",
         "1",
         "max |c| / max |r| of theta.",
-        lambda pair: float(np.max(np.abs(pair.rocking[1])) / np.max(np.abs(pair.rocking[0]))),
+        lambda pair: pair.peaks[1] / pair.peaks[0],
         ideal=1.0,
     ),
     figures.Measure(
@@ -355,7 +355,17 @@ DIFFERENCES = figures.by_name(
 def _peak_rotation(motion: figures.WindowedHistory) -> figures.Value:
     at = motion.history.overturned_at
     fell = "" if at is None or at > motion.until else f"the block overturned at {at:.3g} s"
-    return float(np.max(np.abs(motion.channel("theta")))) / motion.block.alpha, fell
+    return motion.extremes.peak_rotation / motion.block.alpha, fell
+
+
+def _last_slip(motion: figures.WindowedHistory) -> float:
+    motion.channel("slip")  # a history without it has none
+    return figures.last_slip_of(motion.history) if motion.is_whole else motion.at_end("slip")
+
+
+def _highest_hop(motion: figures.WindowedHistory) -> float:
+    motion.channel("y")  # a history without it has no heights
+    return motion.extremes.hop if motion.block else math.nan
 
 
 def _deepest(motion: figures.WindowedHistory) -> float:
@@ -387,30 +397,30 @@ FIGURES = figures.by_name(
         "last_rotation",
         "last rotation",
         "angle",
-        "theta in the window's last row, in alpha: sees a shift in time that a peak does not.",
-        lambda motion: float(motion.channel("theta")[-1]) / motion.block.alpha,
+        "theta at the window's end, in alpha: sees a shift in time that a peak does not.",
+        lambda motion: motion.at_end("theta") / motion.block.alpha,
     ),
     _quantity(
         "last_x",
         "last x",
         "m",
-        "The centroid's x in the window's last row, m.",
-        lambda motion: float(motion.channel("x")[-1]),
+        "The centroid's x at the window's end, m.",
+        lambda motion: motion.at_end("x"),
     ),
     _quantity(
         "last_slip",
         "last slip",
         "m",
-        "Where the pivot corner stands along the floor in the window's last row, m from its"
-        " first place.",
-        lambda motion: float(motion.channel("slip")[-1]),
+        "Where the pivot corner stands along the floor at the window's end, m from its first"
+        " place.",
+        _last_slip,
     ),
     _quantity(
         "end_time",
         "end of motion",
         "s",
-        "Time of the window's last row, s; before the scene's duration where the block overturned.",
-        lambda motion: float(motion.channel("t")[-1]),
+        "End of the window or the run, s; where the block overturned, when it did.",
+        lambda motion: motion.end,
     ),
     _quantity(
         "floor_impacts",
@@ -434,14 +444,14 @@ FIGURES = figures.by_name(
         "m",
         "Largest height of the lowest corner above the floor, m; 0 for a model without free"
         " flight.",
-        lambda motion: float(np.maximum(np.max(motion.heights()), 0.0)),
+        _highest_hop,
     ),
     figures.Measure(
         "deepest_penetration",
         "deepest penetration",
         "m",
         "Largest depth of a corner below the floor or behind a wall (walls where the scene is"
-        " known), m.",
+        " known) in a row, m.",
         _deepest,
     ),
     figures.Measure(
@@ -485,9 +495,10 @@ def _bounce_height(motion: figures.WindowedHistory) -> float:
     t = motion.channel("t")
     strikes = math.sqrt(2.0 * height / scene.gravity)
     lands = strikes * (1.0 + 2.0 * e)
-    hop = motion.channel("y")[(t > strikes) & (t < lands)] - motion.block.half_height
-    _need(len(hop) > 0, "rows after the first bounce")
-    return float(np.max(hop)) - e**2 * height
+    hops = (t > strikes) & (t < lands)
+    _need(bool(np.any(hops)), "rows after the first bounce")
+    highest = _largest(motion, "y", hops) - motion.block.half_height
+    return highest - e**2 * height
 
 
 def _quarter_period(motion: figures.WindowedHistory) -> float:
@@ -501,15 +512,28 @@ def _impact_ratio(motion: figures.WindowedHistory) -> float:
     scene, old, new = _released(motion)
     impacts = [event.t for event in motion.events("floor impact")]
     _need(len(impacts) >= 2, "two floor impacts")
-    t, theta = motion.channel("t"), motion.channel("theta")
-    swing = np.abs(theta[(t > impacts[0]) & (t < impacts[1])])
-    _need(len(swing) > 0, "rows between the first two floor impacts")
+    t = motion.channel("t")
+    swings = (t > impacts[0]) & (t < impacts[1])
+    _need(bool(np.any(swings)), "rows between the first two floor impacts")
+    swing = max(_largest(motion, "theta", swings), _largest(motion, "theta", swings, sense=-1.0))
     before, after = (
         pivot.frequency_parameter(scene.gravity)
         * math.sqrt(math.cos(pivot.alpha - tilt) - math.cos(pivot.alpha))
-        for pivot, tilt in ((old, abs(scene.initial_rotation)), (new, float(np.max(swing))))
+        for pivot, tilt in ((old, abs(scene.initial_rotation)), (new, swing))
     )
     return after / before - (1.0 - new.share * new.arm * (new.arm + old.arm) / new.radius**2)
+
+
+def _largest(
+    motion: figures.WindowedHistory, name: str, rows: NDArray[np.bool_], sense: float = 1.0
+) -> float:
+    """Largest value of a place in these rows and between them, or of its negative."""
+    columns = motion.history.channels
+    place = sense * motion.channel(name)[rows]
+    rate = np.full(len(place), math.nan)
+    if interpolation.RATES[name] in columns:
+        rate = sense * motion.channel(interpolation.RATES[name])[rows]
+    return interpolation.largest(motion.channel("t")[rows], place, rate, np.empty(0))[0]
 
 
 def _scene(motion: figures.WindowedHistory) -> Scene:

@@ -16,7 +16,7 @@ from rockcheck.ebm.table import table_of
 from rockcheck.scenes import Extremes, Floats, History, ModelFailure, Scene, Side, kinematics
 from rockcheck.scenes.history import OUTCOMES, STILL
 from rockcheck.scenes.scene import MOST_SAMPLES
-from rockcheck.validation.discrepancy.compare import extremes_in
+from rockcheck.validation.discrepancy.figures import extremes_in
 
 #: A motion is followed up to this many 1/p after the base has come to rest; event-based models,
 #: which cost a thousandth, go farther in `rockcheck.ebm.fates`.

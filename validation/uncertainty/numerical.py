@@ -17,11 +17,10 @@ is no less than the error at h. So the second row needs no order, only a factor 
 Roache 1994; ASME V&V 20-2009, section 2). Where d does not grow with the step, impacts come in
 another order from run to run. Then any figure may be off by what any history is, with the larger
 factor (3: Eca and Hoekstra 2014; Oberkampf and Roy 2010, section 8.7). The run at 3h is for that:
-figures that agree at h, 2h and 4h by chance seldom agree at 3h. A peak and the time of a fall are
-read off rows; how far the true ones may lie from the rows is added in quadrature.
+figures that agree at h, 2h and 4h by chance seldom agree at 3h.
 
 An event-based model has a tolerance instead of a step: u_num = 1.25 times the change at a hundredth
-of it, and the rows count as well. All uncertainties here are expanded ones: intervals that are
+of it. All uncertainties here are expanded ones: intervals that are
 meant to hold 95 % of the cases.
 """
 
@@ -32,7 +31,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, printable
-from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.discrepancy.figures import Stored, end_of, extremes_in, last_slip_of
 
 #: Steps of the runs, in units of the finest.
 FACTORS = (1.0, 2.0, 3.0, 4.0)
@@ -124,8 +123,8 @@ def numerical_uncertainty(
         quantities=(
             _quantity("theta_rms", "alpha", rms, SAFETY * rms),
             *(
-                _quantity(name, unit, value, math.hypot(SAFETY * abs(better - value), near))
-                for (name, unit, value, near), (_, _, better, _) in figures
+                _quantity(name, unit, value, SAFETY * abs(better - value))
+                for (name, unit, value), (_, _, better) in figures
             ),
             _quantity("outcome", "", given.outcome),
         ),
@@ -143,7 +142,7 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> Iterator[Quantity]:
     alpha, finest = scene.block.alpha, runs[0]
     units = {"alpha": 1.0, "m": alpha * scene.block.radius, "s": 1.0 / scene.frequency_parameter}
     changes = [_changes(scene, finest, coarser) for coarser in runs[1:]]
-    shown = [("theta_rms", "alpha", changes[0]["theta_rms"], 0.0), *_scalars(scene, finest)]
+    shown = [("theta_rms", "alpha", changes[0]["theta_rms"]), *_scalars(scene, finest)]
     apart = [max(one[name] / units[unit] for name, unit, *_ in shown) for one in changes]
     order = _order(apart)
     converge = apart == sorted(apart) and order is not None and order >= LEAST_ORDER
@@ -154,15 +153,18 @@ def _from_steps(scene: Scene, runs: Sequence[History]) -> Iterator[Quantity]:
         unsure = reason = f"the outcome changes with the step: {', '.join(sides)} at h, 2h, 3h, 4h"
     elif parted > LARGE:
         reason = f"the histories part by {parted:.2g} with the step, more than {LARGE:g}"
-    for name, unit, value, near in shown:
+    for name, unit, value in shown:
         own = [one[name] for one in changes]
         u = SAFETY * max(own) if converge else POOR_SAFETY * max(apart) * units[unit]
-        yield _quantity(name, unit, value, math.hypot(u, near), reason, _order(own))
+        yield _quantity(name, unit, value, u, reason, _order(own))
     yield _quantity("outcome", "", finest.outcome, reason=unsure)
 
 
 def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
-    """Largest change of each figure's history between two runs; of theta_rms the RMS over time."""
+    """Largest change of each figure's history between two runs; of theta_rms the RMS over time.
+
+    A peak between rows, and a slip after the last one, may change by more than the rows do.
+    """
     rows = min(len(one.channels["theta"]), len(other.channels["theta"]))
     change = {
         name: np.abs(other.channels[name][:rows] - one.channels[name][:rows])
@@ -170,11 +172,14 @@ def _changes(scene: Scene, one: History, other: History) -> dict[str, float]:
         if name in one.channels
     }
     theta = change["theta"] / scene.block.alpha
+    first, second = extremes_in(one, scene), extremes_in(other, scene)
+    peaks = abs(second.peak_rotation - first.peak_rotation) / scene.block.alpha
+    slips = abs(last_slip_of(other) - last_slip_of(one))
     return {
         "theta_rms": float(np.sqrt(np.mean(theta**2))),
-        "peak_rotation": float(np.max(theta)),
-        "last_slip": float(np.max(change.get("slip", 0.0))),
-        "end_time": abs(float(other.channels["t"][-1] - one.channels["t"][-1])),
+        "peak_rotation": float(np.fmax(np.max(theta), peaks)),
+        "last_slip": float(np.fmax(np.max(change.get("slip", 0.0)), slips)),
+        "end_time": abs(end_of(other) - end_of(one)),
     }
 
 
@@ -202,31 +207,16 @@ def _quantity(
     )
 
 
-def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float, float]]:
-    """Scalar figures: peak rotation and last slip, or time of the fall.
-
-    Name, unit, value, and how far the true one may lie from the rows that it is read from.
-    """
+def _scalars(scene: Scene, history: History) -> list[tuple[str, str, float]]:
+    """Scalar figures with their units: peak rotation and last slip, or time of the fall."""
     if _side(history) != "stands":
-        return [("end_time", "s", float(history.channels["t"][-1]), scene.output_step)]
-    # The peak exceeds the rows at most as the parabola through the top three does, or, where the
-    # block strikes, the point at which the tangents of two rows meet.
-    alpha, theta = scene.block.alpha, history.channels["theta"]
-    height, side = np.abs(theta), np.sign(theta[:-1])
-    bends = np.pad(np.abs(height[:-2] - 2.0 * height[1:-1] + height[2:]), 1)
-    rate, step = history.channels.get("theta_dot", 0.0 * theta), np.diff(history.channels["t"])
-    up, down = side * rate[:-1], side * rate[1:]
-    turns = (up > 0.0) & (down <= 0.0)
-    after = (side * np.diff(theta) - down * step)[turns] / (up - down)[turns]
-    meet = height[:-1][turns] + up[turns] * np.clip(after, 0.0, step[turns])
-    missed = max(bends[np.argmax(height)] / 8.0, np.max(meet, initial=0.0) - np.max(height))
-    return [
-        ("peak_rotation", "alpha", float(np.max(height)) / alpha, float(missed) / alpha),
-        *(
-            ("last_slip", "m", slip, 0.0)
-            for slip in history.channels.get("slip", np.empty(0))[-1:].tolist()
-        ),
-    ]
+        return [("end_time", "s", end_of(history))]
+    extremes = extremes_in(history, scene)
+    scalars = [("peak_rotation", "alpha", extremes.peak_rotation / scene.block.alpha)]
+    slip = last_slip_of(history)
+    if math.isfinite(slip):
+        scalars.append(("last_slip", "m", slip))
+    return scalars
 
 
 def _side(history: History) -> str:

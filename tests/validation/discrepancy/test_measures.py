@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck import Event, EventBasedModel, Floor, compare, load_scene
+from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import describe
 from rockcheck.validation.discrepancy.figures import Pair, match_impacts
@@ -115,7 +116,8 @@ def test_grids_may_differ_and_until_cuts(made):
     coarse = np.linspace(0.0, 10.0, 1501)
     drifting = np.where(coarse > 5.0, 0.1 * (coarse - 5.0), 0.0)
     theta = 0.3 * np.sin(2 * np.pi * coarse) + drifting
-    found = compare(made(WAVE, T), made(theta, coarse), until=5.0)
+    rate = made(np.gradient(theta, coarse)).channels["theta"]
+    found = compare(made(WAVE, T), made(theta, coarse, theta_dot=rate), until=5.0)
     assert found["theta_peak"] < 1e-4
     assert (found.end, found.figures[0].window) == (5.0, "5s")
 
@@ -322,8 +324,13 @@ def test_matching_takes_the_nearest_and_each_once():
 
 def test_figures_of_one_history(made):
     theta, weak = 0.5 * np.sin(np.pi * T), impact(2.0, 0.001)
+    unknown = dict.fromkeys(("theta_dot", "y_dot"), np.full(len(T), math.nan))
     history = made(
-        theta, T, x=np.linspace(0, 0.1, len(T)), events=[*map(impact, (1.0, 3.0, 3.001)), weak]
+        theta,
+        T,
+        x=np.linspace(0, 0.1, len(T)),
+        events=[*map(impact, (1.0, 3.0, 3.001)), weak],
+        **unknown,
     )
     values, y = figures(history), history.channels["y"]
     assert set(values) == {
@@ -332,7 +339,70 @@ def test_figures_of_one_history(made):
     expected = {"peak_rotation": 0.5, "last_x": 0.1, "floor_impacts": 2, "highest_hop": 0.0}
     assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-12)
     for name, rise in (("highest_hop", 0.004), ("deepest_penetration", -0.002)):
-        assert figures(made(theta, T, y=y + rise))[name] == pytest.approx(abs(rise))
+        assert figures(made(theta, T, y=y + rise, **unknown))[name] == pytest.approx(abs(rise))
+
+
+def turning(step, peak=0.5):
+    """A block that rocks once to the left with a cubic rotation, its rows `step` apart."""
+    t = np.arange(0.0, 1.0 + 0.5 * step, step)
+    return {
+        "t": t,
+        "theta": peak * 6.75 * t * t * (1.0 - t),
+        "rate": peak * 6.75 * (2.0 * t - 3.0 * t * t),
+    }
+
+
+def rocked(made, step, **more):
+    motion = turning(step)
+    return made(motion["theta"], motion["t"], theta_dot=PAPER_BLOCK.alpha * motion["rate"], **more)
+
+
+def test_the_peak_of_a_window_lies_between_rows(made):
+    assert figures(rocked(made, 0.3), until=0.85)["peak_rotation"] == pytest.approx(0.5, rel=1e-9)
+
+
+def test_a_window_that_ends_between_rows_ends_there(made):
+    found = figures(rocked(made, 0.3), until=0.5)
+    assert found["last_rotation"] == pytest.approx(0.5 * 6.75 * 0.125, rel=1e-9)
+    assert found["peak_rotation"] == pytest.approx(0.5 * 6.75 * 0.125, rel=1e-9)
+
+
+def test_the_peak_of_a_window_at_an_impact_is_where_both_sides_meet(made):
+    t = np.arange(0.0, 1.05, 0.1)
+    theta = np.where(t <= 0.43, t, 0.86 - t)
+    rate = PAPER_BLOCK.alpha * np.where(t <= 0.43, 1.0, -1.0)
+    hit = impact(0.43, kind="wall impact")
+    history = made(theta, t, theta_dot=rate, events=[hit])
+    assert figures(history, until=0.8)["peak_rotation"] == pytest.approx(0.43, rel=1e-9)
+
+
+def test_a_whole_run_reads_what_the_model_kept(made):
+    history = rocked(made, 0.3)
+    model = dataclasses.replace(history.extremes, rotation_left=0.123, hop=0.045, source="model")
+    found = figures(dataclasses.replace(history, model_extremes=model))
+    assert found["peak_rotation"] == pytest.approx(0.123 / PAPER_BLOCK.alpha)
+    assert found["highest_hop"] == 0.045
+
+
+def test_the_ratio_of_peaks_does_not_depend_on_rows(made):
+    found = compare(rocked(made, 0.3), rocked(made, 0.05))
+    assert found["peak_ratio"] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_a_candidate_is_interpolated_with_its_rates(made):
+    found = compare(rocked(made, 0.05), rocked(made, 0.1))
+    assert found["theta_peak"] < 1e-12
+
+
+def test_a_fall_ends_the_motion_when_it_happens(made):
+    down = Event(t=0.9537, kind="overturned left")
+    history = rocked(made, 0.1, events=[down], outcome="overturned left")
+    assert figures(history)["end_time"] == 0.9537
+
+
+def test_a_rotation_that_is_not_a_number_has_no_peak(made):
+    history = made(np.array([0.0, math.nan, 0.1]))
+    assert math.isnan(history.extremes.peak_rotation)
 
 
 def test_a_measured_history_may_lack_columns(made):

@@ -215,7 +215,8 @@ def below_and_above(below: Motion, above: Motion) -> float:
 
 def falls_without_impact(motion: Motion) -> float:
     """1 if the block overturns without having tipped to the other side, else 0."""
-    other_side = min(-np.min(motion.theta), np.max(motion.theta))
+    extremes = motion.history.extremes
+    other_side = min(extremes.rotation_left, extremes.rotation_right)
     return falls(motion) * float(other_side < 0.01 * NEEDLE.alpha)
 
 

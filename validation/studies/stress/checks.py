@@ -109,7 +109,8 @@ def _is_clearance_wrong(model: EventBasedModel, scene: Scene, seed: int) -> bool
     gaps = kinematics.clearance(
         scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
     )
-    reach = float(np.max(-gaps))
+    extremes = history.extremes
+    reach = extremes.reach_left if side == "left" else extremes.reach_right
     # A contact that parts at the settling speed stays closed: what is smaller is not resolved.
     room = float(np.max(np.abs(np.diff(gaps)))) + 2.0 * SETTLE * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:

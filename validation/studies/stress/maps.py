@@ -195,9 +195,9 @@ def stand_still(label: str, case: str, duration: float) -> MapResult:
         float(channels["t"][-1]),
         float(history.settings.get("time_step", step)) if line.family == "cm" else step,
         {
-            "creep": float(np.max(np.abs(channels["slip"]))) / radius,
+            "creep": history.extremes.slip / radius,
             "sinking": max(0.0, float(np.max(-height))) / radius,
-            "rotation": float(np.max(np.abs(channels["theta"]))) / block.alpha,
+            "rotation": history.extremes.peak_rotation / block.alpha,
             "uplift": max(0.0, float(np.max(lifted))) / radius,
             "jitter": float(np.sqrt(np.mean(speed[late] ** 2))) / math.sqrt(9.81 * radius)
             if late.any()
