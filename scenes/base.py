@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, Strict, ValidationError
 
-from rockcheck.scenes.errors import from_validation
+from rockcheck.scenes.errors import InputError, from_validation, unknown_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,17 +53,49 @@ class Frozen(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    def __init__(self, **data: Any) -> None:
+    def __init__(self, *values: Any, **data: Any) -> None:
+        if values:
+            raise _without_names(type(self))
         try:
             super().__init__(**data)
         except ValidationError as error:
             raise from_validation(error, type(self).model_fields) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raises `InputError`: a field is changed in a copy, by `replace`."""
+        if name.startswith("_"):
+            super().__setattr__(name, value)
+            return
+        raise _is_frozen(type(self), name)
+
+    def __delattr__(self, name: str) -> None:
+        """Raises `InputError`, as `__setattr__`."""
+        raise _is_frozen(type(self), name)
 
     def replace(self, **change: object) -> Self:
         """A copy with some fields changed, validated like any other."""
         return type(self)(
             **{name: getattr(self, name) for name in type(self).model_fields} | change
         )
+
+
+def _without_names(kind: type[Frozen]) -> InputError:
+    """The error for values that are given without the names of their fields."""
+    names = ", ".join(kind.model_fields)
+    first = next(iter(kind.model_fields))
+    return InputError(
+        f"{kind.__name__} takes its values by name, as in {kind.__name__}({first}=...); names:"
+        f" {names}"
+    )
+
+
+def _is_frozen(kind: type[Frozen], name: str) -> InputError:
+    """The error for a field, or what was meant to be one, that is assigned or deleted."""
+    if name not in kind.model_fields:
+        return unknown_name(f"field of {kind.__name__}", name, kind.model_fields)
+    return InputError(
+        f"{kind.__name__} does not change: replace({name}=...) gives a changed copy", name
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

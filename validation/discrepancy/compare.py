@@ -58,13 +58,24 @@ class Discrepancy(Shown):
     histories: tuple[History, History] = field(kw_only=True, repr=False, compare=False)
 
     def __getitem__(self, measure: str) -> float:
-        """The value of a measure; NaN where it could not be computed."""
+        """The value of a measure; NaN where it could not be computed. Raises as `figure`."""
         value = self.figure(measure).value
         return math.nan if value is None else value
 
+    def __contains__(self, measure: object) -> bool:
+        """Whether there is a figure of that measure."""
+        return any(figure.measure == measure for figure in self.figures)
+
     def figure(self, measure: str) -> Figure:
-        """The figure of a measure; KeyError for an unknown one."""
-        return {found.measure: found for found in self.figures}[measure]
+        """The figure of a measure; raises `InputError` for one that is unknown, or not here."""
+        figures = {figure.measure: figure for figure in self.figures}
+        if measure in figures:
+            return figures[measure]
+        if measure in DIFFERENCES:
+            raise errors.InputError(
+                f"{measure} was not computed: name it in compare(..., measures=[{measure!r}])"
+            )
+        raise errors.unknown_name("measure", str(measure), figures)
 
     @cached_property
     def table(self) -> pd.DataFrame:
