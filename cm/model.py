@@ -109,14 +109,18 @@ class ContinuousModel(Frozen):
         )
         return GRID / math.ceil(GRID / longest * (1.0 - 1e-12))
 
+    def check(self, scene: Scene) -> None:
+        """Raises `InputError` where the scene asks for physics that this model excludes."""
+        errors.check_kind(scene, Scene, "load_scene", "scene")
+        scene.check_friction("the continuous model")
+
     def simulate(self, scene: Scene) -> History:
         """The motion of the scene's block. Events: floor impacts, wall impacts, overturning.
 
-        Raises `ModelFailure` where the motion gains energy out of nothing (far too long a step,
-        absurd excitation) or asks for too many steps.
+        Raises `InputError` (see `check`), and `ModelFailure` where the motion gains energy out of
+        nothing (far too long a step, absurd excitation) or asks for too many steps.
         """
-        errors.check_kind(scene, Scene, "load_scene", "scene")
-        scene.check_friction("the continuous model")
+        self.check(scene)
         began = time.perf_counter()
         from rockcheck.cm import extremes, kernels
 

@@ -83,6 +83,8 @@ class Engine(Frozen):
     #: The first and the last Python that the package has wheels for; None where it keeps up.
     first_python: ClassVar[tuple[int, int]] = (3, 11)
     last_python: ClassVar[tuple[int, int] | None] = None
+    #: Whether it takes no centre of mass and no moment of inertia but those of a homogeneous block.
+    homogeneous_only: ClassVar[bool] = False
     #: Why its steps cannot vary; "" where they can.
     fixed_because: ClassVar[str] = ""
     #: The settings in which contacts have Newton's coefficient of restitution.
@@ -201,15 +203,8 @@ class Engine(Frozen):
         }
         return [note for note, applies in notes.items() if applies]
 
-    def simulate(self, scene: Scene) -> History:
-        """The history of the scene as the engine plays it.
-
-        The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises
-        `InputError` if the scene needs more than five million steps, `NotInstalled` if the engine
-        is missing, `ModelFailure` if the motion blows up or its events do not end.
-        """
-        if not self.installed():
-            raise errors.NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
+    def check(self, scene: Scene) -> None:
+        """Raises `InputError` where the engine cannot hold the scene, or needs too many steps."""
         errors.check_kind(scene, Scene, "load_scene", "scene")
         steps = self.steps
         if scene.duration / steps.largest > MOST_STEPS:
@@ -218,6 +213,22 @@ class Engine(Frozen):
                 f" {MOST_STEPS} steps",
                 steps.knobs[0],
             )
+        if self.homogeneous_only and not scene.block.homogeneous:
+            raise errors.InputError(
+                f"{type(self).__name__} holds a homogeneous block only", "block.centre_of_mass"
+            )
+
+    def simulate(self, scene: Scene) -> History:
+        """The history of the scene as the engine plays it.
+
+        The cost's `wall_seconds` and `cpu_seconds` are those of the march alone. Raises
+        `InputError` (see `check`), `NotInstalled` if the engine is missing, `ModelFailure` if the
+        motion blows up or its events do not end.
+        """
+        if not self.installed():
+            raise errors.NotInstalled(f"the engine {self.name}: {self.hint()}", self.name)
+        self.check(scene)
+        steps = self.steps
         start = time.perf_counter()
         best = self.settings == "best"
         unit = scene.block.radius if best else 1.0  # of length, m

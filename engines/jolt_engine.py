@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
-from rockcheck.scenes import InputError, ModelFailure, Scene
+from rockcheck.scenes import ModelFailure, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
 #: Of a second's velocity that Jolt takes away, and culverin has no word for.
@@ -28,8 +28,6 @@ class _JoltWorld(steps.World):
     def __init__(self, scene: Scene) -> None:
         import culverin
 
-        if not scene.block.homogeneous:
-            raise InputError("Jolt holds a homogeneous block only", "block.centre_of_mass")
         self.jolt = culverin
         self.world = culverin.PhysicsWorld(settings={"gravity": (0.0, 0.0, 0.0), **ROOM})
         # Of two frictions the geometric mean counts, of two restitutions the larger.
@@ -103,6 +101,7 @@ class Jolt(Engine):
     first_python: ClassVar[tuple[int, int]] = (3, 12)
     precision: ClassVar[Literal["double", "single"]] = "single"
     fixed_because: ClassVar[str] = "Jolt's velocities are in single precision"
+    homogeneous_only: ClassVar[bool] = True
     worlds: ClassVar[Worlds] = (_RigidJoltWorld, _JoltWorld)
     contact_parameters: ClassVar[ContactParameters] = ContactParameters(
         (0.0, 1.2),

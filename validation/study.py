@@ -296,6 +296,7 @@ class _Run:
                         )
                     )
                 elif time.monotonic() < until:
+                    self.heard(len(self.done), len(self.known), task.label)
                     self._end(task, pool.guarded(self.source.play, task))
             if calls:
                 ends = self._workers.run(calls, until=until, on_playing=self._hear_playing)

@@ -20,13 +20,15 @@ from rich.console import Console
 from rich.progress import (
     BarColumn,
     Progress,
+    ProgressColumn,
     Task as ProgressTask,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
-    TimeRemainingColumn,
 )
+from rich.text import Text
 
+from rockcheck.commands.pace import Pace
 from rockcheck.reports.style import ENDINGS, kind_of
 from rockcheck.scenes import InputError, Record, Scene, errors, named_scenes, printable, writing
 from rockcheck.scenes.progress import OnProgress, announcing, within
@@ -75,6 +77,8 @@ PlotOption = Annotated[
 
 #: All models that are installed.
 ALL = "all"
+#: Most lines on what failed that --quiet prints.
+MOST_WRONG = 100
 
 #: Output of a command: tables and progress, one JSON value instead, or errors only.
 Voice = Literal["tables", "json", "quiet"]
@@ -166,35 +170,35 @@ def progress(
     It says if one of the `models` (family, settings) that play may compile first. Nothing is shown
     where a command is quiet.
     """
-    title += ", may compile first" * any(compiles(*one) for one in models)
-    screen = Console(stderr=True)
+    may_compile = any(compiles(*model) for model in models)
+    title += ", may compile first" * may_compile
+    screen, pace = Console(stderr=True), Pace(compiles=may_compile)
     bar = Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(20),
         TaskProgressColumn(),
         TimeElapsedColumn(),
-        TimeRemainingColumn(),
-        TextColumn("left"),
+        _TimeLeft(pace),
         console=screen,
         transient=True,
-        speed_estimate_period=600.0,
         disable=_voice.get() != "tables" or not screen.is_terminal,
     )
     bar.add_task(title, total=None, what="")
     (task,) = bar.tasks
 
     def on_progress(done: float, total: float, what: str = "") -> None:
+        pace.hear(done, total)
         bar.update(
             task.id,
             total=total,
+            completed=done,
             description=f"{title}: {printable(what, 24)}" if what else title,
             what=what,
         )
-        bar.advance(task.id, done - task.completed)  # what is read back counts for no time
 
     over = threading.Event()
     if bar.disable and _voice.get() != "quiet":
-        threading.Thread(target=_tell_lines, args=[title, task, over], daemon=True).start()
+        threading.Thread(target=_tell_lines, args=[title, task, pace, over], daemon=True).start()
     with nullcontext() if bar.disable else bar:
         try:
             yield on_progress
@@ -202,21 +206,38 @@ def progress(
             over.set()
 
 
-def _tell_lines(title: str, task: ProgressTask, over: threading.Event) -> None:
+def _tell_lines(title: str, task: ProgressTask, pace: Pace, over: threading.Event) -> None:
     """Print lines of progress for a log until the work is `over`.
 
     None for a work of a few seconds.
     """
     wait = EARLY
     while not over.wait(wait):
-        left = task.time_remaining
+        left = pace.left
         if wait == EVERY or (left or 0.0) > EVERY:
-            parts = f"{task.completed:.0f} of {task.total:.0f}, " if task.total else ""
+            parts = f"{pace.done:.0f} of {pace.total:.0f}, " if pace.total else ""
             what = f" ({printable(task.fields['what'], 60)})" if task.fields["what"] else ""
-            minutes, seconds = divmod(int((task.elapsed or 0.0) if left is None else left), 60)
-            told = f"{parts}{minutes}:{seconds:02d} {'so far' if left is None else 'left'}{what}"
-            print(f"rockcheck: {title}: {told}", file=sys.stderr, flush=True)
+            words = f"{parts}{_time_words(pace)}{what}"
+            print(f"rockcheck: {title}: {words}", file=sys.stderr, flush=True)
         wait = EVERY
+
+
+def _time_words(pace: Pace) -> str:
+    """The time left, as "2:05 left"; before that is known the time so far."""
+    left = pace.left
+    minutes, seconds = divmod(int(pace.elapsed if left is None else left), 60)
+    return f"{minutes}:{seconds:02d} {'so far' if left is None else 'left'}"
+
+
+class _TimeLeft(ProgressColumn):
+    """The time left in a bar."""
+
+    def __init__(self, pace: Pace) -> None:
+        super().__init__()
+        self.pace = pace
+
+    def render(self, task: ProgressTask) -> Text:
+        return Text("" if self.pace.left is None else _time_words(self.pace), style="cyan")
 
 
 def studied(study: Study, options: Played, **how: Any) -> NoReturn:
@@ -354,6 +375,16 @@ def usable_folder(folder: Path, *parts: str) -> Path:
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"{printable(path)}: not writable")
     return path
+
+
+def tell_wrong(lines: Sequence[str]) -> None:
+    """Print on stderr what failed, where no table on stdout says it: with --quiet."""
+    if _voice.get() != "quiet":
+        return
+    for line in lines[:MOST_WRONG]:
+        print(printable(f"rockcheck: {line}", 1400), file=sys.stderr)
+    if len(lines) > MOST_WRONG:
+        print(f"rockcheck: and {len(lines) - MOST_WRONG} more lines", file=sys.stderr)
 
 
 def completing(

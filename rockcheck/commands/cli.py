@@ -86,7 +86,9 @@ EXIT_CODES = {
 _NAMED = inspect.Parameter.KEYWORD_ONLY
 #: The options that all commands have, by their parameters.
 COMMON = {
-    "quiet": typer.Option("--quiet", "-q", help="Print errors only; the exit code is the answer."),
+    "quiet": typer.Option(
+        "--quiet", "-q", help="Print errors only, and what fails; the exit code is the answer."
+    ),
     "as_json": typer.Option("--json", help="The result as JSON on stdout, instead of tables."),
 }
 

@@ -5,7 +5,7 @@ And `rockcheck report`: a finished run rendered again, or one of its figures for
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
@@ -27,11 +27,13 @@ from rockcheck.commands import (
     tell_left_out,
     tell_missing,
     tell_record_notes,
+    tell_wrong,
     told,
     usable_folder,
 )
 from rockcheck.commands.record import ReadOption, record_sets
-from rockcheck.scenes import InputError, errors, printable
+from rockcheck.scenes import InputError, files, printable
+from rockcheck.validation.execute import models
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import across, results, runner, suites, tables
 
@@ -116,15 +118,21 @@ def run(
     Exit 0: within tolerance. 1: out of tolerance. 2: bad input. 3: a model failed. 70: a fault of
     rockcheck itself.
     """
-    asked = _scene if suites.is_scene(what) else _suite
-    said = f"{printable(what)} is a scene, and nothing of it is judged: give a suite"
-    errors.refuse(
-        (strict and asked is _scene, said, "--strict"),
-        (history and asked is _scene, said, "--history"),
-    )
-    if history is not None:
-        check_file(history, "--history", across.recall)
-    suite, folder = asked(what, of_scene, played.out, allow_code or ())
+    if what:
+        suites.check_source(what)
+    if suites.is_scene(what):
+        for option, value in (("--strict", strict), ("--history", history)):
+            if value is not None:
+                raise InputError(
+                    f"{printable(what)} is a scene, and nothing of it is judged: give a suite",
+                    option,
+                )
+        suite = _scene(what, of_scene, allow_code or ())
+    else:
+        if history is not None:
+            check_file(history, "--history", across.recall)
+        suite = _suite(what, of_scene, allow_code or ())
+    folder = _folder_of(suite, played.out)
     from rockcheck.reports import document, site
 
     finished = play(
@@ -136,6 +144,9 @@ def run(
     )
     page = site.keep(finished, folder, pages=report)
     document.show(tables.finding_of(finished), console())
+    if finished.exit_code:
+        better = tables.improvements(finished) if strict == "both" else ()
+        tell_wrong([*tables.verdict_lines(finished), *better])
     tell_faults(finished, folder)
     if history is not None:
         moment = across.moment_of(finished, suite.path.parent)
@@ -160,47 +171,73 @@ def run(
     )
 
 
-def _suite(
-    name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
-) -> tuple[suites.Suite, Path]:
-    said = "is for a scene: a suite says which models play what"
-    errors.refuse(
-        *((given and given != ALL, said, f"--{option}") for option, given in vars(of_scene).items())
-    )
-    folder = usable_folder(out)
+def _suite(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Suite:
+    for option, value in vars(of_scene).items():
+        if value and value != ALL:
+            raise InputError("is for a scene: a suite says which models play what", f"--{option}")
     suite = suites.load_suite(name or "paper", allow_code=allow_code)
     tell_left_out(suite.left_out)
-    return suite, folder
+    return suite
 
 
-def _scene(
-    name: str, of_scene: OfScene, out: Path, allow_code: Sequence[str]
-) -> tuple[suites.Suite, Path]:
+def _scene(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Suite:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
-    suite = suites.scene_suite(
-        name,
-        chosen_models(of_scene.models, of_scene.set or ()),
-        records=sets,
-        allow_code=allow_code,
-    )
-    folder = usable_folder(out)
+    chosen = chosen_models(of_scene.models, of_scene.set or ())
+    configured = {setting.partition(".")[0] for setting in of_scene.set or ()}
+    unnamed = chosen.keys() - configured if of_scene.models == ALL else ()
     if of_scene.models == ALL:
         tell_missing()
-    before: results.Run | None = None
-    with suppress(InputError):  # no run there, or none that can be read
-        before = results.Run.load(folder)
-    if before is not None and before.judged:
-        raise InputError(
-            f"{printable(folder)} holds the judged run of suite {before.suite!r}: give another"
-            " folder",
-            "--out",
-        )
+    suite = suites.scene_suite(
+        name,
+        _playable(name, chosen, unnamed),
+        records=sets,
+        allow_code=allow_code,
+        unnamed=unnamed,
+    )
     tell_left_out(
         suite.left_out,
         "--read vertical=true plays such a component together with the horizontal ones",
     )
     tell_record_notes(suite.scenes.values())
-    return suite, folder
+    return suite
+
+
+def _playable(
+    scene_name: str, chosen: Mapping[str, dict[str, Any]], unnamed: Collection[str]
+) -> dict[str, dict[str, Any]]:
+    """The chosen models without those that nobody named and that cannot play the scene.
+
+    Prints a line for each that is left out. Raises `InputError` where none can play it.
+    """
+    scene = files.load_uncertain_scene(scene_name).scene
+    reasons = {
+        name: models.unplayable(name, chosen[name], scene) for name in chosen if name in unnamed
+    }
+    playable = {name: settings for name, settings in chosen.items() if not reasons.get(name)}
+    if not playable:
+        reason = next(iter(reasons.values()))
+        raise InputError(f"{printable(scene_name)}: no model can play it: {reason}")
+    for name, reason in reasons.items():
+        if reason:
+            console().print(
+                f"left out: {name} cannot play this scene: {reason}", style="yellow", soft_wrap=True
+            )
+    return playable
+
+
+def _folder_of(suite: suites.Suite, out: Path) -> Path:
+    """The folder of a run; another suite's run there is replaced, and a line says so."""
+    folder = usable_folder(out)
+    before: results.Run | None = None
+    with suppress(InputError):  # no run there, or none that can be read
+        before = results.Run.load(folder)
+    if before is not None and before.suite != suite.name:
+        console().print(
+            f"note: this replaces the report of {printable(before.suite)} in {printable(folder)};"
+            " --out keeps both",
+            soft_wrap=True,
+        )
+    return folder
 
 
 def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> results.Run:
@@ -253,7 +290,8 @@ def accept(
     They are written into the suite's tolerances, each change is shown: new, tightened, loosened or
     moved, the last two only with --reason.
     """
-    loaded, folder = _suite(suite, OfScene(), played.out, allow_code or ())
+    loaded = _suite(suite, OfScene(), allow_code or ())
+    folder = _folder_of(loaded, played.out)
     finished = play(loaded, folder, played)
     changes, refused = suites.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)

@@ -154,6 +154,18 @@ def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
     return ADAPTIVE if getattr(build(name, settings), "time_step", None) == ADAPTIVE else ""
 
 
+def unplayable(name: str, settings: Mapping[str, Any], scene: Scene) -> str:
+    """Why a model of rockcheck cannot play a scene; empty if it can, as far as it checks before."""
+    check = getattr(build(name, settings), "check", None)
+    if check is None:
+        return ""
+    try:
+        check(scene)
+    except InputError as error:
+        return str(error)
+    return ""
+
+
 def is_own(name: str) -> bool:
     """True for a user-defined model, "module:Class".
 

@@ -67,12 +67,14 @@ class Call:
 class Failure:
     """Why a task has no result, in one line. `refused`: the model or study refused its input.
 
+    `timed_out`: it did not end within its time limit.
     `traceback` is given for an unexpected exception, one that is no `ModelFailure`, `InputError` or
     `MemoryError`.
     """
 
     reason: str
     refused: bool = False
+    timed_out: bool = False
     traceback: str = ""
 
 
@@ -116,7 +118,7 @@ class Ended:
             case None:
                 return self.result
             case TimeoutError():
-                reason = f"did not end within {self.seconds:g} s"
+                return Failure(f"did not end within {self.seconds:g} s", timed_out=True)
             case ProcessExpired(exitcode=int(code)) if code < 0:
                 names = {-one: one.name for one in signal.Signals}
                 reason = f"crashed: {names.get(code, f'signal {-code}')}"
@@ -192,8 +194,8 @@ class Pool:
     ) -> Iterator[Ended]:
         """Run the calls, and yield each as it ends.
 
-        Calls that have not ended at `until` (of `time.monotonic`) are ended and not yielded. While
-        none ends, `on_playing` hears now and then which calls play.
+        Calls that have not ended at `until` (of `time.monotonic`) are ended and not yielded. After
+        each end, and now and then while none ends, `on_playing` hears which calls play.
         """
         waiting = deque(calls)
         running: dict[Future[Any], tuple[Call, float]] = {}
@@ -202,6 +204,7 @@ class Pool:
             while waiting or running:
                 self._mend(waiting, running)
                 self._begin(waiting, running)
+                on_playing(_playing(running))
                 done = _await_end(running, until, on_playing)
                 if not done:
                     return
@@ -277,7 +280,12 @@ def _await_end(
         done = wait(running, min(left, LOOK), FIRST_COMPLETED).done
         if done or left <= LOOK:
             return done
-        on_playing([call for future, (call, _) in running.items() if future.running()])
+        on_playing(_playing(running))
+
+
+def _playing(running: dict[Future[Any], tuple[Call, float]]) -> list[Call]:
+    """The calls that play, not those that wait for a process."""
+    return [call for future, (call, _) in running.items() if future.running()]
 
 
 @contextmanager

@@ -34,6 +34,8 @@ T = TypeVar("T")
 HISTORIES = "histories"
 COMPARISONS = "comparisons"
 RECORDS = "records"
+#: What keeps a folder of results out of a repository: Git leaves out all that is in it.
+GITIGNORE, IGNORED = ".gitignore", "# Results of rockcheck: its commands make them again.\n*\n"
 #: Endings of a history's files.
 TABLE = ".csv.gz"
 SUFFIXES = {TABLE, f".events{TABLE}"}
@@ -80,9 +82,11 @@ class Store:
     ) -> None:
         """Keep a result: its record, and its files by suffix (".csv.gz", ".events.csv.gz"), if any.
 
-        All of them are new, or all are as they were.
+        All of them are new, or all are as they were. With its first result a folder that holds
+        nothing of a user gets a `.gitignore`.
         `history` is the content of the files; if given, it stays in memory.
         """
+        self._keep_out_of_repositories()
         hashes = {suffix: _hash(content) for suffix, content in files.items()}
         record = writing.mapped(  # as it is read
             {**content, "files": hashes} if files else content,
@@ -99,6 +103,16 @@ class Store:
         )
         if history is not None:
             self._recent.append((name, history))
+
+    def _keep_out_of_repositories(self) -> None:
+        mark = self.folder / GITIGNORE
+        if mark.exists() or mark.is_symlink():
+            return
+        names = {HISTORIES, COMPARISONS, RECORDS}
+        if all(
+            path.name in names or (path / GITIGNORE).is_file() for path in self.folder.iterdir()
+        ):
+            writing.write_whole(mark, IGNORED)
 
     def load(self, name: str) -> History:
         """The history of that name, from memory if put or loaded lately, else from its file.

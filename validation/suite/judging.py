@@ -4,7 +4,7 @@ In: what a cell's run gave and its comparisons, or an ensemble's figures. Out: `
 a `results.Cell`. Nothing here knows a store; `runner` and `ensembles` call it.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 
 from rockcheck.validation.discrepancy.figures import Figure, Measure
@@ -91,13 +91,20 @@ def usable_figures(reference: results.Cell) -> dict[str, float | None]:
 
 
 def cell_of(
-    planned: Sequence[Planned], outcomes: Sequence[models.Played | pool.Failure], reason: str = ""
+    planned: Sequence[Planned],
+    outcomes: Sequence[models.Played | pool.Failure],
+    reason: str = "",
+    unnamed: Collection[str] = (),
 ) -> results.Cell:
     """The cell of what was played, without figures: one task, or the batches of an ensemble.
 
-    `reason` says why it failed, empty if it did not.
+    `reason` says why it failed, empty if it did not. A model of those that nobody named
+    (`unnamed`), and that cannot play the scene or takes too long, is left out.
     """
     first, variant = planned[0], planned[0].variant
+    left_out = variant.label in unnamed and _is_left_out(outcomes[0])
+    if left_out:
+        reason += f"; left out, since nobody named it: --models {variant.label} plays it alone"
     missing = models.not_installed(variant.family)
     traced = [
         f"{FAULTS}/{task.kept_as}.txt"
@@ -109,7 +116,7 @@ def cell_of(
         model=variant.label,
         settings=dict(variant.settings),
         key=_key_of(planned),
-        status=_status(variant.family, missing, reason),
+        status="unavailable" if left_out else _status(variant.family, missing, reason),
         reason=missing or reason,
         read_back=all(
             isinstance(outcome, models.Played) and outcome.read_back for outcome in outcomes
@@ -118,6 +125,11 @@ def cell_of(
         # in a user's own model an exception is that model's fault, not rockcheck's
         unexpected=bool(traced) and not models.is_own(variant.family),
     )
+
+
+def _is_left_out(outcome: models.Played | pool.Failure) -> bool:
+    """Whether there is no history since the model cannot play the scene, or takes too long."""
+    return isinstance(outcome, pool.Failure) and (outcome.refused or outcome.timed_out)
 
 
 def _key_of(planned: Sequence[Planned]) -> str:

@@ -129,7 +129,10 @@ def plan(suite: suites.Suite) -> Plan:
     for scene, variant, ensemble in suite.cells():
         if ensemble is None:
             config = owners[scene.name].config
-            cells.setdefault(scene.name, {})[variant.label] = _planned_cell(scene, variant, config)
+            seconds = suite.seconds(scene.name, variant)
+            cells.setdefault(scene.name, {})[variant.label] = _planned_cell(
+                scene, variant, config, seconds
+            )
         else:
             config = owners[ensemble.name].config
             batches.setdefault(ensemble.name, {})[variant.label] = [
@@ -139,7 +142,9 @@ def plan(suite: suites.Suite) -> Plan:
     return Plan(cells, batches)
 
 
-def _planned_cell(scene: Scene, variant: models.Work, config: suites.SuiteFile) -> PlannedCell:
+def _planned_cell(
+    scene: Scene, variant: models.Work, config: suites.SuiteFile, seconds: float
+) -> PlannedCell:
     settings = dict(variant.settings)
     if config.uncertainty:
         settings["uncertainty"] = provenance.code_digest(numerical.__name__)
@@ -151,7 +156,7 @@ def _planned_cell(scene: Scene, variant: models.Work, config: suites.SuiteFile) 
         scene=scene,
         variant=variant,
         uncertainty=config.uncertainty,
-        seconds=config.limits.seconds,
+        seconds=seconds,
         compiles=models.compiles(variant.family, variant.settings),
     )
 

@@ -129,7 +129,8 @@ class Cell(Stored):
 
     `status` "failed": no history (`reason` says why: a model's failure, a crash, a hang, memory);
     "absent": the model is not installed (`reason` says what to install); "unavailable": it has no
-    wheel for this Python, either, which does not count in the run. `history` is the path of its CSV
+    wheel for this Python, either, or nobody named it and it cannot play the scene, or not in time;
+    it does not count in the run. `history` is the path of its CSV
     relative to the run's folder. `read_back`: nothing that the cell depends on had changed, so that
     it was not run. `figures` are all measures, judged or not; `checks` those with a tolerance or in
     need of one.

@@ -105,7 +105,7 @@ def _judged_cells(tasks: SuiteTasks, scene_name: str) -> list[results.Cell]:
             reference = judged.get(reference_name)
             judged[model] = judging.judged_cell(owner, cell, outcome, comparison, reference)
         else:
-            judged[model] = judging.cell_of([cell], [outcome], outcome.reason)
+            judged[model] = judging.cell_of([cell], [outcome], outcome.reason, owner.unnamed)
     return [judged[model] for model in planned]
 
 

@@ -64,6 +64,7 @@ from rockcheck.scenes import Frozen, Positive, Scene, errors, files, printable
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.execute.models import (
+    ENGINE_NAMES,
     PAPER_MODEL,
     REFERENCE,
     Work,
@@ -86,8 +87,8 @@ from rockcheck.validation.suite.tolerances import (
 Key = TypeVar("Key")
 Value = TypeVar("Value")
 
-#: Time limit (s) of a simulation without a suite.
-UNJUDGED_SECONDS = 900.0
+#: Time limit (s) of a simulation without a suite; and of a physics engine that nobody named.
+UNJUDGED_SECONDS, UNNAMED_SECONDS = 900.0, 60.0
 DATA = Path(__file__).parents[1] / "data"
 
 
@@ -170,6 +171,9 @@ class Suite:
     #: Vertical components of its records, which are not played, and whether anything is judged.
     left_out: tuple[str, ...] = ()
     judged: bool = True
+    #: Models that play since they are installed, not since somebody named them. Where one of them
+    #: cannot play a scene, or does not end in time, it is left out, and nothing has failed.
+    unnamed: frozenset[str] = frozenset()
 
     @cached_property
     def _keys_by_cell(self) -> dict[tuple[str, str], list[ToleranceKey]]:
@@ -177,6 +181,12 @@ class Suite:
         for key in self.tolerances:
             keys.setdefault((key.scene, key.model), []).append(key)
         return keys
+
+    def seconds(self, scene_name: str, model: Work) -> float:
+        """The time limit (s) of a cell."""
+        if model.label in self.unnamed and model.family in ENGINE_NAMES:
+            return UNNAMED_SECONDS
+        return self.owners[scene_name].config.limits.seconds
 
     @property
     def members(self) -> tuple[Suite, ...]:
@@ -323,6 +333,7 @@ def _suite(config: SuiteFile, path: Path, shipped: bool, allow_code: Container[s
     _check_references(config, models)
     _check_names(config, models, scenes, ensembles)
     _check_measures(config.require)
+    _check_measured(models, scenes)
     tables, tolerances_path = _tolerance_tables(config, path, shipped)
     try:
         tolerances = parse_tolerances(tables, _cells(scenes, models))
@@ -366,12 +377,13 @@ def scene_suite(
     *,
     records: Sequence[motions.RecordSet] = (),
     allow_code: Container[str] = (),
+    unnamed: Collection[str] = (),
 ) -> Suite:
     """One scene (a name or a .toml file) by some models, perhaps under records: nothing is judged.
 
-    `models` gives the settings of each. Differences are from `ebm-unilateral`, or from the first
-    model without it. User-defined models are looked for in the working folder. Raises `InputError`
-    as `load_suite`.
+    `models` gives the settings of each; `unnamed` are those that nobody named. Differences are from
+    `ebm-unilateral`, or from the first model without it. User-defined models are looked for in the
+    working folder. Raises `InputError` as `load_suite`.
     """
     shipped = source in files.named_scenes()
     path = Path(f"{source}.toml" if shipped else source)
@@ -391,7 +403,7 @@ def scene_suite(
         label: replace(variant, search_path=(str(Path.cwd()),)) if variant.search_path else variant
         for label, variant in suite.models.items()
     }
-    return replace(suite, models=variants, judged=False)
+    return replace(suite, models=variants, judged=False, unnamed=frozenset(unnamed))
 
 
 def accept(
@@ -424,6 +436,16 @@ def accept(
         changes += member_changes
         refused += member_refused
     return changes, refused
+
+
+def check_source(source: str) -> None:
+    """Raise `InputError` for what is neither a file nor the name of a suite or a scene."""
+    names = [*named_suites(), *files.named_scenes()]
+    if source in names or Path(source).suffix.lower() == ".toml":
+        return
+    raise errors.InputError(
+        f"{errors.unknown_name('suite or scene', source, names)}; or the path of a .toml file"
+    )
 
 
 def is_scene(source: str) -> bool:
@@ -472,6 +494,19 @@ def _check_names(
             if scene not in scenes:
                 unknown = errors.unknown_name("scene", scene, scenes)
                 raise errors.InputError(str(unknown), f"models.{label}.files")
+
+
+def _check_measured(models: Mapping[str, Work], scenes: Mapping[str, Scene]) -> None:
+    """Raise `InputError` for a measured history that cannot be played back."""
+    for label, model in models.items():
+        if model.family != "measured":
+            continue
+        player = build(model.family, model.settings)
+        for name in model.settings["files"]:
+            try:
+                player.simulate(scenes[name])
+            except errors.InputError as error:
+                raise errors.InputError(str(error), f"models.{label}") from None
 
 
 def _check_measures(require: Require) -> None:

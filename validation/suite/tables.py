@@ -48,8 +48,9 @@ def finding_of(run: results.Run) -> Finding:
     """A run on a terminal: verdicts, or outcomes if nothing is judged, and why it does not pass."""
     wrong = Text(items=list(verdict_lines(run)), verdict="fail" if run.exit_code else "changed")
     if not run.judged:
+        notes = Text(items=list(note_lines(run)), verdict="changed")
         return Finding(
-            "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), wrong]
+            "run", run.suite, "nothing judged", [*outcome_tables(run), Text(OUTCOMES), notes, wrong]
         )
     cells = run.by_scene
     rows = [
@@ -124,6 +125,21 @@ def outcome_tables(run: results.Run) -> Iterator[Table]:
         yield Table("outcomes", columns, rows, scene)
 
 
+def note_lines(run: results.Run) -> Iterator[str]:
+    """What the models say of their runs, such as a physics that they leave out, a line each.
+
+    A note that several models share is a line with their names.
+    """
+    for scene, cells in run.by_scene.items():
+        models: dict[str, list[str]] = {}
+        for model, cell in cells.items():
+            for note in cell.notes:
+                models.setdefault(note, []).append(model)
+        for note, names in models.items():
+            who = "all models" if len(names) == len(cells) > 1 else ", ".join(names)
+            yield f"{scene}, {who}: {note}"
+
+
 def outcome_row(cell: results.Cell, reference: str) -> dict[str, Any]:
     """The result of a cell in plain values; `peak_rotation_alpha` is None for a block that fell."""
     return {
@@ -182,8 +198,8 @@ def summary(run: results.Run) -> dict[str, Any]:
 def verdict_lines(run: results.Run) -> Iterator[str]:
     """Why anything is not a pass, a line each."""
     yield from run.wrong
-    absent = {cell.model: cell.reason for cell in run.cells if cell.status in results.MISSING}
-    yield from (f"{model}: {reason}" for model, reason in absent.items())
+    missing = [cell for cell in run.cells if cell.status in results.MISSING]
+    yield from dict.fromkeys(f"{cell.model}: {cell.reason}" for cell in missing)
     for cell in run.cells:
         if cell.status not in results.MISSING:
             yield from cell_lines(cell)
@@ -208,6 +224,8 @@ def cell_lines(cell: results.Cell, strict: results.Strict = True) -> Iterator[st
         for check in cell.checks
         if check.fails(strict)
     )
+    if any(check.fails(strict) for check in cell.checks):
+        yield from (f"{place}: note: {note}" for note in cell.notes)
 
 
 def used(check: results.Check) -> float:
