@@ -8,16 +8,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 # What installs: the machine's uv, or one that pip fetches into the virtual environment.
 UV := $(shell command -v uv 2>/dev/null)
-INSTALL := $(or $(UV),$(BIN)/uv) pip install --quiet --python $(BIN)/python
+INSTALL := $(or $(UV),$(BIN)/uv) pip install --quiet --python $(BIN)/python $(if $(PYTHONDONTWRITEBYTECODE),--compile-bytecode)
 
-.PHONY: install validate test test-change test-all nightly coverage mutation lint format docs gallery wheel lock clean
+.PHONY: help install validate test test-change test-all nightly coverage mutation lint format docs gallery wheel lock clean
 
 install: $(VENV)/.ready ## the command `rockcheck` in .venv/bin
 
 validate: $(VENV)/.ready ## run the suite `paper` and write rockcheck-report/index.html
 	$(BIN)/rockcheck validate paper
 
-test: $(VENV)/.ready ## the everyday tests, below five minutes
+help: ## what `make` can do
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' Makefile
+
+test: $(VENV)/.ready ## the everyday tests: 5 to 10 minutes on two cores
 	$(BIN)/python -m pytest -q -m "not slow and not long" -n auto --dist loadfile
 
 test-change: $(VENV)/.ready ## also the long ones: what must pass before a change lands
@@ -57,7 +60,7 @@ lint: $(VENV)/.ready ## linter, formatter's check, type checker, cognitive compl
 	$(BIN)/codespell $(PROSE) rockcheck docs/site_tools
 	$(BIN)/proselint check --config .ci/proselint.json $(PROSE)
 
-format: $(VENV)/.ready
+format: $(VENV)/.ready ## mend what the linter can
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
@@ -75,9 +78,10 @@ lock: $(VENV)/.ready ## the lock file anew, from what pyproject.toml allows toda
 	echo 'setuptools>=77' | $(or $(UV),$(BIN)/uv) pip compile --quiet --upgrade --universal --python-version 3.11 --generate-hashes --no-annotate \
 		--no-emit-index-url --no-header --extra test --extra docs --extra lint --output-file $(LOCK) pyproject.toml -
 
-clean:
+clean: ## remove all that was made
 	rm -rf $(VENV) build dist *.egg-info rockcheck-report site
 
+# Where Python may write no compiled files, as in many containers, each command would compile all sources again: they are compiled once.
 $(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	$(PYTHON) -c 'import sys; sys.exit(0 if sys.version_info >= (3, 11) else "rockcheck needs Python 3.11 or newer: make PYTHON=python3.12")'
 	@$(PYTHON) -c 'import sys; v = sys.version_info; print("Python", ".".join(map(str, v[:3])), "from $(PYTHON)" + ("" if v < (3, 12) else "; PyBullet has wheels for Python 3.11 only and is left out here (make PYTHON=python3.11)"))'
@@ -86,5 +90,6 @@ $(VENV)/.ready: pyproject.toml $(if $(LOCKED),$(LOCK))
 	$(if $(UV),,$(BIN)/python -m pip install --quiet --disable-pip-version-check uv)
 	$(if $(LOCKED),$(INSTALL) --require-hashes --requirement $(LOCK))
 	$(INSTALL) $(if $(LOCKED),--no-deps --no-build-isolation --editable .,--editable '.[test,docs,lint]')
+	$(if $(PYTHONDONTWRITEBYTECODE),$(BIN)/python -m compileall -q $(COGNITIVE))
 	$(BIN)/rockcheck warm
 	touch $@

@@ -232,7 +232,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
     """
     try:
         code = app(
-            args=list(sys.argv[1:] if arguments is None else arguments),
+            args=list(sys.argv[1:] if arguments is None else arguments) or ["--help"],
             prog_name="rockcheck",
             standalone_mode=False,
             obj=time.perf_counter() if began is None else began,
