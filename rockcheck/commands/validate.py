@@ -121,12 +121,7 @@ def run(
     if what:
         suites.check_source(what)
     if suites.is_scene(what):
-        for option, value in (("--strict", strict), ("--history", history)):
-            if value is not None:
-                raise InputError(
-                    f"{printable(what)} is a scene, and nothing of it is judged: give a suite",
-                    option,
-                )
+        _refuse_judging(what, {"--strict": strict, "--history": history})
         suite = _scene(what, of_scene, allow_code or ())
     else:
         if history is not None:
@@ -149,12 +144,7 @@ def run(
         tell_wrong([*tables.verdict_lines(finished), *better])
     tell_faults(finished, folder)
     if history is not None:
-        moment = across.moment_of(finished, suite.path.parent)
-        trend = across.trend_of(across.remember(history, moment))
-        document.show(trend, console())
-        if report:
-            where = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
-            console().print(f"trend: {where}", soft_wrap=True)
+        _show_trend(finished, suite, history, folder, published=report)
     if report:
         with progress("pages") as on_progress:
             page = site.write_site(
@@ -169,6 +159,30 @@ def run(
         said=[("report", page)],
         value={**tables.summary(finished), **left_out, "report": page},
     )
+
+
+def _refuse_judging(scene_name: str, options: Mapping[str, object]) -> None:
+    """Raise `InputError` for an option that judges, of a scene."""
+    for option, value in options.items():
+        if value is not None:
+            raise InputError(
+                f"{printable(scene_name)} is a scene, and nothing of it is judged: give a suite",
+                option,
+            )
+
+
+def _show_trend(
+    finished: results.Run, suite: suites.Suite, history: Path, folder: Path, *, published: bool
+) -> None:
+    """Add a run to a history of runs, and show the trend; as a page where it is `published`."""
+    from rockcheck.reports import document
+
+    moment = across.moment_of(finished, suite.path.parent)
+    trend = across.trend_of(across.remember(history, moment))
+    document.show(trend, console())
+    if published:
+        page = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
+        console().print(f"trend: {page}", soft_wrap=True)
 
 
 def _suite(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Suite:
