@@ -47,8 +47,8 @@ class Outcomes:
 
     @property
     def undecided(self) -> NDArray[np.bool_]:
-        """Which runs were given up before they were decided (`ebm.core.decide.CALM`)."""
-        return np.asarray(self.runs["ending"] == Ending.UNDECIDED)
+        """Which runs were given up before they were decided (`ebm.core.decide.PATIENCE`)."""
+        return np.asarray(self.runs["ending"] == Ending.GIVEN_UP)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,12 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.names import Kind
+from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes import Extremes, Floats, Scene, Side, WallExtremes
 from rockcheck.scenes.extremes import NO_STRIKE
 
 SIDES: tuple[Side, Side] = ("left", "right")
 #: A length below this share of R is rounding of the run.
-_ROUNDING = 1e-13
+_ROUNDING = NOISE[Kind.POSITION]
 
 
 def columns_of(

@@ -3,6 +3,7 @@
 import math
 
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
+from rockcheck.ebm.core.contacts import SLOW
 from rockcheck.ebm.core.extremes import has_met
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
 from rockcheck.ebm.core.names import Ending, Family, Fate, Kind, Pivot, Shape
@@ -19,9 +20,7 @@ _TINIEST = math.ulp(0.0)
 #: How long a run on a quiet base goes on undecided, in 1/p. A block with tan alpha = 0.05, which
 #: loses a hundredth of its energy an impact, comes to rest within 700. What moves longer is held up
 #: by elastic walls, or slides without friction.
-CALM = 1e3
-#: The slowest slide of a frictionless block that moves, sqrt(g R).
-_SLIDES = 1e-5
+PATIENCE = 1e3
 
 
 @inner_kernel
@@ -37,7 +36,7 @@ def quiet_from(base, tolerance):
 def given_up_at(block, quiet):
     """The time at which a run that is still undecided is given up, by when its base is quiet."""
     squares = block.left.share * block.left.radius, block.right.share * block.right.radius
-    return quiet + CALM / math.sqrt(min(squares[0], squares[1]))
+    return quiet + PATIENCE / math.sqrt(min(squares[0], squares[1]))
 
 
 @inner_kernel
@@ -49,11 +48,11 @@ def fate_of(block, state):
     ending, motion = state.ending, state.motion
     if ending == Ending.OVERTURNED:
         return Fate.OVERTURNED_LEFT if motion.theta > 0.0 else Fate.OVERTURNED_RIGHT
-    if ending == Ending.UNDECIDED:
+    if ending == Ending.GIVEN_UP:
         return Fate.UNDECIDED
     if ending != Ending.DONE:
         return Fate.FAILED
-    slides_on = block.mu_k == 0.0 and not block.no_slip and abs(motion.vx) > _SLIDES
+    slides_on = block.mu_k == 0.0 and not block.no_slip and abs(motion.vx) > SLOW
     goes_on = state.t >= state.t_end or not state.control.until_decided
     moves = state.repeats or slides_on or goes_on
     return Fate.MOVING if moves and not stands_still(state.mode) else Fate.AT_REST

@@ -179,10 +179,10 @@ def _look(block, run, began, level):
     """
     state, a = run.state, run.a
     order, tau = state.order, state.tau
-    series.differentiate(a, Row.WATCHED, Row.RATE, order)
-    if not series.may_top(a, Row.WATCHED, Row.RATE, order, tau, level):
+    series.differentiate(a, Row.WATCHED, Row.SLOPE, order)
+    if not series.may_top(a, Row.WATCHED, Row.SLOPE, order, tau, level):
         return
-    _, at = series.highest(a, Row.WATCHED, Row.RATE, Row.GUARD, order, tau, run.stack)
+    _, at = series.highest(a, Row.WATCHED, Row.SLOPE, Row.GUARD, order, tau, run.stack)
     motion_at(block, state, a, at, state.sampled)
     meet(block, state, state.sampled, began + at)
 

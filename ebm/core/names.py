@@ -54,7 +54,7 @@ Row = _rows(
         "GUARD": 1,
         # What is followed for its largest value (see ebm.core.extremes), and its slope.
         "WATCHED": 1,
-        "RATE": 1,
+        "SLOPE": 1,
         # What the general solution needs: known terms, forces found, arms, and the walls' push.
         "KNOWN": 1,
         "FOUND": 1,
@@ -110,9 +110,9 @@ HistoryMode = IntEnum("HistoryMode", "REST SLIDE ROCK SLIDE_ROCK LEAN LADDER FLI
 #: Names of these modes.
 MODE_NAMES = tuple(one.name.lower().replace("_", "-") for one in HistoryMode)
 
-#: How a run ended; UNDECIDED: nothing decided it for so long that it was given up.
+#: How a run ended; GIVEN_UP: nothing decided it for too long.
 Ending = IntEnum(
-    "Ending", "GOING DONE OVERTURNED TOO_MANY_STEPS TOO_MANY_EVENTS NOT_FINITE UNDECIDED", start=-1
+    "Ending", "GOING DONE OVERTURNED TOO_MANY_STEPS TOO_MANY_EVENTS NOT_FINITE GIVEN_UP", start=-1
 )
 
 #: What becomes of a block; the first four in the order of `scenes.history.OUTCOMES`.

@@ -61,7 +61,7 @@ def _decide(block, base, state):
             state.motion.theta = math.copysign(verdict, float(state.mode.sense))
             state.ending = Ending.OVERTURNED
     elif late:
-        state.ending = Ending.UNDECIDED
+        state.ending = Ending.GIVEN_UP
 
 
 @inner_kernel

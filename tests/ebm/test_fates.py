@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.core.decide import CALM
+from rockcheck.ebm.core.decide import PATIENCE
 from rockcheck.ebm.fates import (
     AT_REST,
     FAILED,
@@ -172,12 +172,12 @@ def test_a_block_that_swings_for_ever_beside_an_elastic_wall_moves():
 
 
 def test_what_slides_without_friction_between_elastic_walls_is_undecided():
-    """So fast that energy excludes nothing; it is given up after CALM/p."""
+    """So fast that energy excludes nothing; it is given up after PATIENCE/p."""
     walls = [Wall(side=side, gap=0.5, restitution=1.0) for side in ("left", "right")]
     scene = resting(walls=walls, initial_velocity=2.0, floor=Floor(friction=0.0))
     found = fates_of(scene)
     assert found.outcome.tolist() == [UNDECIDED]
-    assert found.time_s[0] == pytest.approx(CALM / PAPER_BLOCK.frequency_parameter)
+    assert found.time_s[0] == pytest.approx(PATIENCE / PAPER_BLOCK.frequency_parameter)
 
 
 def test_the_duration_of_a_scene_does_not_count():

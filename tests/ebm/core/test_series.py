@@ -207,6 +207,8 @@ def test_the_largest_value_is_that_of_the_highest_top(seed):
     c = polyint(rate, k=r.normal())
     a, stack = np.stack([row_of(some)[0] for some in (c, rate, c)]), np.ones((48, series.WIDTH))
     top, falls = max(polyval(turns, c)), min(polyval(np.linspace(0.0, tau, 2001), rate)) < -1e-9
-    assert series.largest(a, 0, 1, 2, len(rate), tau, stack) == pytest.approx(top, abs=1e-13)
+    highest, at = series.highest(a, 0, 1, 2, len(rate), tau, stack)
+    assert highest == pytest.approx(top, abs=1e-13)
+    assert polyval(at, c) == pytest.approx(top, abs=1e-13)
     assert series.may_top(a, 0, 1, len(rate), tau, top - 1e-12) or not falls
     assert not series.may_top(a, 0, 1, len(rate), tau, np.abs(c) @ tau ** np.arange(len(c)))
