@@ -8,14 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.core.names import Kind
-from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes import Extremes, Floats, Scene, Side, WallExtremes
 from rockcheck.scenes.extremes import NO_STRIKE
 
 SIDES: tuple[Side, Side] = ("left", "right")
-#: A length below this share of R is rounding of the run.
-_ROUNDING = NOISE[Kind.POSITION]
 
 
 def columns_of(
@@ -45,8 +41,11 @@ def columns_of(
 
 
 def _length(value: Floats, length: Floats) -> Floats:
-    """A length in R as one in m; 0 where it is rounding, or below 0."""
-    return np.where(value > _ROUNDING, value, 0.0) * length
+    """A length in R as one in m; 0 where it is rounding of the run, or below 0."""
+    from rockcheck.ebm.core.names import Kind
+    from rockcheck.ebm.core.series import NOISE
+
+    return np.where(value > NOISE[Kind.POSITION], value, 0.0) * length
 
 
 def _wall_columns(

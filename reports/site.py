@@ -13,6 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
 from rockcheck.reports import document, drawers, figures, style, tables
@@ -29,6 +30,7 @@ from rockcheck.scenes import (
     reading,
     writing,
 )
+from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, stated
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite import results
@@ -362,6 +364,9 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
                 "scale": excitation.scale,
                 "time_step": excitation.time_step,  # all its digits
             }
+            peak = float(np.max(np.abs(excitation.unscaled), initial=0.0))
+            if peak > stated.LARGEST_PEAK * GRAVITY_OF_RECORDS:
+                tables[key]["unit"] = "m/s2!"  # it is meant, however large
             rows = (
                 (f"{excitation.time_step * n:.12g}", value)
                 for n, value in enumerate(excitation.unscaled)

@@ -111,7 +111,7 @@ def assess(
     read: ReadOption = None,
     played: Played = Played(OUT / "assess"),
 ) -> None:
-    """Does it fall, how far does it move, which gap is safe, how sure is that?
+    """Does it fall, how far does it move, how sure is that?
 
     Plays the scene under its own base motion, or under each record, until its outcome is decided;
     searches the gaps and the intensities at which it falls; says what hand methods say beside it. A

@@ -117,7 +117,9 @@ def spoilt(history: History, outcome: str = "", **change: Callable[..., Any]) ->
     channels = {
         name: change.get(name, np.copy)(column) for name, column in history.channels.items()
     }
-    return dataclasses.replace(history, channels=channels, outcome=outcome or history.outcome)
+    return dataclasses.replace(
+        history, channels=channels, outcome=outcome or history.outcome, model_extremes=None
+    )
 
 
 FAULTS = {

@@ -328,7 +328,7 @@ class Pair:
     @property
     def rocking(self) -> Floats:
         """`theta`; raises `Unavailable` where the reference's peak is too small to divide by."""
-        if np.max(np.abs(self.theta[0])) <= Measure.resolution:
+        if np.max(np.abs(self.theta[0])) * (self.alpha or 1.0) <= history.STILL:
             raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
         return self.theta
 
@@ -339,7 +339,7 @@ class Pair:
             WindowedHistory(one, self.scene, until=self.end, since=self.start).extremes
             for one in (self.reference, self.candidate)
         ]
-        if peaks[0].peak_rotation <= Measure.resolution * (self.alpha or 1.0):
+        if peaks[0].peak_rotation <= history.STILL:
             raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
         return peaks[0].peak_rotation, peaks[1].peak_rotation
 
