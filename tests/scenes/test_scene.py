@@ -237,7 +237,7 @@ def test_the_moment_of_inertia_is_at_most_that_of_mass_in_the_corners(fault_of):
 
 
 def test_a_block_as_large_as_a_hill_is_told():
-    """200 mm that are written as 200. Rows far apart say nothing: extremes do not depend on them."""
+    """200 mm that are written as 200. Of rows far apart nothing is said: extremes are exact."""
     blocks = [Block(half_width=size / 4, half_height=size) for size in (0.03, 0.2, 30.0, 200.0)]
     notes = [
         "".join(observation.scene_notes(scene(block=block, walls=[], output_step=0.05)))
