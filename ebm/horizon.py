@@ -58,7 +58,7 @@ def predictability_horizon(
         rows = int(np.argmax(apart)) if apart.any() else rows
     whole = rows == len(undisturbed)
     horizon = scene.duration if whole else float(scene.output_times[max(rows - 1, 1)])
-    return min([horizon, *(max(tie.from_s, scene.output_step) for tie in ties_of(scene, model))])
+    return min([horizon, *(max(tie.apart_s, scene.output_step) for tie in ties_of(scene, model))])
 
 
 def may_fly(scene: Scene) -> bool:

@@ -13,7 +13,6 @@ looked for to rounding; then the scene is played on both sides of it, the number
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import get_args
 
 import numpy as np
@@ -36,11 +35,13 @@ PARTED = 1e-3
 class Tie:
     """More than one answer: `what` is equal, and from `from_s` (s) on the answers part.
 
-    `fates` are those on both sides of the equality, and of the scene as it is if that is another.
+    They are `PARTED` from each other after `apart_s` (s). `fates` are those on both sides of the
+    equality, and of the scene as it is if that is another.
     """
 
     what: str
     from_s: float
+    apart_s: float
     fates: tuple[str, ...]
 
 
@@ -172,29 +173,41 @@ def _parted(edge: Edge, scene: Scene, model: EventBasedModel) -> Tie | None:
     """The tie of an equality; None where its sides, and the scene, are one motion."""
     played = [(each, model.simulate(each)) for each in (scene, *edge.sides)]
     first, *others = [history for _, history in played]
-    times = [_parting_time(scene, first, other) for other in others]
-    times += [_parting_time(scene, *pair) for pair in pairwise(others)]
+    compared = (_parting(scene, first, other) for other in others)
+    partings = [parting for parting in compared if parting is not None]
     fates = tuple(dict.fromkeys(fate_words(each, model) for each in (scene, *edge.sides)))
-    known = [time for time in times if time is not None]
-    if not known and len(fates) == 1:
+    if not partings and len(fates) == 1:
         return None
-    return Tie(edge.what, min(known, default=scene.duration), fates)
+    begins = min((parting.begins_s for parting in partings), default=scene.duration)
+    apart = min((parting.apart_s for parting in partings), default=scene.duration)
+    return Tie(edge.what, begins, apart, fates)
 
 
-def _parting_time(scene: Scene, one: History, other: History) -> float | None:
-    """The time (s) of the last row at which two histories are one; None if they do not part."""
+@dataclass(frozen=True)
+class Parting:
+    """Times (s) of the last rows at which two histories are one, and are within `PARTED`."""
+
+    begins_s: float
+    apart_s: float
+
+
+def _parting(scene: Scene, one: History, other: History) -> Parting | None:
+    """How two histories of a scene part; None if they do not."""
     alpha = scene.block.alpha
     rows = min(len(one.channels["t"]), len(other.channels["t"]))
+    times = one.channels["t"][:rows]
     turned = np.abs(one.channels["theta"][:rows] - other.channels["theta"][:rows]) / alpha
     moved = np.abs(one.channels["x"][:rows] - other.channels["x"][:rows])
-    apart = np.maximum(turned, moved / (alpha * scene.block.radius)) > PARTED
+    difference = np.maximum(turned, moved / (alpha * scene.block.radius))
+    apart = difference > PARTED
     if not apart.any():
         return None
-    same = np.flatnonzero(
-        np.maximum(turned, moved / (alpha * scene.block.radius))[: int(np.argmax(apart))]
-        <= 10.0 * NUDGE
+    first_apart = int(np.argmax(apart))
+    same = np.flatnonzero(difference[:first_apart] <= 10.0 * NUDGE)
+    return Parting(
+        begins_s=float(times[same[-1]]) if len(same) else 0.0,
+        apart_s=float(times[max(first_apart - 1, 0)]),
     )
-    return float(one.channels["t"][same[-1]]) if len(same) else 0.0
 
 
 def fate_words(scene: Scene, model: EventBasedModel) -> str:

@@ -61,6 +61,7 @@ def pytester(pytester):
     models = Path(__file__).parents[1] / "validation" / "models"
     pytester.makepyfile(faulty=(models / "faulty.py").read_text("utf-8"))
     pytester.makefile(".toml", rockcheck=SUITE)
+    pytester.makefile(".csv", table="t,theta\n0,0\n0.5,0\n")
     return pytester
 
 

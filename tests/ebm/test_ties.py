@@ -83,6 +83,13 @@ def test_an_acceleration_that_just_reaches_what_uplifts_is_an_edge():
     assert "acceleration equals g tan(alpha)" in edges
 
 
+@pytest.mark.parametrize("scene", [cube(), tall()], ids=["cube", "sine"])
+def test_answers_part_before_they_are_apart(scene):
+    (tie,) = ties_of(scene)
+    assert tie.from_s <= tie.apart_s
+    assert tie.apart_s < scene.duration
+
+
 def test_an_edge_whose_sides_do_not_part_is_no_tie():
     """At its uplift a sine of that size lifts nothing that can be seen."""
     assert ties_of(standing(Sine(amplitude=9.81 * 0.3, period=1.0))) == ()
@@ -109,4 +116,4 @@ def test_a_scene_off_every_edge_is_not_played_again():
 def test_the_horizon_ends_where_the_answers_part():
     scene = tall()
     (tie,) = ties_of(scene)
-    assert predictability_horizon(scene) <= tie.from_s + scene.output_step
+    assert predictability_horizon(scene) <= tie.apart_s + scene.output_step

@@ -257,7 +257,7 @@ def test_any_input(tmp_path, reader):
 _PLAY_BOMBS = """
 import resource, sys, time
 from pathlib import Path
-import pandas, numba, ebm.core.march  # what a run needs in any case
+import pandas, numba, rockcheck.ebm.core.march  # what a run needs in any case
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
 from rockcheck.commands.cli import main
 from rockcheck.scenes import InputError

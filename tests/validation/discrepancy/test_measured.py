@@ -83,6 +83,7 @@ def test_faults_are_named(tmp_path, fault_of, written, name, content, fault):
 
 def test_a_measured_history_is_judged_like_a_model(tmp_path, typed, written):
     path = written("mine.toml", SUITE)
+    write(tmp_path / "table.csv", "time_s,theta_deg", [0.0, 2.0], [0.0, 0.0])
     truth = EventBasedModel().simulate(suites.load_suite(path).scenes["tilt"])
     t, theta = (truth.channels[name][truth.channels["t"] <= 1.6] for name in ("t", "theta"))
     write(tmp_path / "table.csv", "time_s,theta_deg", t + 0.4, np.rad2deg(theta))

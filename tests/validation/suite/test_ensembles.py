@@ -154,7 +154,8 @@ def test_a_model_without_results_is_no_yardstick_and_is_not_drawn(loaded, tmp_pa
     ) == ([None, None], 0, ["still", "near"])
 
 
-def test_a_measured_history_takes_no_part_in_an_ensemble(loaded):
+def test_a_measured_history_takes_no_part_in_an_ensemble(loaded, written):
+    written("run1.csv", "t,theta\n0,0\n1,0\n")
     table = '[models.table]\nmodel = "measured"\nfiles = { fig5a = "run1.csv" }\n[require]'
     cells = loaded('scenes = ["fig5a"]' + SUITE.replace("[require]", table)).cells()
     assert [work.label for _, work, ensemble in cells if ensemble] == ["still", "near", "broken"]
