@@ -289,7 +289,7 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
         ),
         looks=style.looks(style.LOOKS),
         row_cells=row_cells,
-        formats=(),
+        formats=("svg",),
     )
 
 

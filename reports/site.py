@@ -41,7 +41,9 @@ INDEX = "index.html"
 #: What a page with figures for a paper takes to be made, in pages without. Less than FEW in all are
 #: written by the process itself: it has what draws anyway, and another process takes as long as
 #: twenty pages to have it, too.
-PRINTED, FEW = 25, 40
+PRINTED, FEW = 10, 40
+#: The format of a figure that every page has; of those in all formats see `write_site`.
+SHOWN = ("svg",)
 
 
 #: Studies of other commands that may stand beside a run.
@@ -131,11 +133,16 @@ def write_site(
     jobs: int = 1,
     afresh: bool = True,
     wanted: Sequence[str] = (),
+    all_figures: bool = False,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Path:
     """Write `index.html` and a page a scene and an ensemble, beside a finished run.
 
     Figures and data are written with them. Returns the index. Two runs take turns.
+
+    The figures for print are one SVG of each scene for which the run asks, with differences from
+    its first reference; with `all_figures` one for each reference, also as PDF and PNG. What a page
+    shows over time it draws itself.
 
     In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are
     made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now.
@@ -143,7 +150,7 @@ def write_site(
     not of the run.
     """
     with _turn(folder):
-        pages = _Pages(folder, wanted)
+        pages = _Pages(folder, wanted, all_figures)
         document.write_assets(folder)
         stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
         waiting = {
@@ -155,7 +162,7 @@ def write_site(
         calls = [
             pool.Call(pages.write, one)
             if few
-            else pool.Call(_write_page, (folder, pages.wanted, *one))
+            else pool.Call(_write_page, (folder, pages.wanted, all_figures, *one))
             for one in (*waiting.items(), ("", ""))
         ]
         written = drawers.side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
@@ -178,8 +185,10 @@ class _Pages:
     They are those that are shown, and those that are wanted.
     """
 
-    def __init__(self, folder: Path, wanted: Sequence[str] = ()) -> None:
+    def __init__(self, folder: Path, wanted: Sequence[str] = (), all_figures: bool = False) -> None:
         self.folder = folder
+        self.all_figures = all_figures
+        self.formats = style.FORMATS if all_figures else SHOWN
         self.run = results.Run.load(folder)
         self.wanted = tuple(wanted)
         slugs = slugs_of([*self.run.scenes, *(ensemble.name for ensemble in self.run.ensembles)])
@@ -204,6 +213,7 @@ class _Pages:
             },
             "run": self.run,
             "here": document.folder_argument(folder),
+            "formats": self.formats,
             "looks": style.looks(self.run.models),
             "channels": CHANNELS,
             "SEVERITY": results.SEVERITY,
@@ -233,20 +243,16 @@ class _Pages:
         """Write a scene's figures and data; returns what its page shows beside the view.
 
         The figures are a thumbnail of all rotations, and where the run asks for them those for a
-        paper, one a reference.
+        paper.
         """
         drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
         style.save_as(figures.thumbnail(curves), drawn / f"{view.slug}~small.svg", named=False)
-        slugs = slugs_of([str(against) for against in view.figure_references])
-        stems = {
-            against: f"{view.slug}~against-{slugs[str(against)]}" if number else view.slug
-            for number, against in enumerate(view.figure_references)
-        }
-        for against, stem in stems.items() if view.printed else ():
-            style.save(figures.histories_figure(view, against), drawn / stem)
+        stems = self._stems(view)
+        for against, stem in stems.items():
+            style.save(figures.histories_figure(view, against), drawn / stem, self.formats)
         writing.write_whole(
             writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js",
             writing.script_text("window.rockcheck", figures.payload(view)),
@@ -265,6 +271,17 @@ class _Pages:
             "stems": stems,
         }
 
+    def _stems(self, view: SceneView) -> dict[str | None, str]:
+        """The names of a scene's figures for print, by the reference of their differences."""
+        if not view.printed:
+            return {}
+        references = view.figure_references if self.all_figures else view.figure_references[:1]
+        slugs = slugs_of([str(against) for against in references])
+        return {
+            against: f"{view.slug}~against-{slugs[str(against)]}" if number else view.slug
+            for number, against in enumerate(references)
+        }
+
     def _write_ensemble(self, view: figures.EnsembleView) -> dict[str, Any]:
         """Write an ensemble's figures and tables; returns what its page shows beside the view."""
         page, drawn = view.page(), writing.made(self.folder, document.PAGES, document.FIGURES)
@@ -277,7 +294,7 @@ class _Pages:
             figures.thumbnail(curves, step=True), drawn / f"{view.slug}~small.svg", named=False
         )
         for plot in page.plots():
-            style.save(drawers.figure_of(plot), drawn / plot.name)
+            style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
         for table in page.tables():
             *parts, name = table.name.split("/")
             writing.write_whole(
@@ -291,7 +308,7 @@ class _Pages:
         drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
         blocks, matrix = tables.accuracy(self.run), tables.matrix(self.run)
         for plot in (block for block in blocks if isinstance(block, Plot)):
-            style.save(drawers.figure_of(plot), drawn / plot.name)
+            style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
         return {
             "scenes": self.scenes,
             "ensembles": self.ensembles,
@@ -335,6 +352,7 @@ class _Pages:
                     },
                 ),
                 "links": self.common["site"]["links"],
+                "formats": self.formats,
             }
         )
 
@@ -343,8 +361,10 @@ class _Pages:
 _pages_of = cache(_Pages)
 
 
-def _write_page(folder: Path, wanted: Sequence[str], name: str, stamp: str) -> None:
-    _pages_of(folder, wanted).write(name, stamp)
+def _write_page(
+    folder: Path, wanted: Sequence[str], all_figures: bool, name: str, stamp: str
+) -> None:
+    _pages_of(folder, wanted, all_figures).write(name, stamp)
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ import io
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -195,9 +195,9 @@ def save_as(figure: Figure, path: Path, *, stamp: str = "", named: bool = True) 
     return writing.write_whole(path, content.getvalue(), named=named)
 
 
-def save(figure: Figure, stem: Path) -> list[Path]:
-    """Write a figure as `<stem>.svg`, `.png` and `.pdf` (see `save_as`)."""
-    paths = (stem.with_name(f"{stem.name}.{kind}") for kind in FORMATS)
+def save(figure: Figure, stem: Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write a figure as `<stem>.svg` and so on, in each of the `formats` (see `save_as`)."""
+    paths = (stem.with_name(f"{stem.name}.{kind}") for kind in formats)
     return [save_as(figure, path, named=False) for path in paths]
 
 

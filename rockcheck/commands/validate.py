@@ -68,6 +68,28 @@ class OfScene:
     read: ReadOption = None
 
 
+FiguresOption = Annotated[
+    bool,
+    typer.Option(
+        "--figures",
+        help="Also write the figures for print as PDF and PNG, and one for each reference.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Pages:
+    """What is drawn of a run."""
+
+    report: Annotated[
+        bool,
+        typer.Option(
+            "--report/--no-report", help="Render the pages; without them only run.json and tables."
+        ),
+    ] = True
+    figures: FiguresOption = False
+
+
 #: The argument of both commands.
 _named = partial(
     typer.Argument,
@@ -102,12 +124,7 @@ def run(
             help="Append this run to FILE (a JSON line a run), and show the trend.",
         ),
     ] = None,
-    report: Annotated[
-        bool,
-        typer.Option(
-            "--report/--no-report", help="Render the pages; without them only run.json and tables."
-        ),
-    ] = True,
+    pages: Pages = Pages(),
 ) -> None:
     """Run a suite, compare, judge, write the report.
 
@@ -137,20 +154,21 @@ def run(
         force=force,
         strict="both" if strict == "both" else strict is not None,
     )
-    page = site.keep(finished, folder, pages=report)
+    page = site.keep(finished, folder, pages=pages.report)
     document.show(tables.finding_of(finished), console())
     if finished.exit_code:
         better = tables.improvements(finished) if strict == "both" else ()
         tell_wrong([*tables.verdict_lines(finished), *better])
     tell_faults(finished, folder)
     if history is not None:
-        _show_trend(finished, suite, history, folder, published=report)
-    if report:
+        _show_trend(finished, suite, history, folder, published=pages.report)
+    if pages.report:
         with progress("pages") as on_progress:
             page = site.write_site(
                 folder,
                 jobs=played.jobs or os.cpu_count() or 1,
                 afresh=False,
+                all_figures=pages.figures,
                 on_progress=on_progress,
             )
     left_out = {} if suite.judged else {"left_out": suite.left_out}
@@ -345,6 +363,7 @@ def report(
         Path | None,
         typer.Option("-o", "--output", help="Draw that alone, and stop: .svg, .png or .pdf."),
     ] = None,
+    all_figures: FiguresOption = False,
 ) -> None:
     """Render the pages of a finished run again.
 
@@ -369,6 +388,7 @@ def report(
                 jobs=os.cpu_count() or 1,
                 afresh=not scene,
                 wanted=scene or (),
+                all_figures=all_figures,
                 on_progress=on_progress,
             )
     what = "report" if output is None else "figure"
