@@ -191,10 +191,19 @@ def test_no_run_falls_up_to_where_the_first_one_was_seen_to_stand():
     assert answer.first.case == "b"
     words = sentences.gap_sentences([answer])
     assert words[0].startswith(
-        "No run falls at gaps up to 52.4 mm (looked at every 1 mm); above, b falls first;"
+        "No run falls at gaps up to 52.4 mm (looked at every 1 mm); just above, b falls first;"
         " none falls from 60.1 mm on; without the wall it reaches 0.1 m"
     )
-    assert "not always worse" in words[1]
+    assert "stands again in some wider gaps" in words[1]
+
+
+def test_the_curve_of_what_overturns_steps_where_the_search_saw_it():
+    low = interval(0, 0.0, 0.02, None, 0.021)
+    high = interval(0, 0.05, 0.1, 0.049, None)
+    answer = gap_answer(a=search(low, high), b=search(low))
+    gaps, shares = statistics.overturned_steps(answer)
+    assert gaps == [0.0, 0.0, 0.0, 0.021, 0.021, 0.05, 0.1]
+    assert shares == [0.0, 0.5, 1.0, 0.5, 0.0, 0.5, 0.5]
 
 
 def test_one_that_falls_at_no_gap_leaves_nothing_safe():

@@ -26,7 +26,7 @@ from rockcheck.validation.finding import (
 )
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensities import size_of
-from rockcheck.validation.studies.population.sentences import UNITS
+from rockcheck.validation.studies.population.sentences import UNITS, count_of
 from rockcheck.validation.studies.population.statistics import (
     FallAnswer,
     QuantityAnswer,
@@ -73,7 +73,7 @@ def scene_text(scene: Scene, gathered: Gathered) -> Text:
 
 def _base_words(gathered: Gathered) -> str:
     if gathered.plan.recorded:
-        return f"{len(gathered.plan.cases)} recorded motions, listed below"
+        return f"{count_of(len(gathered.plan.cases), 'recorded motion')}, listed below"
     excitation = gathered.plan.own.scene.excitation
     if excitation.kind == "rest":
         return "at rest"

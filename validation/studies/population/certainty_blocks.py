@@ -20,7 +20,7 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.certainty import MethodScore, UncertaintyAnswer
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.sentences import UNITS
+from rockcheck.validation.studies.population.sentences import NEGLIGIBLE, UNITS
 
 #: What each source of uncertainty is.
 SOURCES = {
@@ -37,6 +37,7 @@ def contribution_table(answer: UncertaintyAnswer) -> Table:
     rows = [
         [part.source, part.share, part.sd, SOURCES[part.source]] for part in answer.contributions
     ]
+    matters = any(part.sd > NEGLIGIBLE for part in answer.contributions)
     unknown = f" Not known: {', '.join(answer.unknown)}." if answer.unknown else ""
     unit = "α" if answer.of == "peak rotation" else ""
     return Table(
@@ -50,7 +51,7 @@ def contribution_table(answer: UncertaintyAnswer) -> Table:
         rows,
         "How sure",
         note=f"Of the variance of the {answer.of}.{unknown}",
-        on="all" if len(rows) > 1 else "file",
+        on="all" if len(rows) > 1 and matters else "file",
         folded=True,
     )
 

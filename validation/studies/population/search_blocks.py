@@ -17,7 +17,11 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
-from rockcheck.validation.studies.population.statistics import GapAnswer, IntensityAnswer
+from rockcheck.validation.studies.population.statistics import (
+    GapAnswer,
+    IntensityAnswer,
+    overturned_steps,
+)
 
 
 def gap_blocks(answer: GapAnswer) -> list[Block]:
@@ -27,10 +31,8 @@ def gap_blocks(answer: GapAnswer) -> list[Block]:
     shares = Panel(
         "share of the runs",
         [
-            Series("struck", gaps, [row.struck / row.runs for row in answer.rows], style="step"),
-            Series(
-                "overturned", gaps, [row.overturned / row.runs for row in answer.rows], style="step"
-            ),
+            Series("struck", gaps, [row.struck / row.runs for row in answer.rows]),
+            Series("overturned", *overturned_steps(answer), style="step"),
         ],
     )
     speeds = Panel(
@@ -43,7 +45,7 @@ def gap_blocks(answer: GapAnswer) -> list[Block]:
     intervals = [
         [
             case.case,
-            case.draw,
+            case.draw if answer.draws_every is not None else None,
             interval.low,
             interval.high,
             interval.stands_below,
@@ -65,7 +67,7 @@ def gap_blocks(answer: GapAnswer) -> list[Block]:
     ]
     interval_columns = [
         text("record"),
-        Column("draw", help="0 is the scene as it is"),
+        Column("draw", help="0 is the scene as it is", optional=True),
         Column("low", "falls from", "m", digits=4),
         Column("high", "to", "m", digits=4),
         Column("stands_below", "stands at", "m", digits=4, brief=False),

@@ -134,11 +134,11 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
     else:
         falls = first_falls or f"{answer.first.case} falls first"
         sentences.append(
-            f"{where}{none_falls} at gaps up to {length(answer.safe_up_to)} ({looked}); above,"
+            f"{where}{none_falls} at gaps up to {length(answer.safe_up_to)} ({looked}); just above,"
             f" {falls}{again_words(answer)}; {reach}."
         )
     if answer.islands:
-        sentences.append("A wider gap is not always worse: see the intervals.")
+        sentences.append("It stands again in some wider gaps: see the intervals.")
     if answer.undecided:
         sentences.append(f"{count_of(answer.undecided, 'run')} of the search undecided.")
     return sentences

@@ -248,6 +248,27 @@ def gap_rows(searches: Mapping[str, results.GapSearch]) -> list[GapRowAnswer]:
     return rows
 
 
+def overturned_steps(answer: GapAnswer) -> tuple[list[float], list[float]]:
+    """The share of the runs that overturn, as a step at each gap (m) where one begins or ceases to.
+
+    By the intervals of the search: of the draws, or of the scenes as they are where there are none.
+    """
+    drawn = answer.draws_every is not None
+    intervals = [
+        interval for case in answer.falls if bool(case.draw) == drawn for interval in case.intervals
+    ]
+    changes = [(interval.low, 1) for interval in intervals]
+    changes += [
+        (interval.stands_above, -1) for interval in intervals if interval.stands_above is not None
+    ]
+    gaps, shares, overturned = [answer.low], [0.0], 0
+    for gap, change in sorted(changes):
+        overturned += change
+        gaps.append(gap)
+        shares.append(overturned / answer.free_runs)
+    return [*gaps, answer.high], [*shares, shares[-1]]
+
+
 # At which intensity does it fall?
 
 
