@@ -15,9 +15,9 @@ from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
 from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, new_figure, power_of_ten
-from rockcheck.scenes import Scene, recordings, writing
+from rockcheck.scenes import Floats, Scene, recordings, writing
 from rockcheck.validation.execute.pool import Call, Pool, cores
-from rockcheck.validation.finding import Axis, Panel, Plot
+from rockcheck.validation.finding import Axis, Panel, Plot, Series
 
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones
 #: and levels.
@@ -422,16 +422,18 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
 def live_data(plot: Plot) -> dict[str, Any]:
     """What the page's script needs to draw a plot of one panel and to read it under the pointer."""
     (panel,) = plot.panels
+    axis = np.array(panel.series[0].x, float)
     fits = {series.label: series for series in panel.series if series.style == "dots"}
     return {
         "name": plot.name,
         "across": plot.x.label,
         "along": plot.y.label,
-        "intensities": list(panel.series[0].x),
+        "intensities": axis.tolist(),
+        "log": plot.x.log,
         "curves": [
             {
                 "label": series.label,
-                "values": _short(series.y),
+                "values": _short(_on(axis, series)),
                 "fell": np.flatnonzero(np.array(series.y, float) == math.inf).tolist(),
                 "colour": colour,
                 "low": _short(series.low),
@@ -450,6 +452,20 @@ def live_data(plot: Plot) -> dict[str, Any]:
         "single": any(series.style == "thin" for series in panel.series),
         **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),
     }
+
+
+def _on(axis: Floats, series: Series) -> Floats:
+    """A series at the values of an axis; NaN where it has none.
+
+    The charts of a page have one axis for all their series. A step keeps its last value.
+    """
+    x, y = np.array(series.x, float), np.array(series.y, float)
+    if np.array_equal(x, axis):
+        return y
+    if series.style != "step":
+        return np.interp(axis, x, y, left=math.nan, right=math.nan)
+    last = np.searchsorted(x, axis, side="right") - 1
+    return np.where(last >= 0, y[np.maximum(last, 0)], math.nan)
 
 
 def _short(values: Any) -> list[float | None]:

@@ -86,7 +86,7 @@ def inert(text: str) -> str:
     These are control characters, and those that turn the order of text (U+202E). Line breaks and
     every kind of blank stay.
     """
-    if text.isprintable():
+    if all(line.isprintable() for line in text.split("\n")):
         return text
     return "".join(c if c.isprintable() or c == "\n" or category(c) == "Zs" else "?" for c in text)
 

@@ -51,7 +51,7 @@ document.addEventListener("DOMContentLoaded", () => {
     const u = new uPlot({
       ...size(), legend: { show: false }, padding: [8, 12, 0, 0], bands, series,
       cursor: { drag: { x: false, y: false }, points: { show: !chart.single }, y: false },
-      scales: { x: { time: false }, y: { range: [chart.least, chart.most] } },
+      scales: { x: { time: false, distr: chart.log ? 3 : 1 }, y: { range: [chart.least, chart.most] } },
       axes: [{ ...axis, label: chart.across, size: 30 }, { ...axis, label: chart.along, size: 48 }, ...(chart.per_unit ? [above] : [])],
       hooks: { setCursor: [u => {
         const index = u.cursor.idx, y = u.cursor.top === null ? 0 : u.posToVal(u.cursor.top, "y");

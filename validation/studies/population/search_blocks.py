@@ -4,6 +4,8 @@ In: typed answers (`statistics`). Out: blocks of a finding, a function a questio
 study.
 """
 
+from typing import Any
+
 import numpy as np
 
 from rockcheck.validation.finding import (
@@ -17,6 +19,7 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
+from rockcheck.validation.studies.population.results import FallInterval
 from rockcheck.validation.studies.population.statistics import (
     GapAnswer,
     IntensityAnswer,
@@ -26,7 +29,10 @@ from rockcheck.validation.studies.population.statistics import (
 
 def gap_blocks(answer: GapAnswer) -> list[Block]:
     """Which gaps on one side are safe: a plot, the intervals, and the runs at some gaps."""
-    side = answer.side
+    return [_gap_plot(answer), *_interval_tables(answer), _gap_table(answer)]
+
+
+def _gap_plot(answer: GapAnswer) -> Plot:
     gaps = [row.gap for row in answer.rows]
     shares = Panel(
         "share of the runs",
@@ -42,17 +48,63 @@ def gap_blocks(answer: GapAnswer) -> list[Block]:
             Series("largest", gaps, [row.largest_speed for row in answer.rows]),
         ],
     )
-    intervals = [
-        [
-            case.case,
-            case.draw if answer.draws_every is not None else None,
-            interval.low,
-            interval.high,
-            interval.stands_below,
-            interval.stands_above,
+    return Plot(
+        f"gaps-{answer.side}",
+        f"Which gap on the {answer.side} is safe",
+        panels=[shares, speeds],
+        x=Axis("clear gap, m"),
+        shared=False,
+    )
+
+
+def _interval_tables(answer: GapAnswer) -> list[Block]:
+    """The intervals of the scene as it is, and in a file those of its draws."""
+    as_it_is = [case for case in answer.falls if case.draw == 0]
+    rows = [_interval_row(case.case, interval) for case in as_it_is for interval in case.intervals]
+    columns = [
+        text("record"),
+        Column("low", "falls from", "m", digits=4),
+        Column("high", "to", "m", digits=4),
+        Column("stands_below", "stands at", "m", digits=4, brief=False),
+        Column("stands_above", "and again at", "m", digits=4, brief=False),
+    ]
+    tables: list[Block] = [
+        Table(
+            f"gap_intervals_{answer.side}",
+            columns,
+            rows,
+            "At which gaps it falls",
+            note=f"Looked at every {1e3 * answer.looked_every:.3g} mm, each change narrowed to"
+            " 0.1 mm. Narrower intervals may be missed.",
+            on="page" if rows else "file",
+            folded=len(rows) > 12,
+        )
+    ]
+    if answer.draws_every is not None:
+        draws = [
+            [case.draw, *_interval_row(case.case, interval)]
+            for case in answer.falls
+            if case.draw
+            for interval in case.intervals
         ]
-        for case in answer.falls
-        for interval in case.intervals
+        name = f"gap_intervals_{answer.side}_draws"
+        tables.append(Table(name, [Column("draw"), *columns], draws, on="file"))
+    return tables
+
+
+def _interval_row(case: str, interval: FallInterval) -> list[Any]:
+    ends = [interval.low, interval.high, interval.stands_below, interval.stands_above]
+    return [case, *ends]
+
+
+def _gap_table(answer: GapAnswer) -> Table:
+    columns = [
+        Column("gap", "clear gap", "m", digits=4),
+        Column("runs"),
+        Column("overturned"),
+        Column("struck"),
+        Column("median", "speed, median", "m/s"),
+        Column("largest", "largest", "m/s"),
     ]
     rows = [
         [
@@ -65,50 +117,15 @@ def gap_blocks(answer: GapAnswer) -> list[Block]:
         ]
         for row in answer.rows
     ]
-    interval_columns = [
-        text("record"),
-        Column("draw", help="0 is the scene as it is", optional=True),
-        Column("low", "falls from", "m", digits=4),
-        Column("high", "to", "m", digits=4),
-        Column("stands_below", "stands at", "m", digits=4, brief=False),
-        Column("stands_above", "and again at", "m", digits=4, brief=False),
-    ]
-    row_columns = [
-        Column("gap", "clear gap", "m", digits=4),
-        Column("runs"),
-        Column("overturned"),
-        Column("struck"),
-        Column("median", "speed, median", "m/s"),
-        Column("largest", "largest", "m/s"),
-    ]
-    return [
-        Plot(
-            f"gaps-{side}",
-            f"Which gap on the {side} is safe",
-            panels=[shares, speeds],
-            x=Axis("clear gap, m"),
-            shared=False,
-        ),
-        Table(
-            f"gap_intervals_{side}",
-            interval_columns,
-            intervals,
-            "At which gaps it falls",
-            note=f"Looked at every {1e3 * answer.looked_every:.3g} mm, each change narrowed to"
-            " 0.1 mm. Narrower intervals may be missed.",
-            on="page" if intervals else "file",
-            folded=len(intervals) > 12,
-        ),
-        Table(
-            f"gaps_{side}",
-            row_columns,
-            rows,
-            "Runs by gap",
-            note="Struck: also by runs that then overturn.",
-            on="page",
-            folded=True,
-        ),
-    ]
+    return Table(
+        f"gaps_{answer.side}",
+        columns,
+        rows,
+        "Runs by gap",
+        note="Struck: also by runs that then overturn.",
+        on="page",
+        folded=True,
+    )
 
 
 def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
@@ -149,7 +166,7 @@ def _curve_plot(answer: IntensityAnswer) -> list[Block]:
     least = sorted(record.least for record in answer.records if record.least is not None)
     if answer.fit is None or not answer.fit.dispersion > 0.0:
         return []
-    x = np.geomspace(0.5 * least[0], 2.0 * least[-1], 100)
+    x = np.union1d(np.geomspace(0.5 * least[0], 2.0 * least[-1], 100), least)
     low, high = answer.fit.band(x)
     steps = [(rank + 1) / len(answer.records) for rank in range(len(least))]
     series = [
@@ -161,7 +178,7 @@ def _curve_plot(answer: IntensityAnswer) -> list[Block]:
             high.tolist(),
             style="smooth",
         ),
-        Series("records", least, steps, style="step"),
+        Series("records", [float(x[0]), *least], [0.0, *steps], style="step"),
     ]
     head = f"{answer.label}, {answer.unit}" if answer.unit else answer.label
     return [
