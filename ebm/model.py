@@ -71,43 +71,41 @@ class EventBasedModel(Frozen):
         bilateral, bouc_wen = self.pivot == "bilateral", self.friction == "bouc-wen"
         if self.friction != "no-slip":
             scene.check_friction("event-based models")
-        errors.refuse(
-            (
-                self.friction != "coulomb" and not bilateral,
+        if self.friction != "coulomb" and not bilateral:
+            raise errors.InputError(
                 f'{self.pivot!r} is not allowed with friction="{self.friction}", only "bilateral"',
                 "pivot",
-            ),
-            (
-                bouc_wen and floor.mu_s != floor.friction,
+            )
+        if bouc_wen and floor.mu_s != floor.friction:
+            raise errors.InputError(
                 f"{floor.mu_s:g} is not allowed: Bouc-Wen friction has one coefficient,"
                 f" {floor.friction:g}",
                 "floor.static_friction",
-            ),
-            (
-                self.friction == "no-slip" and speed != 0.0,
+            )
+        if self.friction == "no-slip" and speed != 0.0:
+            raise errors.InputError(
                 f'{speed:g} is not allowed with friction="no-slip": it never slips',
                 "initial_velocity",
-            ),
-            (
-                bilateral and floor.restitution > 0.0,
+            )
+        if bilateral and floor.restitution > 0.0:
+            raise errors.InputError(
                 f"{floor.restitution:g} is not allowed with the bilateral pivot: a floor impact"
                 " that rebounds is free flight, which this model excludes; use 0, or"
                 ' pivot="unilateral"',
                 "floor.restitution",
-            ),
-            (
-                bilateral and height > 0.0,
+            )
+        if bilateral and height > 0.0:
+            raise errors.InputError(
                 f"{height:g} is not allowed with the bilateral pivot, which never leaves the"
                 ' floor; use 0, or pivot="unilateral"',
                 "initial_height",
-            ),
-            (
-                floor.restitution == 1.0,
+            )
+        if floor.restitution == 1.0:
+            raise errors.InputError(
                 "1 is not allowed: a block that loses nothing at the floor never settles; use less"
                 " than 1",
                 "floor.restitution",
-            ),
-        )
+            )
 
     def simulate(self, scene: Scene) -> history.History:
         """The motion of the scene on its output grid.

@@ -346,18 +346,14 @@ def _axis(values: ArrayLike, key: str) -> Floats:
         axis = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("numbers are asked for", key) from None
-    errors.refuse(
-        (
-            axis.ndim != 1 or axis.size == 0,
+    if axis.ndim != 1 or axis.size == 0:
+        raise InputError(
             f"{axis.size} values of {axis.ndim} dimensions; a list of at least one number is asked"
             " for",
             key,
-        ),
-        (
-            not np.all(np.isfinite(axis)) or np.any(axis.ravel()[:1] <= 0.0),
-            "positive finite numbers are asked for",
-            key,
-        ),
-        (np.any(np.diff(axis.ravel()) <= 0.0), "increasing numbers are asked for", key),
-    )
+        )
+    if not np.all(np.isfinite(axis)) or np.any(axis.ravel()[:1] <= 0.0):
+        raise InputError("positive finite numbers are asked for", key)
+    if np.any(np.diff(axis.ravel()) <= 0.0):
+        raise InputError("increasing numbers are asked for", key)
     return axis

@@ -111,18 +111,13 @@ class Engine(Frozen):
         step = given["time_step"]
         number = isinstance(step, int | float) and not isinstance(step, bool)
         why = ' with settings = "default":' if stock else f": {cls.fixed_because};"
-        errors.refuse(
-            (
-                step != "adaptive" and not (number and 0.0 < step <= sys.float_info.max),
+        if step != "adaptive" and not (number and 0.0 < step <= sys.float_info.max):
+            raise errors.InputError(
                 f'{printable(step)} is not allowed: give a step above 0 s, or "adaptive"',
                 "time_step",
-            ),
-            (
-                step == "adaptive" and usual != "adaptive",
-                f'"adaptive" is not allowed{why} give a step in s',
-                "time_step",
-            ),
-        )
+            )
+        if step == "adaptive" and usual != "adaptive":
+            raise errors.InputError(f'"adaptive" is not allowed{why} give a step in s', "time_step")
         return given
 
     @property

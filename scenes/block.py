@@ -15,7 +15,7 @@ from pydantic import (
 )
 
 from rockcheck.scenes.base import Finite, Frozen, Positive
-from rockcheck.scenes.errors import refuse
+from rockcheck.scenes.errors import InputError
 
 Side = Literal["left", "right"]
 
@@ -90,20 +90,18 @@ class Block(Frozen):
         (x, z), b, h = self.offset, self.half_width, self.half_height
         most, mass = b * b + h * h - x * x - z * z, self.mass or 1.0
         without = " (no mass is given: it is taken as that of 1 kg)" if self.mass is None else ""
-        refuse(
-            (
-                not (abs(x) < b and abs(z) < h),
+        if not (abs(x) < b and abs(z) < h):
+            raise InputError(
                 f"({x:g}, {z:g}) is not allowed: must lie inside the box, x between -{b:g} and"
                 f" {b:g} m and z between -{h:g} and {h:g} m",
                 "centre_of_mass",
-            ),
-            (
-                self.gyration_squared > most * (1.0 + ROUNDING),
+            )
+        if self.gyration_squared > most * (1.0 + ROUNDING):
+            raise InputError(
                 f"{self.gyration_squared * mass:g} is not allowed{without}: a mass inside the box"
                 f" with that centre has at most {most * mass:g} kg m^2",
                 "moment_of_inertia",
-            ),
-        )
+            )
         return self
 
     @model_serializer(mode="wrap")

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, StringConstraints, model_validator
 
 from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, refuse
+from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
 #: Largest peak acceleration that a record may be scaled to, g.
@@ -152,40 +152,11 @@ class Record(Motion):
     @classmethod
     def _read_file(cls, data: Any) -> Any:
         if isinstance(data, dict) and "file" in data:
-            path, extra = data["file"], {"unscaled", "source", "notes"} & data.keys()
-            refuse(
-                ({"pga", "scale"} <= data.keys(), "cannot be given together with scale", "pga"),
-                (extra, "cannot be given together with file", min(extra, default="")),
-                (
-                    not isinstance(path, str | Path),
-                    f"{path!r} is not allowed: give the path of a record file",
-                    "file",
-                ),
-            )
-            if data.get("scale") == 0:
-                raise InputError("0 leaves nothing of the record: give another scale", "scale")
-            options = data.keys() & Reading.model_fields
-            found = read_record(Path(path), Reading(**{name: data[name] for name in options}))
-            data = {key: data[key] for key in data if key not in (*options, "file")} | {
-                "unscaled": tuple(found.samples.tolist()),
-                "time_step": found.time_step,
-                "source": Path(path).name,
-                "notes": found.notes,
-            }
+            data = _with_file_read(data)
         if isinstance(data, dict) and "pga" in data:
-            pga, rest = data["pga"], {name: data[name] for name in data if name != "pga"}
+            rest = {name: value for name, value in data.items() if name != "pga"}
             largest = max(map(abs, cls(**rest).unscaled))
-            refuse(
-                (
-                    not isinstance(pga, int | float)
-                    or isinstance(pga, bool)
-                    or not 0.0 < pga <= MOST_PGA,
-                    f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}",
-                    "pga",
-                ),
-                (not largest > 0.0, "the record does not move: no scale gives it a peak", "pga"),
-            )
-            data = rest | {"scale": pga * GRAVITY_OF_RECORDS / largest}
+            data = rest | {"scale": _scale_to(data["pga"], largest)}
         return data
 
     @classmethod
@@ -227,6 +198,39 @@ class Record(Motion):
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
+
+
+def _with_file_read(data: dict[str, Any]) -> dict[str, Any]:
+    """The fields of a record, what its `file` holds in place of the file's name."""
+    path, extra = data["file"], {"unscaled", "source", "notes"} & data.keys()
+    if {"pga", "scale"} <= data.keys():
+        raise InputError("cannot be given together with scale", "pga")
+    if extra:
+        raise InputError("cannot be given together with file", min(extra))
+    if not isinstance(path, str | Path):
+        raise InputError(f"{path!r} is not allowed: give the path of a record file", "file")
+    if data.get("scale") == 0:
+        raise InputError("0 leaves nothing of the record: give another scale", "scale")
+    options = data.keys() & Reading.model_fields
+    recording = read_record(Path(path), Reading(**{name: data[name] for name in options}))
+    return {key: data[key] for key in data if key not in (*options, "file")} | {
+        "unscaled": tuple(recording.samples.tolist()),
+        "time_step": recording.time_step,
+        "source": Path(path).name,
+        "notes": recording.notes,
+    }
+
+
+def _scale_to(pga: object, largest: float) -> float:
+    """The factor that gives a record whose largest sample is `largest` (m/s^2) the peak `pga` (g).
+
+    Raises `InputError` where there is none.
+    """
+    if not isinstance(pga, int | float) or isinstance(pga, bool) or not 0.0 < pga <= MOST_PGA:
+        raise InputError(f"{pga!r} is not allowed: a number above 0, at most {MOST_PGA:g}", "pga")
+    if not largest > 0.0:
+        raise InputError("the record does not move: no scale gives it a peak", "pga")
+    return pga * GRAVITY_OF_RECORDS / largest
 
 
 Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]

@@ -28,7 +28,7 @@ import numpy as np
 from pydantic import model_validator
 
 from rockcheck.scenes.base import DATA, Finite, Floats, Frozen, Positive
-from rockcheck.scenes.errors import InputError, printable, refuse, suggestion, unknown_name
+from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
@@ -57,9 +57,8 @@ def load_uncertain_scene(source: str | Path) -> UncertainScene:
 
     Raises as `load_scene`.
     """
-    refuse(
-        (not isinstance(source, str | Path), "give a name, or the path of a .toml file", "source")
-    )
+    if not isinstance(source, str | Path):
+        raise InputError("give a name, or the path of a .toml file", "source")
     known = named_scenes()
     path = known.get(str(source), Path(source))
     if path.suffix.lower() != ".toml":
@@ -150,26 +149,23 @@ class Spread(Frozen):
     @model_validator(mode="after")
     def _one_form(self) -> Spread:
         normal, (low, high) = self.sd is not None, self._ends
-        refuse(
-            (
-                normal and (low, high) != (None, None),
-                "cannot be given together with low and high",
-                "sd",
-            ),
-            (normal and self.value is None, "is missing beside sd", "value"),
-            (
-                not normal and None in (low, high),
-                "is missing: give value and sd, or low and high",
-                "low" if low is None else "high",
-            ),
-            (
-                not normal
-                and "distribution" in self.model_fields_set
-                and self.distribution != "uniform",
+        if normal and (low, high) != (None, None):
+            raise InputError("cannot be given together with low and high", "sd")
+        if normal and self.value is None:
+            raise InputError("is missing beside sd", "value")
+        if not normal and None in (low, high):
+            raise InputError(
+                "is missing: give value and sd, or low and high", "low" if low is None else "high"
+            )
+        if (
+            not normal
+            and "distribution" in self.model_fields_set
+            and self.distribution != "uniform"
+        ):
+            raise InputError(
                 f"{self.distribution} is not allowed with low and high: such a number is uniform",
                 "distribution",
-            ),
-        )
+            )
         if not normal and not low < high:
             raise InputError(f"{high:g} is not allowed: must be more than low, {low:g}", "high")
         if normal and self.distribution == "lognormal" and self.nominal <= 0.0:
@@ -259,6 +255,21 @@ class UncertainScene:
             ) from None
 
 
+def _correlated_pair(key: str, names: list[str]) -> tuple[int, int]:
+    """The places, among these names, of the two uncertain numbers of a key "a, b"."""
+    pair, where = [part.strip() for part in key.split(",")], f"{CORRELATION}.{key}"
+    if len(pair) != 2 or pair[0] == pair[1]:
+        raise InputError(
+            "give two uncertain numbers, as in 'floor.friction, walls.left.gap'", where
+        )
+    for name in pair:
+        if name not in names:
+            raise InputError(
+                f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}", where
+            )
+    return names.index(pair[0]), names.index(pair[1])
+
+
 def uncertain_scene(
     scene: Scene, spreads: Mapping[str, Spread], correlations: Mapping[str, Any]
 ) -> UncertainScene:
@@ -270,29 +281,13 @@ def uncertain_scene(
     names = list(spreads)
     matrix = np.eye(len(names))
     for key, value in correlations.items():
-        pair, where = [part.strip() for part in key.split(",")], f"{CORRELATION}.{key}"
+        i, j = _correlated_pair(key, names)
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        refuse(
-            (
-                len(pair) != 2 or pair[0] == pair[1],
-                "give two uncertain numbers, as in 'floor.friction, walls.left.gap'",
-                where,
-            ),
-            *(
-                (
-                    name not in names,
-                    f"{name!r} is not an uncertain number of the scene{suggestion(name, names)}",
-                    where,
-                )
-                for name in pair
-            ),
-            (
-                not number or not -1.0 < value < 1.0,
+        if not number or not -1.0 < value < 1.0:
+            raise InputError(
                 f"{value!r} is not allowed: give a number between -1 and 1",
-                where,
-            ),
-        )
-        i, j = (names.index(name) for name in pair)
+                f"{CORRELATION}.{key}",
+            )
         matrix[i, j] = matrix[j, i] = float(value)
     if names and np.linalg.eigvalsh(matrix)[0] <= 0.0:
         raise InputError(

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field, StringConstraints, model_validator
 from rockcheck.scenes import kinematics
 from rockcheck.scenes.base import Finite, Floats, Frozen, NonNegative, Positive, Restitution, Shown
 from rockcheck.scenes.block import PAPER_BLOCK, Block, Side
-from rockcheck.scenes.errors import InputError, refuse
+from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.excitations import Excitation, Rest
 
 __all__ = ["PAPER_BLOCK", "Block", "Floor", "Scene", "Wall"]
@@ -96,29 +96,25 @@ class Scene(Shown, Frozen):
             wall.side: kinematics.clearance(self.block, wall.side, wall.gap, x, tilt)
             for wall in self.walls
         }
-        refuse(
-            (
-                len(clear) < len(self.walls),
+        if len(clear) < len(self.walls):
+            raise InputError(
                 "two walls on one side; at most one wall on the left and one on the right are"
                 " allowed",
                 "walls",
-            ),
-            (
-                self.duration / self.output_step > MOST_SAMPLES,
+            )
+        if self.duration / self.output_step > MOST_SAMPLES:
+            raise InputError(
                 f"{self.output_step:g} s gives more than {MOST_SAMPLES} samples in"
                 f" {self.duration:g} s",
                 "output_step",
-            ),
-            *(
-                (
-                    gap < -1e-12 * self.block.half_diagonal,
+            )
+        for side, gap in clear.items():
+            if gap < -1e-12 * self.block.half_diagonal:
+                raise InputError(
                     f"{tilt:g} is not allowed: the block would start {-gap:.3g} m inside the"
                     f" {side} wall",
                     "initial_rotation",
                 )
-                for side, gap in clear.items()
-            ),
-        )
         return self
 
     def wall(self, side: Side) -> Wall | None:

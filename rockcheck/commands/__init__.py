@@ -286,22 +286,32 @@ def chosen_models(names: str = ALL, settings: Sequence[str] = ()) -> dict[str, d
         if names == ALL
         else filter(None, map(str.strip, names.split(",")))
     )
-    words: dict[str, list[str]] = {name: [] for name in named}
-    if not words or "measured" in words:
+    chosen = list(dict.fromkeys(named))
+    if not chosen or "measured" in chosen:
         raise InputError(
             f"{printable(names)!r} is not allowed: models that play, with commas between, or all",
             "--models",
         )
-    for text in settings:
-        model, dot, rest = text.partition(".")
-        said = f"write MODEL.key=value, with MODEL one of {', '.join(words)}"
-        errors.refuse((not dot or model not in words, f"{printable(text)!r}: {said}", "--set"))
-        words[model].append(rest)
-    found = {name: settings_of(some) for name, some in words.items()}
-    for name, given in found.items():
+    by_model = _settings_by_model(settings, chosen)
+    for name, given in by_model.items():
         if not is_own(name):
             build(name, given)
-    return found
+    return by_model
+
+
+def _settings_by_model(settings: Iterable[str], models: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """The settings of each of these models, from words `MODEL.key=value`."""
+    words: dict[str, list[str]] = {name: [] for name in models}
+    for text in settings:
+        model, dot, rest = text.partition(".")
+        if not dot or model not in words:
+            raise InputError(
+                f"{printable(text)!r}: write MODEL.key=value, with MODEL one of"
+                f" {', '.join(models)}",
+                "--set",
+            )
+        words[model].append(rest)
+    return {name: settings_of(own) for name, own in words.items()}
 
 
 def need_installed(names: Iterable[str], option: str) -> None:
@@ -319,10 +329,10 @@ def settings_of(words: Iterable[str], option: str = "--set") -> dict[str, Any]:
     found: dict[str, Any] = {}
     for word in words:
         key, equals, value = word.partition("=")
-        errors.refuse(
-            (not equals or not key.isidentifier(), f"{printable(word)!r}: write key=value", option),
-            (key in found, f"{key} is given twice: give one value", option),
-        )
+        if not equals or not key.isidentifier():
+            raise InputError(f"{printable(word)!r}: write key=value", option)
+        if key in found:
+            raise InputError(f"{key} is given twice: give one value", option)
         try:
             found[key] = tomllib.loads(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:

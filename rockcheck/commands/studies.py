@@ -117,18 +117,15 @@ def spectrum(
         grid.size, grid.frequencies, grid.amplitudes, name, given, grid.refine, through
     )
     if agreement is not None:
-        errors.refuse(
-            (
-                name != "ebm",
-                "cannot be given together with --model: all are compared",
-                "--agreement",
-            ),
-            (
-                not 2 <= agreement <= grid.size**2,
+        if name != "ebm":
+            raise errors.InputError(
+                "cannot be given together with --model: all are compared", "--agreement"
+            )
+        if not 2 <= agreement <= grid.size**2:
+            raise errors.InputError(
                 f"{agreement} is not allowed: give 2 up to the number of the spectrum's nodes",
                 "--agreement",
-            ),
-        )
+            )
         tell_missing()
     studied(study.Spectra(panels, request, agreement or 0), played)
 

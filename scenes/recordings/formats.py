@@ -15,7 +15,7 @@ from itertools import islice, takewhile
 import numpy as np
 
 from rockcheck.scenes.base import LEAST, MOST
-from rockcheck.scenes.errors import printable, refuse
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.recordings.network_lines import digit_notes
 from rockcheck.scenes.recordings.recording import (
     NUMBER,
@@ -78,6 +78,16 @@ _DIRECTIONS = {n: f"{n} deg" for n in range(361)} | {400: "up", 401: "down", 402
 NO_FIELDS = "a format without fields"
 
 
+def _refuse_other_kinds(header: list[str]) -> None:
+    """Raise `InputError` where a header says that the file holds no accelerations."""
+    for n, line in enumerate(header, 1):
+        other = _OTHER_KIND.search(line[:_WIDE])
+        if other is not None:
+            raise InputError(
+                f"{printable(other[0], 30)!r}; only accelerations can be read", f"line {n}"
+            )
+
+
 def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
     """Read PEER: header lines with the units, NPTS and DT, then accelerations in g."""
     found = (AT2_HEADER.search(line) or AT2_HEADER_PLAIN.search(line) for line in lines[:20])
@@ -86,23 +96,12 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
         raise fault("no header line with NPTS and DT within the first 20 lines")
     words = (word for line in lines[:header] for word in _UNITS.findall(line))
     stated = next(filter(None, map(known_unit, words)), "")
-    refuse(
-        *(
-            (
-                other,
-                f"{printable(other[0], 30)!r}; only accelerations can be read",
-                f"line {n}",
-            )
-            for n, line in enumerate(lines[:header], 1)
-            for other in _OTHER_KIND.finditer(line[:_WIDE])
-        ),
-        (
-            not stated and reading.unit is None,
+    _refuse_other_kinds(lines[:header])
+    if not stated and reading.unit is None:
+        raise InputError(
             "no header line that states UNITS OF G or another; give the unit:"
-            f" {option('unit', 'cm/s2')}",
-            "",
-        ),
-    )
+            f" {option('unit', 'cm/s2')}"
+        )
     count = checked_count(header, "NPTS", match[1])
     facts = Stated(
         count=Fact(count, "NPTS", header),
@@ -145,22 +144,15 @@ def read_esm(lines: list[str], reading: Reading) -> list[Recording]:
     needed = ("NDATA", "SAMPLING_INTERVAL_S")
     (place, counted), (line, interval) = (header.get(key, (0, "")) for key in needed)
     kind_line, kind = header.get("DATA_TYPE", (0, "ACCELERATION"))
-    refuse(
-        (
-            kind.upper() != "ACCELERATION",
-            f"DATA_TYPE {printable(kind, 30)!r}; only ACCELERATION can be read",
-            f"line {kind_line}",
-        ),
-        *(
-            (not word, f"no header line that states {key}", "")
-            for key, word in zip(needed, (counted, interval), strict=True)
-        ),
-        (
-            not re.fullmatch(r"[0-9]++", counted),
-            f"NDATA {printable(counted, 30)!r} is not a count",
-            f"line {place}",
-        ),
-    )
+    if kind.upper() != "ACCELERATION":
+        raise InputError(
+            f"DATA_TYPE {printable(kind, 30)!r}; only ACCELERATION can be read", f"line {kind_line}"
+        )
+    for key, word in zip(needed, (counted, interval), strict=True):
+        if not word:
+            raise InputError(f"no header line that states {key}")
+    if not re.fullmatch(r"[0-9]++", counted):
+        raise InputError(f"NDATA {printable(counted, 30)!r} is not a count", f"line {place}")
     count = checked_count(place, "NDATA", counted)
     unit_line, unit_word = header.get("UNITS", (0, ""))
     unit = known_unit(unit_word)
@@ -207,19 +199,15 @@ def read_knet(lines: list[str], reading: Reading) -> list[Recording]:
     values = np.array(numbers(enumerate(lines[end:], end + 1)))
     line_of, length = header.get("Duration Time(s)", (0, ""))
     expected = number(line_of, length) * hertz if line_of else float(len(values))
-    refuse(
-        (
-            counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST,
-            f"Scale Factor {printable(scale[0], 40)} is not usable",
-            f"line {place}",
-        ),
-        (not len(values), "no samples after the line Memo.", ""),
-        (
-            abs(expected - len(values)) > 0.5,
+    if counts == 0.0 or not LEAST <= abs(factor / counts) <= MOST:
+        raise InputError(f"Scale Factor {printable(scale[0], 40)} is not usable", f"line {place}")
+    if not len(values):
+        raise InputError("no samples after the line Memo.")
+    if abs(expected - len(values)) > 0.5:
+        raise InputError(
             f"Duration Time(s) {length} is {expected:.10g} samples, the file has {len(values)}",
             f"line {line_of}",
-        ),
-    )
+        )
     gals = values * (factor / counts)
     mean = float(np.mean(gals))
     peak_line, peak = header.get("Max. Acc. (gal)", (0, ""))
@@ -327,7 +315,8 @@ def _refuse_counts(block: re.Match[str], line: int) -> None:
 def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) -> int:
     """Take direction and time step from a block of header values; returns the line after it."""
     across, width = int(header[4]), int(header[5])
-    refuse((across < 1 or width < 1, NO_FIELDS, f"line {index}"))
+    if across < 1 or width < 1:
+        raise InputError(NO_FIELDS, f"line {index}")
     end = min(index + int(header[3][:6]), len(lines))
     fields = (
         (n, line[k * width : (k + 1) * width].strip())
@@ -347,16 +336,10 @@ def _heed(lines: list[str], index: int, header: re.Match[str], block: _Block) ->
     return end
 
 
-def _recording(lines: list[str], index: int, about: _Block, reading: Reading) -> Recording:
-    (place, seconds), here, end = about.step, f"line {index}", index + about.height
-    refuse(
-        (not place, "no real header before this block states the time step", here),
-        (about.across < 1 or about.width < 1, NO_FIELDS, here),
-    )
-    count = checked_count(index, "the count of points", about.count)
-    step = checked_step(place, "the time step", f"{seconds!r}")
+def _values_in_fields(lines: list[str], within: range, about: _Block, count: int) -> list[float]:
+    """At most `count` numbers in the fields of a block's lines, up to the first line of others."""
     values: list[float] = []
-    for n, line in enumerate(lines[index:end], index + 1):
+    for n, line in zip(within, lines[within.start : within.stop], strict=False):
         on_line = min(about.across, count - len(values))
         places = range(0, on_line * about.width, about.width)
         words = [line[k : k + about.width].strip() for k in places]
@@ -364,20 +347,26 @@ def _recording(lines: list[str], index: int, about: _Block, reading: Reading) ->
         if "" in words or line[about.across * about.width :][:1].strip():
             break
         if len(line.rstrip()) < on_line * about.width:
-            raise fault(f"{len(line.rstrip())} characters: a digit is missing", n)
-        values += [number(n, word) for word in words]
-    refuse(
-        (
-            len(values) != count,
-            f"the header says {count} points of acceleration, the block has {len(values)}",
-            here,
-        ),
-        (
-            {*map(is_number, "".join(lines[end : end + 1]).split())} == {True},
-            f"the header says {count} points of acceleration, more follow",
-            here,
-        ),
-    )
+            raise fault(f"{len(line.rstrip())} characters: a digit is missing", n + 1)
+        values += [number(n + 1, word) for word in words]
+    return values
+
+
+def _recording(lines: list[str], index: int, about: _Block, reading: Reading) -> Recording:
+    (place, seconds), here, end = about.step, f"line {index}", index + about.height
+    if not place:
+        raise InputError("no real header before this block states the time step", here)
+    if about.across < 1 or about.width < 1:
+        raise InputError(NO_FIELDS, here)
+    count = checked_count(index, "the count of points", about.count)
+    step = checked_step(place, "the time step", f"{seconds!r}")
+    values = _values_in_fields(lines, range(index, end), about, count)
+    if len(values) != count:
+        raise InputError(
+            f"the header says {count} points of acceleration, the block has {len(values)}", here
+        )
+    if {*map(is_number, "".join(lines[end : end + 1]).split())} == {True}:
+        raise InputError(f"the header says {count} points of acceleration, more follow", here)
     length = float(about.seconds[:9]) if about.seconds else None
     facts = Stated(
         time_step=Fact(step, "the header", place),

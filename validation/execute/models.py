@@ -183,19 +183,15 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
     if not is_own(name):
         return
     module = family(name).module
-    errors.refuse(
-        (
-            module in sys.stdlib_module_names,
-            f"{printable(name)!r} is no model: {module} is part of Python's standard library",
-            "",
-        ),
-        (
-            name not in allow_code,
+    if module in sys.stdlib_module_names:
+        raise InputError(
+            f"{printable(name)!r} is no model: {module} is part of Python's standard library"
+        )
+    if name not in allow_code:
+        raise InputError(
             f"{printable(name)!r} is code of your own; it runs only if you allow it: --allow-code"
-            f" {printable(name)}",
-            "",
-        ),
-    )
+            f" {printable(name)}"
+        )
 
 
 def home(name: str) -> str:
@@ -225,29 +221,20 @@ def build(
     a `search_path`. Its code, in one of these folders, is imported: give them only in the process
     that plays it, for code that was allowed.
     """
-    errors.refuse(
-        (
-            is_own(name) and search_path is None,
+    if is_own(name) and search_path is None:
+        raise InputError(
             f"model {printable(name)!r} is one of your own, which `validate` and `simulate` can"
-            " play",
-            "",
+            " play"
         )
-    )
     check_allowed(name, (name,))
     sys.path.extend(path for path in search_path or () if path not in sys.path)
     kind, model_class, settings = family(name), class_of(name), dict(settings or {})
-    errors.refuse(
-        (
-            not isinstance(model_class, type)
-            or not callable(getattr(model_class, "simulate", None)),
-            f"{printable(name)!r} is no model: it must be a class with a method `simulate`",
-            "",
-        ),
-        *(
-            (True, f"is fixed by the name of the model, {name}", f"{name}.{key}")
-            for key in kind.fixed.keys() & settings.keys()
-        ),
-    )
+    if not isinstance(model_class, type) or not callable(getattr(model_class, "simulate", None)):
+        raise InputError(
+            f"{printable(name)!r} is no model: it must be a class with a method `simulate`"
+        )
+    for key in kind.fixed.keys() & settings.keys():
+        raise InputError(f"is fixed by the name of the model, {name}", f"{name}.{key}")
     try:
         model: Model = model_class(**kind.fixed, **settings)
     except InputError as error:
