@@ -48,23 +48,6 @@ COMMANDS = {
     "warm": ("simulate:warm", "rockcheck warm"),
 }
 
-#: Replacements of removed commands and options.
-GONE = {
-    "run": "rockcheck validate SCENE",
-    "diff": "rockcheck compare RUN_A RUN_B",
-    "figure": "rockcheck report DIR --scene NAME -o FILE",
-    "convergence": "rockcheck benchmark convergence",
-    "calibrate": "rockcheck conformance --tune E",
-    "uncertainty": "rockcheck assess SCENE",
-    "ida": "rockcheck assess SCENE RECORDS --levels pga:0.05:2:40",
-    "compare --offset": "--align SECONDS",
-    "conformance --settings": "--set settings=best, default or both",
-    "compare --all": "--json has all that moved",
-    "simulate --plot": "-o FILE.png, beside -o FILE.csv",
-    "spectrum --force": "give another --out",
-    "report --against": "rockcheck compare A.csv B.csv --plot FILE",
-    "benchmark --minutes": "it ends after 25 minutes, and goes on when called again",
-}
 #: Commands that are not listed.
 HIDDEN = ("warm",)
 
@@ -145,10 +128,6 @@ class _EachOnce(typer.core.TyperCommand):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        for word in args:
-            named = word.partition("=")[0]
-            if instead := GONE.get(f"{ctx.info_name} {named}"):
-                raise InputError(f"is gone: {instead}", named)
         own = BARE.keys() & itertools.chain.from_iterable(one.opts for one in self.params)
         args = [
             f"{word}={BARE[word][0]}"
@@ -181,8 +160,6 @@ class _Commands(typer.core.TyperGroup):
         return [name for name in COMMANDS if name not in HIDDEN]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name in GONE:
-            raise InputError(f"the command {cmd_name} is gone: {GONE[cmd_name]}")
         if cmd_name not in COMMANDS:
             return None
         where, example = COMMANDS[cmd_name]
