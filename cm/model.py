@@ -13,16 +13,15 @@ from rockcheck.cm.grid import GRID
 from rockcheck.scenes import (
     Cost,
     Event,
+    Excitation,
     Floats,
     Frozen,
     History,
     Positive,
     Record,
     Rest,
-    Ricker,
     Scene,
     Side,
-    Sine,
     errors,
     kinematics,
     observation,
@@ -213,10 +212,10 @@ class ContinuousModel(Frozen):
         return replace(history, model_extremes=found)
 
 
-def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tuple[Floats, float]:
+def _samples(excitation: Excitation, duration: float) -> tuple[Floats, float]:
     """Samples (m/s^2) of the excitation, linear in between, and their number a second.
 
-    A record keeps its samples.
+    A record keeps its samples, and no line leads beyond the last one.
     """
     if isinstance(excitation, Record):
         return excitation.samples, 1.0 / excitation.time_step
@@ -224,4 +223,7 @@ def _samples(excitation: Rest | Ricker | Sine | Record, duration: float) -> tupl
         return np.zeros(1), 1.0
     step = excitation.period / SAMPLES_A_PERIOD
     until = min(excitation.quiet_after, duration)
+    if until in excitation.jumps:
+        times = np.linspace(0.0, until, round(until / step) + 1)
+        return excitation.acceleration(times), (len(times) - 1) / until
     return excitation.acceleration(step * np.arange(math.ceil(until / step) + 2)), 1.0 / step

@@ -202,7 +202,7 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
     horizontal, ratio = given["horizontal"], 1.0 / periods
     bell = horizontal["kind"][0] == Shape.GAUSSIAN
     for power in range(4):
-        horizontal[f"c{power}"] *= amplitudes * (ratio**power if bell else 1.0)
+        horizontal[f"c{power}"] *= amplitudes * ratio**power
     horizontal["rate"] *= ratio**2 if bell else ratio
     horizontal["centre"] *= periods
     horizontal["quiet"] *= periods

@@ -12,7 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rockcheck.ebm.model import EventBasedModel
-from rockcheck.scenes import Block, Floats, InputError, Record, Scene, Shown, errors, progress
+from rockcheck.scenes import (
+    Block,
+    Floats,
+    InputError,
+    Pulse,
+    Record,
+    Scene,
+    Shown,
+    errors,
+    progress,
+)
 
 if TYPE_CHECKING:
     from rockcheck.ebm.core.state import Rows
@@ -95,7 +105,7 @@ def overturning_spectrum(
     """The outcomes of a scene under pulses of its own kind, each run until its outcome is decided.
 
     `frequency_ratios` (omega_p/p) and `amplitude_ratios` (a_p/(g tan alpha)) are increasing,
-    positive and finite. `scene` gives block, floor, walls, the kind of pulse (Ricker or sine) and
+    positive and finite. `scene` gives block, floor, walls, the kind of pulse and
     its direction, the sign of its amplitude; its duration and the pulse's own size are not used.
     Where the scene's excitation is a record, `frequency_ratios` are sizes of the block relative to
     its own (the gaps stay as they are) and `amplitude_ratios` multiply the record. With `refine`
@@ -114,10 +124,9 @@ def overturning_spectrum(
             "frequency_ratios",
         )
     errors.check_kind(scene, Scene, "load_scene", "scene")
-    if scene.excitation.kind not in ("ricker", "sine", "record"):
+    if not isinstance(scene.excitation, Pulse | Record):
         raise InputError(
-            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a ricker or sine pulse,"
-            " or a record",
+            f"{scene.excitation.kind!r} is not allowed: a spectrum needs a pulse, or a record",
             "excitation.kind",
         )
     outcomes = np.full((len(amplitudes), len(frequencies)), _UNKNOWN, dtype=np.int8)

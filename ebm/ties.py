@@ -19,7 +19,7 @@ import numpy as np
 
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.table import table_of
-from rockcheck.scenes import Excitation, History, InputError, ModelFailure, Record, Scene, Side
+from rockcheck.scenes import Excitation, History, InputError, ModelFailure, Scene, Side
 from rockcheck.scenes.history import OUTCOMES
 
 #: Relative difference of two numbers that are equal but for rounding.
@@ -121,16 +121,8 @@ def largest_accelerations(excitation: Excitation) -> dict[Side, float]:
 
     A base that moves to the right tips the block to the left.
     """
-    if excitation.kind == "rest":
-        return {"left": 0.0, "right": 0.0}
-    if isinstance(excitation, Record):
-        values = excitation.samples
-    elif excitation.kind == "sine":
-        values = np.array([excitation.amplitude, -excitation.amplitude])
-    else:
-        t = np.linspace(0.0, excitation.quiet_after, 20_001)
-        values = excitation.acceleration(t)
-    return {"left": float(np.max(values)), "right": float(-np.min(values))}
+    least, largest = excitation.extremes
+    return {"left": largest, "right": -least}
 
 
 def _balance_edges(scene: Scene) -> Iterator[Edge]:

@@ -5,9 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rockcheck.scenes import Record, Rest, Ricker, Scene, Sine
-
-SAMPLES_A_PERIOD = 1000  # of a pulse: a cubic spline through them is good to 1e-11 of its amplitude
+from rockcheck.scenes import Excitation, Record, Rest, Scene
 
 
 class BaseVelocity(NamedTuple):
@@ -22,18 +20,17 @@ class BaseVelocity(NamedTuple):
     last: float
 
 
-def velocity_of(excitation: Rest | Ricker | Sine | Record) -> BaseVelocity:
+def velocity_of(excitation: Excitation) -> BaseVelocity:
     """The velocity of the base, zero at t = 0; for `velocity_at`."""
     from scipy.interpolate import CubicSpline, PPoly
 
     if isinstance(excitation, Rest) or excitation.quiet_after == 0.0:  # a record of one sample
         return BaseVelocity([], 1.0, 0.0)
-    interval = (
-        excitation.time_step
-        if isinstance(excitation, Record)
-        else excitation.period / SAMPLES_A_PERIOD
-    )
+    interval = excitation.sample_step
     times = interval * np.arange(math.ceil(excitation.quiet_after / interval - 1e-9) + 1)
+    last = times[-1]
+    if last > excitation.quiet_after and math.isclose(last, excitation.quiet_after):
+        times[-1] = excitation.quiet_after  # rounding, where the acceleration may jump
     samples = excitation.acceleration(times)
     lines = np.array([np.diff(samples) / interval, samples[:-1]])
     pieces = lines if isinstance(excitation, Record) else CubicSpline(times, samples).c

@@ -17,9 +17,11 @@ from .engines import (
 )
 from .scenes import (
     Block as Block,
+    Cosine as Cosine,
     Cost as Cost,
     Event as Event,
     Floor as Floor,
+    HalfSine as HalfSine,
     History as History,
     InputError as InputError,
     ModelFailure as ModelFailure,
@@ -29,6 +31,7 @@ from .scenes import (
     Scene as Scene,
     Sine as Sine,
     Wall as Wall,
+    Wavelet as Wavelet,
     load_scene as load_scene,
     named_scenes as named_scenes,
 )

@@ -15,7 +15,18 @@ from rockcheck.scenes.base import (
 from rockcheck.scenes.block import Block, Pivot as Pivot, Side as Side
 from rockcheck.scenes.errors import InputError, ModelFailure, printable as printable
 from rockcheck.scenes.events import Event
-from rockcheck.scenes.excitations import Excitation as Excitation, Record, Rest, Ricker, Sine
+from rockcheck.scenes.excitations import (
+    Cosine,
+    Excitation as Excitation,
+    HalfSine,
+    Pulse as Pulse,
+    Record,
+    Rest,
+    Ricker,
+    Sine,
+    Wave as Wave,
+    Wavelet,
+)
 from rockcheck.scenes.extremes import Extremes as Extremes, WallExtremes as WallExtremes
 from rockcheck.scenes.files import load_scene, named_scenes
 from rockcheck.scenes.history import Cost, History
@@ -24,9 +35,11 @@ from rockcheck.scenes.scene import PAPER_BLOCK as PAPER_BLOCK, Floor, Scene, Wal
 # Public names; the others are for the packages above.
 __all__ = [
     "Block",
+    "Cosine",
     "Cost",
     "Event",
     "Floor",
+    "HalfSine",
     "History",
     "InputError",
     "ModelFailure",
@@ -36,6 +49,7 @@ __all__ = [
     "Scene",
     "Sine",
     "Wall",
+    "Wavelet",
     "load_scene",
     "named_scenes",
 ]

@@ -20,8 +20,28 @@ from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 MOST_PGA = 1000.0
 
 
+#: Samples a period of a pulse: between them it is a straight line to 1e-5 of its amplitude, and a
+#: cubic to 1e-11.
+SAMPLES_A_PERIOD = 1000
+
+
 class Motion(Frozen):
-    """Base of all excitations: a scaled or stretched motion is of the same kind."""
+    """Base of all excitations: a scaled or stretched motion is of the same kind.
+
+    What a solver asks of one: `acceleration(t)`, the time `quiet_after` which the base is at rest,
+    the times of its `kinks` and `jumps`, its `extremes`, and the `sample_step` of a solver that
+    takes samples. What the compiled core asks is in `ebm.core.ground`.
+    """
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times (s) at which the acceleration, or its rate, jumps."""
+        return ()
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) after the start at which the acceleration itself jumps."""
+        return ()
 
     def scaled(self, factor: float) -> Self:
         """The same motion with `factor` times the acceleration, validated like any other.
@@ -44,6 +64,22 @@ class Motion(Frozen):
         )
 
 
+class Pulse(Motion):
+    """A motion of one shape: its `amplitude` is in m/s^2, and its `period` in s.
+
+    A negative amplitude gives the mirror image. The frequency of a spectrum is 2 pi over the
+    period.
+    """
+
+    amplitude: Finite
+    period: Positive
+
+    @property
+    def sample_step(self) -> float:
+        """Time between samples (s) that follow the pulse, see `SAMPLES_A_PERIOD`."""
+        return self.period / SAMPLES_A_PERIOD
+
+
 class Rest(Motion):
     """A base that does not move."""
 
@@ -55,8 +91,13 @@ class Rest(Motion):
         """Base acceleration at times `t` (s): zero."""
         return np.zeros_like(np.asarray(t, dtype=float))
 
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return 0.0, 0.0
 
-class Ricker(Motion):
+
+class Ricker(Pulse):
     """A Ricker pulse; antisymmetric (the paper's (34)) unless `symmetric`.
 
     It starts 2 T_p before its centre. An antisymmetric pulse of positive amplitude has a weak
@@ -66,8 +107,6 @@ class Ricker(Motion):
     """
 
     kind: Literal["ricker"] = "ricker"
-    amplitude: Finite
-    period: Positive
     symmetric: bool = False
 
     @property
@@ -109,25 +148,145 @@ class Ricker(Motion):
         """Time in s after which the pulse is below 1e-16 of its amplitude."""
         return self.centre + math.sqrt(46.0 / self.rate)
 
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return extremes_by_samples(self)
 
-class Sine(Motion):
-    """`cycles` full cycles of a sine of `amplitude` (m/s^2) and `period` (s), then rest."""
 
-    kind: Literal["sine"] = "sine"
-    amplitude: Finite
-    period: Positive
-    cycles: Annotated[int, Field(ge=1, le=1000)] = 1
+class Wave(Pulse):
+    """A piece of a sine: amplitude times sin(2 pi (t + lead)/period), then rest."""
+
+    #: How much of a period has passed at the start.
+    lead_share: ClassVar[float] = 0.0
+
+    @property
+    def lead(self) -> float:
+        """Time (s) by which the sine is ahead at the start."""
+        return self.lead_share * self.period
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s at which the piece ends."""
+        raise NotImplementedError
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times (s) at which the acceleration, or its rate, jumps."""
+        return (self.quiet_after,)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return -abs(self.amplitude), abs(self.amplitude)
 
     def acceleration(self, t: ArrayLike) -> Floats:
         """Base acceleration in m/s^2 at times `t` in s."""
         time = np.asarray(t, dtype=float)
         inside = (time >= 0.0) & (time <= self.quiet_after)
-        return np.where(inside, self.amplitude * np.sin(2.0 * math.pi * time / self.period), 0.0)
+        phase = 2.0 * math.pi * (time + self.lead) / self.period
+        return np.where(inside, self.amplitude * np.sin(phase), 0.0)
+
+
+class Sine(Wave):
+    """`cycles` full cycles of a sine of `amplitude` (m/s^2) and `period` (s), then rest.
+
+    One cycle is Zhang and Makris's pulse of type A (2001).
+    """
+
+    kind: Literal["sine"] = "sine"
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 1
 
     @property
     def quiet_after(self) -> float:
         """Time in s at which the last cycle ends."""
         return self.cycles * self.period
+
+
+class Cosine(Wave):
+    """`cycles` full cycles of a cosine of `amplitude` (m/s^2) and `period` (s), then rest.
+
+    It begins and ends with a jump. One cycle is Zhang and Makris's pulse of type B (2001): the base
+    moves there and back.
+    """
+
+    kind: Literal["cosine"] = "cosine"
+    cycles: Annotated[int, Field(ge=1, le=1000)] = 1
+    lead_share: ClassVar[float] = 0.25
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s at which the last cycle ends."""
+        return self.cycles * self.period
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) after the start at which the acceleration itself jumps."""
+        return (self.quiet_after,)
+
+
+class HalfSine(Wave):
+    """Half a cycle of a sine of `amplitude` (m/s^2), then rest: Housner's pulse (1963).
+
+    It lasts half its `period` (s).
+    """
+
+    kind: Literal["half-sine"] = "half-sine"
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s at which the pulse ends."""
+        return 0.5 * self.period
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return min(self.amplitude, 0.0), max(self.amplitude, 0.0)
+
+
+class Wavelet(Pulse):
+    """Mavroeidis and Papageorgiou's wavelet of near-fault ground motion (2003).
+
+    The velocity of the base is A/2 (1 + cos(omega tau/gamma)) cos(omega tau + phase), tau from the
+    middle, for gamma periods in all; omega is 2 pi over the `period` (s). `amplitude` (m/s^2) is
+    omega A, near the largest acceleration. `gamma` (above 1) says how many oscillations it has, and
+    `phase` (rad) which: 0 is symmetric in velocity, pi/2 antisymmetric.
+    """
+
+    kind: Literal["wavelet"] = "wavelet"
+    gamma: Annotated[float, Field(gt=1.0, le=100.0)] = 2.0
+    phase: Finite = 0.0
+
+    @property
+    def quiet_after(self) -> float:
+        """Time in s at which the pulse ends."""
+        return self.gamma * self.period
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times (s) at which the acceleration, or its rate, jumps."""
+        return (self.quiet_after,)
+
+    def acceleration(self, t: ArrayLike) -> Floats:
+        """Base acceleration in m/s^2 at times `t` in s: the derivative of the velocity."""
+        time = np.asarray(t, dtype=float)
+        inside = (time >= 0.0) & (time <= self.quiet_after)
+        turn = 2.0 * math.pi / self.period * (time - 0.5 * self.quiet_after)
+        envelope, carrier = turn / self.gamma, turn + self.phase
+        falling = np.sin(envelope) * np.cos(carrier) / self.gamma
+        value = falling + (1.0 + np.cos(envelope)) * np.sin(carrier)
+        return np.where(inside, -0.5 * self.amplitude * value, 0.0)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return extremes_by_samples(self)
+
+
+def extremes_by_samples(pulse: Ricker | Wavelet) -> tuple[float, float]:
+    """The least and the largest acceleration of a pulse (m/s^2), to 1e-6 of its amplitude."""
+    values = pulse.acceleration(np.linspace(0.0, pulse.quiet_after, 20_001))
+    return float(np.min(values)), float(np.max(values))
 
 
 class Record(Motion):
@@ -195,6 +354,26 @@ class Record(Motion):
         return self.time_step * (len(self.unscaled) - 1)
 
     @property
+    def sample_step(self) -> float:
+        """Time between samples, s."""
+        return self.time_step
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Times (s) at which the acceleration, or its rate, jumps: those of its samples."""
+        return tuple((self.time_step * np.arange(len(self.unscaled))).tolist())
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) after the start at which the acceleration itself jumps: the end."""
+        return (self.quiet_after,)
+
+    @property
+    def extremes(self) -> tuple[float, float]:
+        """The least and the largest acceleration, m/s^2."""
+        return float(np.min(self.samples)), float(np.max(self.samples))
+
+    @property
     def peak(self) -> float:
         """Largest absolute scaled acceleration in units of standard gravity."""
         return float(np.max(np.abs(self.samples))) / GRAVITY_OF_RECORDS
@@ -233,4 +412,6 @@ def _scale_to(pga: object, largest: float) -> float:
     return pga * GRAVITY_OF_RECORDS / largest
 
 
-Excitation = Annotated[Rest | Ricker | Sine | Record, Field(discriminator="kind")]
+Excitation = Annotated[
+    Rest | Ricker | Sine | Cosine | HalfSine | Wavelet | Record, Field(discriminator="kind")
+]

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rockcheck.scenes.base import DATA, Frozen
+from rockcheck.scenes.excitations import Rest
 from rockcheck.scenes.scene import Scene
 
 #: Standard deviations of a 95 % interval.
@@ -98,8 +99,7 @@ def axes_of(scene: Scene) -> dict[str, list[float]]:
     over g tan alpha. An axis without a value is left out.
     """
     block, base = scene.block, scene.excitation
-    # no peak lies between the samples of a record, or 1000 times in a pulse's period
-    step = getattr(base, "time_step", getattr(base, "period", 1.0) / 1000.0)
+    step = 1.0 if isinstance(base, Rest) else base.sample_step  # no peak lies in between
     times = np.arange(0.0, min(scene.duration, base.quiet_after) + step, step)
     peak = np.max(np.abs(base.acceleration(np.minimum(times, scene.duration))))
     found = {

@@ -11,15 +11,17 @@ import numpy as np
 from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
 from rockcheck.ebm.core.series import RECIPROCAL
-from rockcheck.scenes import Floats, Record, Rest, Ricker, Sine
+from rockcheck.scenes import Excitation, Floats, Record, Ricker, Wave, Wavelet
 from rockcheck.scenes.compiled import inner_kernel
 
 NEVER = np.inf
 
 
 #: One component of the base motion but for its samples. GAUSSIAN is (c0 + c1 tau + c2 tau^2 + c3
-#: tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate t) up to `quiet`; SAMPLED is
+#: tau^3) exp(-rate tau^2), tau from `centre`; SINE is c0 sin(rate tau) up to `quiet`; SAMPLED is
 #: linear between `scale` times the samples, every `step`, of which it has `count` from `first` on.
+#: WAVELET is the sum of -share (c0 sin(w tau) + c1/rate cos(w tau)) over the angular rates w = rate
+#: and rate +- pi/(quiet - centre), with the shares 1/2 and 1/4 times w/rate.
 #: After `quiet` there is no motion.
 FORM = record(
     kind="i8",
@@ -54,9 +56,7 @@ _SOME = 30
 _SOON = 1e-6
 
 
-def ground_of(
-    excitation: Rest | Ricker | Sine | Record, gravity: float, time_unit: float
-) -> Ground:
+def ground_of(excitation: Excitation, gravity: float, time_unit: float) -> Ground:
     """The compiled form of an excitation, in units of `gravity` (m/s^2) and `time_unit` (s)."""
     samples, given = _NO_SAMPLES, {"kind": Shape.STILL, "quiet": 0.0}
     if isinstance(excitation, Ricker):
@@ -67,11 +67,21 @@ def ground_of(
             "rate": excitation.rate * time_unit**2,
             "centre": excitation.centre / time_unit,
         }
-    elif isinstance(excitation, Sine):
+    elif isinstance(excitation, Wave):
         given = {
             "kind": Shape.SINE,
             "c0": excitation.amplitude / gravity,
             "rate": 2.0 * math.pi * time_unit / excitation.period,
+            "centre": -excitation.lead / time_unit,
+        }
+    elif isinstance(excitation, Wavelet):
+        rate = 2.0 * math.pi / excitation.period
+        given = {
+            "kind": Shape.WAVELET,
+            "c0": excitation.amplitude * math.cos(excitation.phase) / gravity,
+            "c1": excitation.amplitude * math.sin(excitation.phase) / gravity * rate * time_unit,
+            "rate": rate * time_unit,
+            "centre": 0.5 * excitation.quiet_after / time_unit,
         }
     elif isinstance(excitation, Record):
         taken = np.ascontiguousarray(excitation.samples / gravity)
@@ -94,7 +104,7 @@ def interval(g, t):
 
 @inner_kernel
 def acceleration(g, t):
-    """Acceleration at time t; where it jumps (a record that ends) that just after."""
+    """Acceleration at time t; where it jumps (at the end of some) that just after."""
     return _with_rate(g, t)[0]
 
 
@@ -109,9 +119,10 @@ def _with_rate(g, t):
             g.form.c1 + tau * (2.0 * g.form.c2 + tau * 3.0 * g.form.c3) + shape * fall
         ) * bell
     if g.form.kind == Shape.SINE and t < g.form.quiet:
-        return g.form.c0 * math.sin(g.form.rate * t), g.form.c0 * g.form.rate * math.cos(
-            g.form.rate * t
-        )
+        phase = g.form.rate * (t - g.form.centre)
+        return g.form.c0 * math.sin(phase), g.form.c0 * g.form.rate * math.cos(phase)
+    if g.form.kind == Shape.WAVELET and t < g.form.quiet:
+        return _wavelet(g.form, t)
     if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         if i + 1 < g.samples.size:
@@ -119,6 +130,40 @@ def _with_rate(g, t):
             rise = g.form.scale * g.samples[i + 1] - here
             return here + (t / g.form.step - i) * rise, rise / g.form.step
     return 0.0, 0.0
+
+
+@inner_kernel
+def _component_of_wavelet(f, k):
+    """The angular rate of component k of a wavelet, and the size of its acceleration by c0."""
+    w = f.rate + (k - 1.0) * math.pi / (f.quiet - f.centre)
+    return w, -(0.5 if k == 1 else 0.25) * w / f.rate
+
+
+@inner_kernel
+def _wavelet(f, t):
+    """Acceleration of a wavelet at time t, and its rate."""
+    value, slope = 0.0, 0.0
+    for k in range(3):
+        w, share = _component_of_wavelet(f, k)
+        sine, cosine = math.sin(w * (t - f.centre)), math.cos(w * (t - f.centre))
+        value += share * (f.c0 * sine + f.c1 / f.rate * cosine)
+        slope += share * w * (f.c0 * cosine - f.c1 / f.rate * sine)
+    return value, slope
+
+
+@inner_kernel
+def _fill_wavelet(g, t, sign, n, a, row):
+    f = g.form
+    for k in range(n + 1):
+        a[row, k] = 0.0
+    for component in range(3):
+        w, share = _component_of_wavelet(f, component)
+        sine, cosine = math.sin(w * (t - f.centre)), math.cos(w * (t - f.centre))
+        here = sign * share * (f.c0 * sine + f.c1 / f.rate * cosine)
+        after = sign * share * w * (f.c0 * cosine - f.c1 / f.rate * sine)
+        for k in range(n + 1):
+            a[row, k] += here
+            here, after = after, -w * w * here * RECIPROCAL[k + 1] * RECIPROCAL[k + 2]
 
 
 @inner_kernel
@@ -145,6 +190,9 @@ def fill_series(g, t, sign, n, a, row):
     """Taylor coefficients 0..n of sign * acceleration about t, to the right of t, into a[row]."""
     if g.form.kind == Shape.GAUSSIAN:
         _fill_gaussian(g, t, sign, n, a, row)
+        return
+    if g.form.kind == Shape.WAVELET and t < g.form.quiet:
+        _fill_wavelet(g, t, sign, n, a, row)
         return
     value, rate = _with_rate(g, t)
     a[row, 0], a[row, 1] = sign * value, sign * rate
@@ -173,7 +221,8 @@ def next_kink(g, t):
     if g.form.kind == Shape.SAMPLED:
         i = interval(g, t)
         return (i + 1) * g.form.step if i + 1 < g.samples.size else NEVER
-    return g.form.quiet if g.form.kind == Shape.SINE and t < g.form.quiet else NEVER
+    ends = g.form.kind == Shape.SINE or g.form.kind == Shape.WAVELET
+    return g.form.quiet if ends and t < g.form.quiet else NEVER
 
 
 @inner_kernel
@@ -238,6 +287,38 @@ def _next_extremum_of_pulse(f, t):
 
 
 @inner_kernel
+def _next_extremum_of_wavelet(f, t):
+    """The next extremum of a wavelet after t, or its end.
+
+    No step is so long that its rate, which changes at most by `curvature` a time, could pass zero
+    within it, but for the shortest ones.
+    """
+    if t >= f.quiet:
+        return NEVER
+    size, curvature, fastest = math.hypot(f.c0, f.c1 / f.rate), 0.0, 0.0
+    for k in range(3):
+        w, share = _component_of_wavelet(f, k)
+        curvature += abs(share) * size * w * w
+        fastest = max(fastest, w)
+    shortest = _SOON / fastest
+    a = t + _SAME / fastest
+    slope = _wavelet(f, a)[1]
+    while a < f.quiet:
+        b = min(a + max(abs(slope) / curvature, shortest), f.quiet)
+        there = _wavelet(f, b)[1]
+        if slope * there < 0.0:
+            for _ in range(_SOME):
+                middle = 0.5 * (a + b)
+                if slope * _wavelet(f, middle)[1] > 0.0:
+                    a = middle
+                else:
+                    b = middle
+            return b
+        a, slope = b, there
+    return f.quiet
+
+
+@inner_kernel
 def _next_extremum(g, t):
     """The next time after t up to which the motion is monotone.
 
@@ -245,12 +326,14 @@ def _next_extremum(g, t):
     """
     if g.form.kind == Shape.GAUSSIAN:
         return _next_extremum_of_pulse(g.form, t)
+    if g.form.kind == Shape.WAVELET:
+        return _next_extremum_of_wavelet(g.form, t)
     end = next_kink(g, t)
     if g.form.kind != Shape.SINE or end == NEVER:
         return end
     quarter = 0.5 * math.pi / g.form.rate
-    k = math.floor((t / quarter + 1.0) / 2.0 + _SAME)
-    return min((2.0 * k + 1.0) * quarter, end)
+    k = math.floor(((t - g.form.centre) / quarter + 1.0) / 2.0 + _SAME)
+    return min((2.0 * k + 1.0) * quarter + g.form.centre, end)
 
 
 @inner_kernel
@@ -263,6 +346,8 @@ def largest_ahead(g, t):
         return 0.0
     if g.form.kind == Shape.SINE:
         return abs(g.form.c0)
+    if g.form.kind == Shape.WAVELET:  # the shares add up to at most 1.5 in size
+        return 1.5 * math.hypot(g.form.c0, g.form.c1 / g.form.rate)
     largest = 0.0
     if g.form.kind == Shape.SAMPLED:
         for i in range(max(interval(g, t), 0), g.samples.size):
@@ -341,9 +426,11 @@ def _leaves(g, times, values, level, beyond, ahead):
 
 @inner_kernel
 def _just_before(g, t):
-    """Acceleration at time t; where a record ends that just before."""
+    """Acceleration at time t; where a motion ends that just before."""
     if g.form.kind == Shape.SAMPLED:
         return g.form.scale * g.samples[interval(g, t)]
+    if g.form.kind == Shape.SINE and t == g.form.quiet:
+        return g.form.c0 * math.sin(g.form.rate * (t - g.form.centre))
     return acceleration(g, t)
 
 

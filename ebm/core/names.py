@@ -11,7 +11,7 @@ Family = IntEnum("Family", "FLAT TILT", start=0)
 Pivot = IntEnum("Pivot", "OFF STICK SLIPPING", start=0)
 
 #: What a component of the base motion is made of (see `ebm.core.ground`).
-Shape = IntEnum("Shape", "STILL GAUSSIAN SINE SAMPLED", start=0)
+Shape = IntEnum("Shape", "STILL GAUSSIAN SINE SAMPLED WAVELET", start=0)
 
 #: What a series is made of: its noise, and how far ahead it is judged, differ.
 Kind = IntEnum("Kind", "POSITION RATE FORCE", start=0)

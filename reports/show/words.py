@@ -12,7 +12,17 @@ import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, RIGHT, Spectrum
 from rockcheck.reports.style import SUPERSCRIPTS
-from rockcheck.scenes import History, Record, Rest, Ricker, Scene, Sine, errors
+from rockcheck.scenes import (
+    Cosine,
+    Excitation,
+    History,
+    Pulse,
+    Record,
+    Ricker,
+    Scene,
+    Sine,
+    errors,
+)
 from rockcheck.validation import Discrepancy
 from rockcheck.validation.discrepancy import figures
 
@@ -45,16 +55,21 @@ def html_table(caption: str, rows: Iterable[Sequence[object]], head: Sequence[ob
     )
 
 
-def excitation_words(excitation: Rest | Ricker | Sine | Record) -> str:
+def excitation_words(excitation: Excitation) -> str:
     """An excitation in a few words."""
     match excitation:
         case Record(source=source, scale=scale, peak=peak):
             return f"{source} × {number(scale)}, peak {number(peak)} g"
-        case Sine(amplitude=amplitude, period=period, cycles=cycles):
-            return f"sine, {number(amplitude)} m/s², period {number(period)} s, {cycles} cycles"
+        case Sine() | Cosine():
+            return (
+                f"{excitation.kind}, {number(excitation.amplitude)} m/s²,"
+                f" period {number(excitation.period)} s, {excitation.cycles} cycles"
+            )
         case Ricker(amplitude=amplitude, period=period, symmetric=symmetric):
             kind = "symmetric" if symmetric else "antisymmetric"
             return f"{kind} Ricker pulse, {number(amplitude)} m/s², period {number(period)} s"
+        case Pulse(amplitude=amplitude, period=period):
+            return f"{excitation.kind} pulse, {number(amplitude)} m/s², period {number(period)} s"
     return "at rest"
 
 

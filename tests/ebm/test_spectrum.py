@@ -283,7 +283,7 @@ def test_least_overturning_amplitude_and_area():
         (scene(), [[1.0]], [1.0], "dimensions"),
         (scene(), 1.0, [1.0], "1 values of 0 dimensions"),
         (scene(), np.linspace(1.0, 2.0, 40_000), np.linspace(1.0, 2.0, 40_000), "more than"),
-        (scene(excitation=Rest()), [1.0], [1.0], "ricker or sine pulse, or a record"),
+        (scene(excitation=Rest()), [1.0], [1.0], "a spectrum needs a pulse, or a record"),
     ],
 )
 def test_what_has_no_spectrum(fault_of, start, frequencies, amplitudes, said):

@@ -6,9 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.signal import cont2discrete, lfilter
 
-from rockcheck.scenes import Record, Rest, Ricker, Sine
+from rockcheck.scenes import Cosine, HalfSine, Record, Rest, Ricker, Sine, Wavelet
 from rockcheck.scenes.recordings import intensity
 from rockcheck.scenes.recordings.recording import Recording
 
@@ -47,6 +48,9 @@ def test_symmetric_ricker_peaks_at_its_centre():
         Ricker(amplitude=6.0, period=0.98),
         Ricker(amplitude=6.0, period=0.98, symmetric=True),
         Sine(amplitude=2.0, period=0.5, cycles=3),
+        Cosine(amplitude=2.0, period=0.5, cycles=3),
+        HalfSine(amplitude=2.0, period=0.5),
+        Wavelet(amplitude=2.0, period=0.5, gamma=1.7, phase=0.4),
         Record.from_samples([0.0, 1.0, -2.0, 0.5], time_step=0.1, scale=1.5),
     ],
     ids=lambda excitation: excitation.kind,
@@ -55,6 +59,54 @@ def test_quiet_before_and_after(excitation):
     after = excitation.quiet_after + np.array([1e-9, 0.1, 10.0])
     np.testing.assert_allclose(excitation.acceleration(after), 0.0, atol=1e-14)
     np.testing.assert_array_equal(excitation.acceleration(np.array([-1e-9, -5.0])), 0.0)
+
+
+def velocity_after(pulse):
+    """The base's velocity at a pulse's end, by quadrature."""
+    return quad(pulse.acceleration, 0.0, pulse.quiet_after, epsabs=1e-13, limit=200)[0]
+
+
+def test_a_half_sine_leaves_the_base_moving():
+    """Housner's pulse: a T/pi, with T twice the pulse's length."""
+    assert velocity_after(HalfSine(amplitude=3.0, period=0.8)) == pytest.approx(2.4 / math.pi)
+
+
+@pytest.mark.parametrize("gamma", [1.2, 2.0, 3.7])
+@pytest.mark.parametrize("phase", [0.0, 0.6, math.pi / 2])
+def test_the_wavelet_is_the_rate_of_its_velocity(gamma, phase):
+    """Mavroeidis and Papageorgiou's velocity, differentiated by central differences."""
+    pulse, step = Wavelet(amplitude=4.0, period=0.9, gamma=gamma, phase=phase), 1e-5
+    omega = 2.0 * math.pi / 0.9
+
+    def velocity(t):
+        turn = omega * (t - 0.45 * gamma)
+        return 4.0 / omega / 2.0 * (1.0 + np.cos(turn / gamma)) * np.cos(turn + phase)
+
+    t = np.linspace(0.01, pulse.quiet_after - 0.01, 200)
+    rates = (velocity(t + step) - velocity(t - step)) / (2.0 * step)
+    np.testing.assert_allclose(pulse.acceleration(t), rates, atol=1e-7)
+
+
+def test_the_wavelet_brings_the_base_to_rest():
+    assert velocity_after(Wavelet(amplitude=4.0, period=0.9, gamma=2.3, phase=0.5)) == (
+        pytest.approx(0.0, abs=1e-12)
+    )
+
+
+@pytest.mark.parametrize(
+    ("pulse", "extremes"),
+    [
+        (Rest(), (0.0, 0.0)),
+        (Sine(amplitude=-2.0, period=0.5), (-2.0, 2.0)),
+        (Cosine(amplitude=2.0, period=0.5), (-2.0, 2.0)),
+        (HalfSine(amplitude=2.0, period=0.5), (0.0, 2.0)),
+        (HalfSine(amplitude=-2.0, period=0.5), (-2.0, 0.0)),
+        (Record.from_samples([1.0, -2.0, 0.5], time_step=0.1, scale=1.5), (-3.0, 1.5)),
+    ],
+    ids=str,
+)
+def test_extremes(pulse, extremes):
+    assert pulse.extremes == extremes
 
 
 def test_record_is_linear_between_samples_of_one_column(fault_of):

@@ -53,7 +53,7 @@ def test_scenes_cover_what_a_user_could_write():
         assert 0.9 * high < max(values) <= high * (1 + 1e-9)
     friction = [scene.floor.friction for scene in scenes]
     assert min(friction) == 0.0 < 0.98 * FRICTION[1] < max(friction)
-    kinds = {"rest", "ricker", "sine", "record"}
+    kinds = {"rest", "ricker", "sine", "cosine", "half-sine", "wavelet", "record"}
     assert {s.excitation.kind for s in scenes} == {s.vertical.kind for s in scenes} == kinds
     assert len({tuple(wall.side for wall in scene.walls) for scene in scenes}) == 4
     assert [name for name, has in OCCURS.items() if not any(map(has, scenes))] == []

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rockcheck.scenes import InputError, Scene, errors, files, recordings
+from rockcheck.scenes import InputError, Pulse, Scene, errors, files, recordings
 from rockcheck.scenes.recordings import intensity
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.finding import (
@@ -371,7 +371,7 @@ def fragility(
     `frequencies`. The intensity is peak acceleration over g tan(alpha). Raises `InputError`.
     """
     pulse = scene.excitation
-    if pulse.kind not in ("ricker", "sine"):
+    if not isinstance(pulse, Pulse):
         raise InputError("are needed: the scene's excitation is no pulse", "records")
     slope = scene.gravity * scene.block.slope
     hertz = np.geomspace(*frequencies, PULSES) * scene.frequency_parameter / (2.0 * math.pi)

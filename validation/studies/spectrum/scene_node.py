@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
-from rockcheck.scenes import Record, Ricker, Scene, Sine
+from rockcheck.scenes import Pulse, Record, Scene
 from rockcheck.validation.studies.spectrum.tiles import UNDECIDED, letters_of
 
 OUTCOMES = {
@@ -52,7 +52,7 @@ def ratios(scene: Scene) -> tuple[float, float] | None:
     excitation = scene.excitation
     if isinstance(excitation, Record):
         return 1.0, 1.0
-    if isinstance(excitation, Ricker | Sine):
+    if isinstance(excitation, Pulse):
         frequency = 2.0 * math.pi / (excitation.period * scene.frequency_parameter)
         return frequency, abs(excitation.amplitude) / (scene.gravity * scene.block.slope)
     return None

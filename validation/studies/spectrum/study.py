@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm import EventBasedModel, Spectrum, horizon
 from rockcheck.ebm.spectrum import CALM, LEFT, RIGHT, SAFE, node_pulse, vary
 from rockcheck.engines.engine import Engine
-from rockcheck.scenes import Ricker, Sine, reading, writing
+from rockcheck.scenes import Pulse, reading, writing
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Plot, Table, Text, text
 from rockcheck.validation.paper import (
@@ -323,7 +323,7 @@ class Spectra(Study):
     ) -> Plot:
         request, first, pulses = self.request, next(iter(spectra)), None
         number, pulse = first.figure, first.scene.excitation
-        if isinstance(pulse, Ricker | Sine):
+        if isinstance(pulse, Pulse):
             # amplitude (m/s^2) and period (s) along the axes
             f, a = request.frequencies, request.amplitudes
             amplitudes, periods = (abs(some).tolist() for some in node_pulse(first.scene, a, f))

@@ -14,11 +14,10 @@ from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import (
     History,
     ModelFailure,
+    Pulse,
     Record,
-    Ricker,
     Scene,
     Side,
-    Sine,
     Wall,
     kinematics,
 )
@@ -176,7 +175,7 @@ def audited(scene: Scene) -> Scene:
     step = min(
         [
             0.03 * math.sqrt(scene.block.radius / scene.gravity),
-            *(base.period / FINE for base in bases if isinstance(base, Ricker | Sine)),
+            *(base.period / FINE for base in bases if isinstance(base, Pulse)),
         ]
     )
     sample_steps = [base.time_step for base in bases if isinstance(base, Record)]

@@ -10,10 +10,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import (
     Floats,
     History,
-    Record,
-    Ricker,
     Scene,
-    Sine,
 )
 from rockcheck.validation.studies.stress.conditions import largest, none_between
 from rockcheck.validation.studies.stress.forces import Mask
@@ -100,11 +97,10 @@ def energy_without_source(motion: Motion) -> float:
         (scene.vertical, motion.up),
     ):
         # The velocity of the base: the integral, exact for a record, which is linear between its
-        # samples and zero after the last one.
+        # samples; on both sides of a jump.
         times = t
-        if isinstance(excitation, Record):
-            kinks = excitation.time_step * np.arange(len(excitation.unscaled))
-            kinks = np.append(kinks, np.nextafter(kinks[-1], np.inf))
+        if excitation.jumps:
+            kinks = np.array([*excitation.kinks, *np.nextafter(excitation.jumps, np.inf)])
             times = np.union1d(t, kinks[kinks < t[-1]])
         acceleration = excitation.acceleration(times)
         base_velocity = np.cumsum(0.5 * np.diff(times) * (acceleration[1:] + acceleration[:-1]))
@@ -123,19 +119,14 @@ def _whole_groups(scene: Scene, history: History) -> tuple[Mask, Mask]:
     edges = t[: groups * GROUP + 1 : GROUP]
     events = [event.t for event in history.event_list]
     bases = scene.excitation, scene.vertical
-    records = [base for base in bases if isinstance(base, Record)]
-    kinks = [
-        time for record in records for time in record.time_step * np.arange(len(record.unscaled))
-    ]
-    ends = [base.quiet_after for base in bases if isinstance(base, Ricker | Sine)]
+    kinks = [time for base in bases for time in (*base.kinks, base.quiet_after)]
+    jumps = [time for base in bases for time in base.jumps]
     near = 1e-9 * scene.output_step
 
     # An event at an edge itself: the row there is from before or after it. The base acceleration
-    # jumps where a record ends.
-    whole = none_between(
-        [*events, *kinks, *ends], edges[:-1] + near, edges[1:] - near
-    ) & none_between(
-        [*events, *(record.quiet_after for record in records)],
+    # jumps where some motions end.
+    whole = none_between([*events, *kinks], edges[:-1] + near, edges[1:] - near) & none_between(
+        [*events, *jumps],
         edges[:-1] - 1e3 * near,
         edges[1:] + 1e3 * near,
     )

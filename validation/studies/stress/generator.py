@@ -11,9 +11,11 @@ import numpy as np
 
 from rockcheck.scenes import (
     Block,
+    Cosine,
     Excitation,
     Floats,
     Floor,
+    HalfSine,
     InputError,
     Record,
     Rest,
@@ -22,6 +24,7 @@ from rockcheck.scenes import (
     Side,
     Sine,
     Wall,
+    Wavelet,
 )
 
 #: Kinds of scenes by what models can play: the bilateral pivot neither bounces nor hops, Bouc-Wen
@@ -224,8 +227,22 @@ def _excitation(r: np.random.Generator, uplift: float, own_period: float) -> Exc
             lambda: Ricker(amplitude=amplitude, period=period, symmetric=bool(r.random() < 0.3)),
         ),
         (
-            0.6,
+            0.54,
             lambda: Sine(amplitude=amplitude, period=period, cycles=int(r.integers(1, 9))),
+        ),
+        (0.56, lambda: HalfSine(amplitude=amplitude, period=period)),
+        (
+            0.58,
+            lambda: Wavelet(
+                amplitude=amplitude,
+                period=period,
+                gamma=r.uniform(1.2, 4.0),
+                phase=r.uniform(0.0, 6.0),
+            ),
+        ),
+        (
+            0.6,
+            lambda: Cosine(amplitude=amplitude, period=period, cycles=int(r.integers(1, 9))),
         ),
         (
             1.0,
