@@ -113,6 +113,14 @@ def test_three_records_are_called_few():
     assert "3 records are too few" in words
 
 
+def test_the_first_sentence_has_both_answers_of_a_tie():
+    tie = ("friction equals B/H", 0.4, ("at rest", "overturned right"))
+    sure = {"a": results.Certainty(ties=(tie,))}
+    everything = gathered({"a": RUNS["a"]}, certainty=sure)
+    (words,) = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
+    assert words.startswith("shelf stays, or overturns to the right: it stands on a knife edge")
+
+
 def test_what_is_undecided_is_not_among_those_that_stay():
     answer = statistics.fall_answer(gathered({**RUNS, "d": ran("undecided", 0.9)}))
     assert answer.runs == 4

@@ -64,7 +64,13 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
     if answer.runs == 0:
         return [f"{name}: no run has a result."]
     if answer.runs == 1:
-        (_, run) = gathered.all_runs[0]
+        case, run = gathered.all_runs[0]
+        others = _fates_of_ties(gathered, case, run.fate)
+        if others:
+            return [
+                f"{name} {FATE_WORDS[run.fate]}, or {' or '.join(others)}: it stands on a knife"
+                " edge, where the mechanics has more than one answer."
+            ]
         return [f"{name} {FATE_WORDS[run.fate]}."]
     share = answer.overturning
     of = runs_words(answer, gathered)
@@ -84,6 +90,13 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
         if as_it_is is not None:
             sentences.append(f"With its own numbers it {FATE_WORDS[as_it_is.fate]}.")
     return sentences
+
+
+def _fates_of_ties(gathered: Gathered, case: str, fate: str) -> list[str]:
+    """The other fates of a run on both sides of its ties, in words."""
+    sure = gathered.certainty.get(case, results.Certainty())
+    fates = dict.fromkeys(other for *_, others in sure.ties for other in others)
+    return [FATE_WORDS[other] for other in fates if other not in (fate, UNDECIDED, "failed")]
 
 
 def runs_words(answer: FallAnswer, gathered: Gathered) -> str:
