@@ -20,6 +20,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     vary, or as a model in double precision with its steps; some take their time. The continuous
     model is one of the models."""
 
+    minutes = metafunc.definition.get_closest_marker("slow_for")
+    slow = dict.fromkeys(minutes.args if minutes else (), pytest.mark.slow)
     fixed, bouncing = ([one(time_step=1e-4) for one in some] for some in (DOUBLE, BOUNCING))
     adaptive = [one(time_step="adaptive") for one in VARYING]
     for name, models in {
@@ -35,5 +37,5 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
             words = [
                 f"{one.name} {one.time_step}" if "model" in name else one.name for one in models
             ]
-            marked = [pytest.param(one, marks=MARKS.get(one.name, ())) for one in models]
+            marked = [pytest.param(one, marks=(MARKS | slow).get(one.name, ())) for one in models]
             metafunc.parametrize(name, marked, ids=words)

@@ -87,6 +87,7 @@ def test_a_stock_engine_is_far_off(stock):
     assert best < 1e-3
 
 
+@pytest.mark.slow_for("dart")
 @pytest.mark.parametrize(
     ("every", "least", "bounds"),
     [
