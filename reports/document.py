@@ -1,4 +1,4 @@
-"""A finding as a terminal's tables, CSV, Markdown and a page.
+"""A finding as CSV, Markdown and a page; `reports.terminal` shows it on a terminal.
 
 Each block is rendered from one description. All pages have one look, made of the templates in
 `data/templates`.
@@ -17,9 +17,6 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
-from rich.console import Console
-from rich.table import Table as Grid
-from rich.text import Text as Line
 
 from rockcheck.reports import drawers, style
 from rockcheck.reports.show.words import (
@@ -96,25 +93,6 @@ def _words(mark: Mark, column: Column, write: Callable[[float, int], str]) -> st
     return f"{VERDICTS[mark.verdict][0]} {said}".strip()
 
 
-def show(found: Finding, screen: Console) -> None:
-    """The answer and the blocks that a terminal has room for."""
-    for block in (block for block in found.blocks if block.on == "all"):
-        match block:
-            case Table():
-                screen.print(_grid(block.shown))
-                if len(block.rows) > block.most:
-                    screen.print(f"and {len(block.rows) - block.most} more rows: {block.name}.csv")
-            case Text():
-                for line in filter(None, (block.text, *map(": ".join, block.facts), *block.items)):
-                    screen.print(line, style=VERDICTS[block.verdict][1], soft_wrap=True)
-    for line in failure_lines(found.failures):
-        screen.print(f"failed: {line}", style="red", soft_wrap=True)
-    if not found.complete:
-        screen.print("not complete: the same command goes on where it ended", style="yellow")
-    if found.answer:
-        screen.print(found.answer, style="bold", soft_wrap=True)
-
-
 def failure_lines(failures: Mapping[str, str]) -> list[str]:
     """A line a reason: the first task that failed for it, and how many more."""
     tasks: dict[str, list[str]] = {}
@@ -126,26 +104,6 @@ def failure_lines(failures: Mapping[str, str]) -> list[str]:
         else f"{labels[0]}: {reason}"
         for reason, labels in tasks.items()
     ]
-
-
-def _grid(table: Table) -> Grid:
-    grid = Grid(box=None, pad_edge=False, title=table.title or None, title_justify="left")
-    for column in table.columns:
-        if column.brief:
-            grid.add_column(
-                column.head,
-                justify="left" if column.kind in ("text", "model") else "right",
-                overflow="fold",
-            )
-    for row in table.rows[: table.most]:
-        grid.add_row(
-            *(
-                Line(errors.inert(said), VERDICTS[mark.verdict][1])
-                for mark, column, said in row_cells(row, table.columns, "{:.{}g}".format)
-                if column.brief
-            )
-        )
-    return grid
 
 
 def csv(table: Table) -> str:

@@ -266,7 +266,8 @@ def told(
     Its page is written first if it has a `folder`; else `said` has the files, each with its kind.
     As JSON it is its `value`, by default all that it holds.
     """
-    from rockcheck.reports.document import publish, show
+    from rockcheck.reports.document import publish
+    from rockcheck.reports.terminal import show
 
     page = folder and publish(found, folder)
     show(found, console())
@@ -312,6 +313,22 @@ def _settings_by_model(settings: Iterable[str], models: Sequence[str]) -> dict[s
             )
         words[model].append(rest)
     return {name: settings_of(own) for name, own in words.items()}
+
+
+def names_in(words: Iterable[str]) -> list[str]:
+    """The names in words, which may hold several with commas between; each once."""
+    names = [name.strip() for word in words for name in word.split(",")]
+    return list(dict.fromkeys(names))
+
+
+def check_one_model(name: str, command: str) -> None:
+    """Raise `InputError` for several models where a command plays one."""
+    if "," in name:
+        raise InputError(
+            f"{printable(name)!r} is not allowed: {command} plays one model; validate and assess"
+            " take several",
+            "--model",
+        )
 
 
 def need_installed(names: Iterable[str], option: str) -> None:

@@ -54,6 +54,8 @@ HIDDEN = ("warm",)
 #: Commands that take no time worth printing.
 AT_ONCE = ("scenes", "new", "record", "compare")
 
+#: Options that name models: a command has one, and takes the other as well.
+MODEL_OPTIONS = ("--models", "--model")
 #: Options whose value may be left out: the default, and the pattern of a value.
 BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
@@ -125,7 +127,14 @@ class _EachOnce(typer.core.TyperCommand):
     """A command that refuses an option given twice, unless the option gathers values.
 
     Otherwise the last value would silently win. An option of `BARE` may be given without its value.
+    Either of `MODEL_OPTIONS` stands for that which the command has.
     """
+
+    def __init__(self, name: str | None, **settings: Any) -> None:
+        super().__init__(name, **settings)
+        for option in self.params:
+            if not {*MODEL_OPTIONS}.isdisjoint(option.opts):
+                option.opts[:0] = [other for other in MODEL_OPTIONS if other not in option.opts]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         own = BARE.keys() & itertools.chain.from_iterable(one.opts for one in self.params)

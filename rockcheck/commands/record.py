@@ -53,7 +53,7 @@ def run(
     file does not say is given by --read. --plot draws acceleration, velocity and Sa(T). Of several
     files a line each; files of a folder that are no records are left out.
     """
-    from rockcheck.reports import document
+    from rockcheck.reports import terminal
 
     if plot is not None:
         check_file(plot, "--plot")
@@ -71,7 +71,7 @@ def run(
             for (path, _, recording), value in zip(motions, values, strict=True)
         ]
     for finding in findings:
-        document.show(finding, console())
+        terminal.show(finding, console())
     if plot is not None and motions:
         from rockcheck.reports.show.drawing import recordings_figure
 

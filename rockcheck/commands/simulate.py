@@ -18,6 +18,7 @@ from rockcheck.commands import (
     AllowCodeOption,
     JobsOption,
     check_file,
+    check_one_model,
     console,
     model_names,
     progress,
@@ -115,6 +116,7 @@ def run(
     Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
     A figure shows rotation, slip and impacts.
     """
+    check_one_model(model, "simulate")
     models.check_allowed(model, allow_code or ())
     given = settings_of(settings or ())
     simulate = (

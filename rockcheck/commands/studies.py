@@ -18,8 +18,10 @@ from rockcheck.commands import (
     JobsOption,
     OutOption,
     Played,
+    check_one_model,
     completing,
     model_names,
+    names_in,
     need_installed,
     settings_of,
     studied,
@@ -103,6 +105,8 @@ def spectrum(
     """
     from rockcheck.validation.studies.spectrum import scene_node, study, tiles
 
+    if model is not None:
+        check_one_model(model, "spectrum")
     if what in PAPER:
         panels = paper_panels(*PAPER[what])
     else:
@@ -177,7 +181,8 @@ def stress(
         ),
     ] = None,
     model: Annotated[
-        list[str] | None, typer.Option("--model", help="Only this model; repeatable.")
+        list[str] | None,
+        typer.Option("--models", help="Only these, with commas between; repeatable."),
     ] = None,
 ) -> None:
     """Numerical stability: where the models break.
@@ -192,16 +197,17 @@ def stress(
     from rockcheck.validation.studies.stress.study import Stress, What
 
     part: What = errors.one_of("stress", what, get_args(What))
-    families = (errors.one_of("model", name, PLAYERS).split()[0] for name in model or ())
-    need_installed(families, "--model")
+    names = names_in(model or ())
+    families = [errors.one_of("model", name, PLAYERS).split()[0] for name in names]
+    need_installed(families, "--models")
     if part == "maps" and runs:
         raise errors.InputError("is of random scenes, not of maps", "--runs")
-    if part == "maps" and not map_points(quick, model or ()):
+    if part == "maps" and not map_points(quick, names):
         raise errors.InputError(
-            "maps are of engines and cm: an event-based model has no step", "--model"
+            "maps are of engines and cm: an event-based model has no step", "--models"
         )
     tell_missing()
-    studied(Stress(part, seed, quick, runs, tuple(model or ())), played)
+    studied(Stress(part, seed, quick, runs, tuple(names)), played)
 
 
 def conformance(
@@ -292,10 +298,9 @@ def _tune(
 
 def _engine_names(words: Sequence[str], default: Sequence[str]) -> list[str]:
     """The names in words with commas between them; without words those of `default` here."""
-    names = [name.strip() for word in words for name in word.split(",")]
-    if not names:
-        names = [name for name in default if not models.not_installed(name)]
-    return list(dict.fromkeys(names))
+    if words:
+        return names_in(words)
+    return [name for name in default if not models.not_installed(name)]
 
 
 def _check_engines(names: Sequence[str], allow_code: Sequence[str], *, user_models: bool) -> None:

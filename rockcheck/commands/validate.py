@@ -145,7 +145,7 @@ def run(
             check_file(history, "--history", across.recall)
         suite = _suite(what, of_scene, allow_code or ())
     folder = _folder_of(suite, played.out)
-    from rockcheck.reports import document, site
+    from rockcheck.reports import site, terminal
 
     finished = play(
         suite,
@@ -155,7 +155,7 @@ def run(
         strict="both" if strict == "both" else strict is not None,
     )
     page = site.keep(finished, folder, pages=pages.report)
-    document.show(tables.finding_of(finished), console())
+    terminal.show(tables.finding_of(finished), console())
     if finished.exit_code:
         better = tables.improvements(finished) if strict == "both" else ()
         tell_wrong([*tables.verdict_lines(finished), *better])
@@ -193,11 +193,11 @@ def _show_trend(
     finished: results.Run, suite: suites.Suite, history: Path, folder: Path, *, published: bool
 ) -> None:
     """Add a run to a history of runs, and show the trend; as a page where it is `published`."""
-    from rockcheck.reports import document
+    from rockcheck.reports import document, terminal
 
     moment = across.moment_of(finished, suite.path.parent)
     trend = across.trend_of(across.remember(history, moment))
-    document.show(trend, console())
+    terminal.show(trend, console())
     if published:
         page = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
         console().print(f"trend: {page}", soft_wrap=True)
