@@ -6,7 +6,6 @@ import gzip
 import io
 import json
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -18,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FiniteFloat, TypeAdapter, ValidationError
 
+from rockcheck.scenes import tables
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
+from rockcheck.scenes.columns import COLUMNS, meanings_of
 from rockcheck.scenes.errors import InputError, printable, refuse
 from rockcheck.scenes.events import Event
 from rockcheck.scenes.experience import Expected, expected, trust_of
@@ -31,7 +32,6 @@ from rockcheck.scenes.writing import columns_text, json_text, write_together
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = ("t", "x", "y", "theta", "x_dot", "y_dot", "theta_dot", "slip", "slip_rate", "mode")
 EVENT_COLUMNS = ("t", "kind", "mode_before", "mode_after", "impulse")
 OUTCOMES = ("at rest", "moving", "overturned left", "overturned right")
 #: |theta| from which a block has fallen, rad.
@@ -41,30 +41,13 @@ STILL = 1e-4
 #: Endings of files that a history can be written to, and the columns that hold words.
 FORMATS = ("", ".csv", ".gz", ".json", ".mat", ".parquet")
 WORDS = ("kind", "mode_before", "mode_after")
-#: The column of a CSV that holds the metadata, as JSON in its first row, so that any reader takes
-#: the file as a plain table; "-" in the other rows, since pandas warns of text beside empty cells.
+#: The first line of a CSV; those below it give the metadata, a key a line as JSON.
+HEAD = "rockcheck history: its metadata, a key a line; pandas.read_csv(FILE, comment='#')"
+#: Files of rockcheck 0.1 before November 2026 hold the metadata in the first row of this column;
+#: it is also their name in the attributes of Parquet.
 ABOUT = "rockcheck_history"
 #: Metadata of the block; `_MASS` of one that is not homogeneous.
 _SIZES, _MASS = ("half_width", "half_height"), ("centre_of_mass", "moment_of_inertia")
-#: Units that a column of a table may have, as in `theta_deg` or `x_dot_mm_s`, and their SI value.
-ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
-LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254}
-UNITS: Mapping[str, Mapping[str, float]] = {
-    "t": {"s": 1.0, "ms": 1e-3},
-    "theta": ANGLES,
-    "theta_dot": {f"{unit}_s": factor for unit, factor in ANGLES.items()},
-    **dict.fromkeys(("x", "y", "slip"), LENGTHS),
-    **{
-        name: {f"{unit}_s": factor for unit, factor in LENGTHS.items()}
-        for name in ("x_dot", "y_dot", "slip_rate")
-    },
-}
-#: By a column's name in a table: its name in a history, and the factor to SI units.
-MEANINGS = {name: (name, 1.0) for name in COLUMNS} | {
-    f"{name}_{unit}": (name, factor)
-    for name, units in UNITS.items()
-    for unit, factor in units.items()
-}
 #: The modes of motion that a `mode` column may hold.
 MODES = ("rest", "slide", "rock", "slide-rock", "lean", "ladder", "flight", "overturned")
 
@@ -196,13 +179,14 @@ class History(Shown):
 
         | ending | what is written |
         |---|---|
-        | .csv | the table, metadata in the first row of its last column; and `<stem>.events.csv` |
-        | .csv.gz | the same two files compressed; `pandas.read_csv` opens them as they are |
+        | .csv | metadata in lines that begin with #, the table; and `<stem>.events.csv` |
+        | .csv.gz | the same two files compressed |
         | .json | {"outcome", "model", ..., "channels": {name: [...]}, "events": {column: [...]}} |
         | .mat | the same as a MATLAB file: structures `about`, `channels` and `events` |
         | .parquet | the table, metadata in the frame's `attrs`; and `<stem>.events.parquet` |
 
-        The metadata are outcome, model, block and settings. Parquet needs the package pyarrow. All
+        `pandas.read_csv(path, comment="#")` reads either CSV. The metadata are outcome, model,
+        block and settings. Parquet needs the package pyarrow. All
         files are written whole, or none is touched. `load` reads the CSV, compressed or not. Raises
         `InputError` for another ending, and `OSError` that names the file which cannot be written.
         """
@@ -262,10 +246,12 @@ class History(Shown):
             for name in COLUMNS
             if name in self.channels
         }
-        rows = len(next(iter(columns.values()), ()))
-        about = json.dumps(self._about(), sort_keys=True, default=str)
-        columns[ABOUT] = [about, *["-"] * rows][:rows]
-        return columns_text(columns), columns_text(self._event_columns())
+        about = [
+            f"# {key}: {json.dumps(value, sort_keys=True, default=str)}\n"
+            for key, value in sorted(self._about().items())
+        ]
+        head = "".join([f"# {HEAD}\n", *about])
+        return head + columns_text(columns), columns_text(self._event_columns())
 
     def _event_columns(self) -> dict[str, list[Any]]:
         return {name: [getattr(event, name) for event in self.event_list] for name in EVENT_COLUMNS}
@@ -285,7 +271,7 @@ class History(Shown):
             )
         except ValidationError:
             raise InputError(
-                f"{printable(path)}: column {ABOUT!r}: not written by rockcheck"
+                f"{printable(path)}: metadata: extremes: not written by rockcheck"
             ) from None
 
     @classmethod
@@ -293,8 +279,10 @@ class History(Shown):
         """Read a file that `save` wrote, or any CSV with columns of t and theta.
 
         Other columns of `COLUMNS` are optional. A name may say the unit: `t_s` or `time_ms`,
-        `theta_deg`, `x_mm`, `slip_rate_mm_s` (`UNITS`); a name without one is in SI units. Signs
-        are the scene's: theta counterclockwise positive, x of the box's centre relative to the
+        `theta_deg`, `x_mm`, `slip_rate_mm_s`, also as "Time (s)", "Rotation [°]", or in a row of
+        units below (`scenes.columns`); a name without one is in SI units. Semicolons, tabs or
+        blanks may separate, and commas stand before decimals (`scenes.tables`). Signs are the
+        scene's: theta counterclockwise positive, x of the box's centre relative to the
         base. Raises `InputError` that names file and column for a file that is missing or no CSV,
         lacks those columns or has one twice, is not numeric, not finite or not ordered in time.
         """
@@ -308,13 +296,13 @@ class History(Shown):
         shown = printable(path)
         if (kind := path.suffix.lower()) in (".json", ".mat", ".parquet"):
             raise InputError(f"{shown}: a history is read from .csv or .csv.gz, not from {kind}")
-        frame = read_table(path).rename(columns=str.strip)
+        table = tables.read(path)
         beside = events_path(path)
         # Any text is a kind or a mode, also "None" and "hit #2".
         words = {"dtype": dict.fromkeys(WORDS, str), "keep_default_na": False, "comment": None}
         events = read_table(beside, **words) if beside.exists() else pd.DataFrame()
-        about, block = _about_of(frame, shown)
-        channels, plain = _channels(frame, shown)
+        about, block = _about_of(table, shown)
+        channels, plain = _channels(table, shown)
         try:
             event_list = tuple(
                 Event(
@@ -428,7 +416,7 @@ def events_path(path: Path) -> Path:
 
 
 class _About(Frozen):
-    """Metadata that `save` writes into the table's first row.
+    """Metadata that `save` writes above the table.
 
     All of it may be missing in a file of another program.
     """
@@ -448,66 +436,62 @@ class _About(Frozen):
     extremes: Any = None
 
 
-def _about_of(frame: pd.DataFrame, shown: str) -> tuple[_About, Block | None]:
+def _about_of(table: tables.Table, shown: str) -> tuple[_About, Block | None]:
     """The metadata of a table, and its block where both of its sizes are known."""
-    text = frame[ABOUT].iloc[0] if ABOUT in frame.columns and len(frame) else "{}"
     try:
-        about = _About(**json.loads(text))
-        given = {name: getattr(about, name) for name in (*_SIZES, *_MASS)}
+        about = _About(**_metadata(table))
+        sizes = {name: getattr(about, name) for name in (*_SIZES, *_MASS)}
         unknown = None in (about.half_width, about.half_height)
-        massless = all(given[name] is None for name in _MASS)
-        return about, None if unknown and massless else Block(**given)
+        massless = all(sizes[name] is None for name in _MASS)
+        return about, None if unknown and massless else Block(**sizes)
     except InputError as error:
-        raise InputError(f"{shown}: column {ABOUT!r}: {error}") from None
+        raise InputError(f"{shown}: metadata: {error}") from None
     except (TypeError, ValueError, RecursionError):
-        raise InputError(f"{shown}: column {ABOUT!r}: not written by rockcheck") from None
+        raise InputError(f"{shown}: metadata: not written by rockcheck") from None
 
 
-def _channels(frame: pd.DataFrame, shown: str) -> tuple[dict[str, NDArray[Any]], bool]:
+def _metadata(table: tables.Table) -> dict[str, Any]:
+    """What `save` wrote above a table, or in the first row of a column of an older file."""
+    if table.remarks[:1] == [HEAD]:
+        pairs = [remark.partition(": ") for remark in table.remarks[1:]]
+        return {key: json.loads(value) for key, _, value in pairs}
+    if ABOUT in table.names and len(table.frame):
+        older: dict[str, Any] = json.loads(table.frame[table.names.index(ABOUT)].iloc[0])
+        return older
+    return {}
+
+
+def _channels(table: tables.Table, shown: str) -> tuple[dict[str, NDArray[Any]], bool]:
     """The channels of a table in SI units, and whether the table has them in these."""
-    columns, factors = dict[str, str](), dict[str, float]()
-    for given in frame.columns:
-        bare = re.sub(r"\.\d+$", "", given)  # pandas numbers a name that is there twice
-        plain, first = (re.sub(r"^time(?=_|$)", "t", one) for one in (given, bare))
-        known = (one for one in UNITS if plain.startswith(f"{one}_"))
-        unit_of = max(known, key=len, default="")
-        name, factor = MEANINGS.get(plain, (given, 1.0))
-        again, _ = MEANINGS.get(first, (name, factor))
-        refuse(
-            (
-                again in columns,
-                f"{shown}: column {printable(bare)!r} gives {printable(again)} a second time",
-                "",
-            ),
-            (
-                unit_of and plain not in MEANINGS,
-                f"{shown}: column {printable(given)!r}: give a unit of {unit_of}:"
-                f" {', '.join(UNITS.get(unit_of, ()))}",
-                "",
-            ),
-        )
-        columns[name], factors[name] = given, factor
-    refuse(
-        *(
-            (
-                name not in columns,
-                f"{shown}: no column {name!r}; t and theta are needed, of {', '.join(COLUMNS)}",
-                "",
+    try:
+        columns = meanings_of(table.names, table.units)
+    except InputError as error:
+        raise InputError(f"{shown}: {error}") from None
+    for name in ("t", "theta"):
+        if name not in columns:
+            raise InputError(
+                f"{shown}: no column {name!r}, or with a unit as in {_EXAMPLES[name]}; t and theta"
+                f" are needed, of {', '.join(COLUMNS)}"
             )
-            for name in ("t", "theta")
-        ),
-        (len(frame) == 0, f"{shown}: no rows", ""),
-    )
-    channels = {
-        name: frame[columns[name]].astype(str).to_numpy()
-        if name == "mode"
-        else factors[name] * _numbers(frame[columns[name]], shown)
-        for name in COLUMNS
-        if name in columns
-    }
+    if len(table.frame) == 0:
+        raise InputError(f"{shown}: no rows")
+    channels: dict[str, NDArray[Any]] = {}
+    for name in COLUMNS:
+        if name not in columns:
+            continue
+        index, factor = columns[name]
+        column = table.frame[index]
+        if name == "mode":
+            channels[name] = column.astype(str).to_numpy()
+        else:
+            channels[name] = factor * _numbers(column.rename(table.names[index]), shown)
     if np.any(np.diff(channels["t"]) <= 0.0):
         raise InputError(f"{shown}: column 't' does not increase")
-    return channels, {*factors.values()} == {1.0}
+    return channels, all(factor == 1.0 for _, factor in columns.values())
+
+
+#: How other programs may name the columns that are needed.
+_EXAMPLES = {"t": "'Time (s)' or t_ms", "theta": "'Rotation (deg)' or theta_mrad"}
 
 
 def _numbers(column: pd.Series[Any], shown: str) -> Floats:

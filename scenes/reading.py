@@ -124,6 +124,41 @@ _NOT_UTF8 = re.compile(rb"\xff\xfe|\xfe\xff")
 _CONTROLS = re.compile(rb"[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
 
 
+def first_lines(path: Path, most: int) -> tuple[list[str], str]:
+    """At most `most` first lines of a text file, plain or compressed by gzip, and its encoding.
+
+    A file that is not UTF-8 is taken for Latin-1. Raises `InputError` where it cannot be read, and
+    for a line that is too long for a table.
+    """
+    shown = printable(path)
+    lines: list[bytes] = []
+    with open_regular(path, MOST_TABLE_BYTES) as raw:
+        try:
+            stream = _unpacked(raw)
+            while len(lines) < most and (line := stream.readline(MOST_LINE + 1)):
+                lines.append(line)
+        except (gzip.BadGzipFile, EOFError, zlib.error):
+            raise InputError(f"{shown}: a compressed file that is damaged") from None
+    for number, line in enumerate(lines, 1):
+        if len(line) > MOST_LINE:
+            raise InputError(
+                f"{shown}: not a CSV table: line {number}: longer than {MOST_LINE} bytes"
+            )
+    content = b"".join(lines)
+    try:
+        text, encoding = content.decode("utf-8-sig"), "utf-8-sig"
+    except UnicodeDecodeError:
+        text, encoding = content.decode("latin-1"), "latin-1"
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), encoding
+
+
+def _unpacked(raw: IO[bytes]) -> IO[bytes]:
+    """The content of an open file, decompressed if gzip has compressed it."""
+    packed = raw.read(len(_GZIP)) == _GZIP
+    raw.seek(0)
+    return cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
+
+
 def read_table(path: Path, **options: Any) -> pd.DataFrame:
     """A CSV file by pandas, plain or compressed by gzip; `options` are those of pandas.
 
@@ -139,9 +174,7 @@ def read_table(path: Path, **options: Any) -> pd.DataFrame:
         options = {"float_precision": "round_trip", **options}
     with open_regular(path, MOST_TABLE_BYTES) as raw:
         try:
-            packed = raw.read(len(_GZIP)) == _GZIP
-            raw.seek(0)
-            stream = cast(IO[bytes], gzip.GzipFile(fileobj=raw)) if packed else raw
+            stream = _unpacked(raw)
             _check_lines(stream, shown)
             stream.seek(0)
             # It would take the first column for names of rows, or leave what is too much out.

@@ -21,7 +21,8 @@ from rockcheck.scenes import (
     reading,
     writing,
 )
-from rockcheck.scenes.history import COLUMNS
+from rockcheck.scenes.columns import COLUMNS
+from rockcheck.scenes.history import HEAD
 
 SCENE = Scene(
     name="observed",
@@ -186,13 +187,13 @@ HOSTILE = [
     ("t,theta\n0,0\n0,1\n", "column 't' does not increase"),
     ("t,theta\n1,0\n0,1\n", "column 't' does not increase"),
     ("t,theta\n0,0\n1,0,5,6\n", "not a CSV table"),
-    (rows_about("{broken"), "column 'rockcheck_history': not written by rockcheck"),
-    (rows_about("[1, 2]"), "column 'rockcheck_history': not written by rockcheck"),
-    (rows_about("[" * 100000), "column 'rockcheck_history': not written by rockcheck"),
-    (rows_about('{"cost": 3}'), "column 'rockcheck_history': cost: 3 is not allowed"),
-    (rows_about('{"cost": {"steps": NaN}}'), "column 'rockcheck_history': cost.steps: nan is not"),
-    (rows_about('{"settings": []}'), "column 'rockcheck_history': settings: "),
-    (rows_about('{"notes": "x"}'), "column 'rockcheck_history': notes: x is not allowed"),
+    (rows_about("{broken"), "metadata: not written by rockcheck"),
+    (rows_about("[1, 2]"), "metadata: not written by rockcheck"),
+    (rows_about("[" * 100000), "metadata: not written by rockcheck"),
+    (rows_about('{"cost": 3}'), "metadata: cost: 3 is not allowed"),
+    (rows_about('{"cost": {"steps": NaN}}'), "metadata: cost.steps: nan is not"),
+    (rows_about('{"settings": []}'), "metadata: settings: "),
+    (rows_about('{"notes": "x"}'), "metadata: notes: x is not allowed"),
     (rows_about('{"half_width": -1}'), "half_width: -1 is not allowed"),
     (
         rows_about('{"half_width": 1, "half_height": 2, "centre_of_mass": [3, 0]}'),
@@ -236,19 +237,43 @@ def test_hostile_tables(text, said, written, fault_of):
 
 
 @pytest.mark.filterwarnings("error")
-def test_pandas_reads_the_table_without_an_option(tmp_path):
+@pytest.mark.parametrize("name", ["run.csv", "run.csv.gz"])
+def test_pandas_reads_the_table_and_nothing_else(tmp_path, name):
     """Also a long one, whose columns pandas looks at in pieces."""
     scene = SCENE.replace(duration=30.0, output_step=0.001)
     history = observation.observe(scene, "model", states(0.1 * np.sin(scene.output_times)))
-    history.save(tmp_path / "run.csv")
-    frame = pd.read_csv(tmp_path / "run.csv")
-    pd.testing.assert_frame_equal(
-        frame[list(COLUMNS)], history.frame, check_exact=False, rtol=1e-14
+    history.save(tmp_path / name)
+    frame = pd.read_csv(tmp_path / name, comment="#")
+    assert list(frame.columns) == list(COLUMNS)
+    pd.testing.assert_frame_equal(frame, history.frame, check_exact=False, rtol=1e-14)
+
+
+def test_the_metadata_are_lines_that_a_reader_understands(tmp_path):
+    history = observation.observe(
+        SCENE, "model", states(np.zeros(11)), notes=["a # note\nwith two"]
     )
-    assert list(frame.columns) == [*COLUMNS, "rockcheck_history"]
-    about = frame["rockcheck_history"]
-    assert [json.loads(about[0])["outcome"], *set(about[1:])] == [history.outcome, "-"]
-    assert list(pd.read_csv(tmp_path / "run.events.csv").columns) == list(history.events.columns)
+    history.save(tmp_path / "run.csv")
+    lines = (tmp_path / "run.csv").read_text("utf-8").splitlines()
+    assert f"# outcome: {json.dumps(history.outcome)}" in lines
+    assert max(len(line) for line in lines if line.startswith("#")) < 400
+    assert History.load(tmp_path / "run.csv").notes == ("a # note?with two",)
+
+
+def test_a_file_with_its_metadata_in_a_column_is_read_as_before(written):
+    about = '{"outcome": "at rest", "half_width": 0.4, "half_height": 1.5, "model": "older"}'
+    history = History.load(written("older.csv", rows_about(about)))
+    assert history.outcome == "at rest"
+    assert history.model == "older"
+    assert history.block is not None
+    assert history.block.half_height == 1.5
+    assert set(history.channels) == {"t", "theta"}
+
+
+def test_metadata_that_nobody_wrote_are_refused(written, fault_of):
+    text = f"# {HEAD}\n# cost: {{broken\nt,theta\n0,0\n1,0.1\n"
+    assert "metadata: not written by rockcheck" in str(
+        fault_of(History.load, written("edited.csv", text))
+    )
 
 
 @pytest.mark.parametrize("row", ["soon,uplift,,,0", "0.5,uplift,,,nan", "0.5,uplift,,,inf"])
