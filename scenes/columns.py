@@ -88,7 +88,6 @@ def meanings_of(names: Sequence[str], units: Sequence[str] = ()) -> dict[str, tu
     names that other programs give count where no such name is there, and need a unit. Raises
     `InputError` for a unit that a quantity cannot have, and for what is there twice.
     """
-    _check_twice(names)
     stated = units or [""] * len(names)
     columns: dict[str, tuple[int, float]] = {}
     for index, (name, unit) in enumerate(zip(names, stated, strict=True)):
@@ -102,6 +101,7 @@ def meanings_of(names: Sequence[str], units: Sequence[str] = ()) -> dict[str, tu
         quantity, own_unit = _foreign_parts(name)
         if quantity and quantity not in columns:
             _add(foreign, names, quantity, index, _factor(name, quantity, own_unit or unit))
+    _check_twice(names)
     return columns | foreign
 
 

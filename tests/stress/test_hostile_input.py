@@ -26,6 +26,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import History, InputError, Scene, load_scene, recordings
+from rockcheck.scenes.history import HEAD
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import (
     COMPARISONS,
@@ -366,11 +367,14 @@ def test_a_path_does_not_steer_the_terminal(tmp_path, monkeypatch, capsys):
     in a history's header."""
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "fig4a", "--model", "ebm", "-o", "a\x1b]0;x\x07\udcff.csv"]) == 0
-    (tmp_path / "h.csv").write_text(
+    (tmp_path / "older.csv").write_text(
         "t,theta,rockcheck_history\n"
         '0.0,0.1,"{""name"": ""\\u001b[2J"", ""model"": ""\\u001b[2J""}"\n0.5,0.2,\n'
     )
-    assert main(["compare", "h.csv", "h.csv"]) in (0, 1)
+    (tmp_path / "h.csv").write_text(
+        f'# {HEAD}\n# model: "\\u001b[2J"\n# name: "\\u001b[2J"\nt,theta\n0.0,0.1\n0.5,0.2\n'
+    )
+    assert main(["compare", "older.csv", "h.csv"]) in (0, 1)
     heard = capsys.readouterr()
     assert "history: a?]0;x??.csv" in heard.out
     assert "\x1b" not in heard.out + heard.err

@@ -355,7 +355,7 @@ def test_the_history_of_each_run_and_its_tables_are_written(assess, tmp_path, lo
     assert [part for part in shown if part not in page] == []
     for name in ("R00", "R09"):
         theta = loop[0.05, name][1].channels["theta"]
-        kept = pd.read_csv(out / "histories" / f"{name}.csv").theta
+        kept = pd.read_csv(out / "histories" / f"{name}.csv", comment="#").theta
         assert kept.tolist() == pytest.approx(theta[:: -(-len(theta) // 2000)].tolist(), abs=1e-15)
     assert {path.stem for path in out.glob("*.csv")} >= {
         "outcomes",
