@@ -11,7 +11,7 @@ from rockcheck.commands import PlotOption, check_file, scene_names, told
 from rockcheck.reports.style import save_as
 from rockcheck.scenes import History, InputError, Scene, errors, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
-from rockcheck.validation.discrepancy import figures, measured, measures
+from rockcheck.validation.discrepancy import figures, hints, measured, measures
 from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.suite import across, results
@@ -90,14 +90,30 @@ def run(
         raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
     given, other = History.load(reference), History.load(candidate)
     shift = measured.time_shift(given, other) if align == BEST else offset
-    found = compare(given, measured.shifted(other, shift), until=until, scene=what)
-    finding = _finding(found, {"reference": given, "candidate": other}, what, shift)
+    moved = measured.shifted(other, shift)
+    found = compare(given, moved, until=until, scene=what)
+    hint = hints.hint(given, moved, until, what)
+    finding = _finding(
+        found, {"reference": given, "candidate": other}, what, shift, _hint_words(hint, shift)
+    )
     drawn = (("figure", save_as(found.plot(), path)) for path in (plot,) if path)
     told(finding, said=drawn, value=finding.as_dict())
 
 
+def _hint_words(hint: hints.Hint | None, shift: float) -> str:
+    """A hint as a line, with the whole shift as an option; "" without one."""
+    if hint is None:
+        return ""
+    advice = f"--align {shift + hint.shift:.4g}"
+    return f"hint: {hint.sentence('the candidate', advice)}"
+
+
 def _finding(
-    found: Discrepancy, histories: Mapping[str, History], scene: Scene | None, shift: float
+    found: Discrepancy,
+    histories: Mapping[str, History],
+    scene: Scene | None,
+    shift: float,
+    hint: str,
 ) -> Finding:
     # Whether outcomes agree, and how far rotations differ.
     fates = dict.fromkeys(history.fate for history in reversed(found.histories))
@@ -135,6 +151,7 @@ def _finding(
         ),
         Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
+        Text(hint, verdict="changed"),
         Text(
             items=[
                 f"note on the {role}: {note}"
@@ -157,6 +174,7 @@ def _finding(
             "shift": shift,
             "gap": found.gap,
             "headline": headline,
+            "hint": hint,
             "motion": motions,
             "notes": {role: history.notes for role, history in histories.items()},
             "figures": [

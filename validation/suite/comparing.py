@@ -5,7 +5,7 @@ knows a store; `runner` calls `compare_cell`, and keeps what it returns.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from typing import NamedTuple
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.horizon import other_laws
 from rockcheck.scenes import History, InputError, ModelFailure, Scene
-from rockcheck.validation.discrepancy import impact_laws
+from rockcheck.validation.discrepancy import hints, impact_laws
 from rockcheck.validation.discrepancy.compare import Discrepancy, compare, describe, gap_of
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.execute import models
@@ -25,10 +25,14 @@ BY_NEAREST_LAW = ("outcome_agrees", "peak_ratio")
 
 @dataclass(frozen=True)
 class Reference:
-    """A reference's history, and by law those under the other laws of impacts."""
+    """A reference's history, and by law those under the other laws of impacts.
+
+    `offset` (s) is what a measured history's model adds to its times; None of a model that plays.
+    """
 
     history: History
     under_other_laws: Mapping[str, History] = field(default_factory=dict)
+    offset: float | None = None
 
 
 @dataclass(frozen=True)
@@ -37,13 +41,15 @@ class Request:
 
     `wanted` holds the names of measures by reference (`tolerances.OWN_FIGURES`: the history itself)
     and by window, `window_ends` the end of each window (s; "", the whole time, has none). `landing`
-    is the scene's first at which the laws of impacts part, None without one.
+    is the scene's first at which the laws of impacts part, None without one. `offset` is that of
+    `Reference`, of the cell's own history.
     """
 
     scene: Scene
     wanted: Mapping[str, Mapping[str, Sequence[str]]]
     window_ends: Mapping[str, float]
     landing: impact_laws.Landing | None
+    offset: float | None = None
 
 
 class ComparedFigure(NamedTuple):
@@ -55,9 +61,13 @@ class ComparedFigure(NamedTuple):
 
 
 class ComparisonRecord(Stored):
-    """All figures of a cell: of its history itself, and against each reference."""
+    """All figures of a cell: of its history itself, and against each reference.
+
+    `hints` say what explains a large difference from a measured history.
+    """
 
     figures: tuple[ComparedFigure, ...]
+    hints: tuple[str, ...] = ()
     impact_law: impact_laws.LawFollowed | None = None
     overturned_at: float | None = None
 
@@ -78,9 +88,28 @@ def compare_cell(
     landing = request.landing
     return ComparisonRecord(
         figures=tuple(figures),
+        hints=tuple(_hints(history, references, request)),
         impact_law=None if landing is None else landing.followed_by(history, request.scene),
         overturned_at=history.overturned_at,
     )
+
+
+def _hints(
+    history: History, references: Mapping[str, Reference], request: Request
+) -> Iterator[str]:
+    """What explains large differences between a measured history and another, one line each."""
+    for against, reference in references.items():
+        if request.offset is not None:
+            measured, other, offset = history, reference.history, request.offset
+        elif reference.offset is not None:
+            measured, other, offset = reference.history, history, reference.offset
+        else:
+            continue
+        with suppress(InputError):  # none in common
+            hint = hints.hint(other, measured, scene=request.scene)
+            if hint is not None:
+                advice = f"offset = {offset + hint.shift:.4g}"
+                yield f"against {against}: {hint.sentence('the measured history', advice)}"
 
 
 def _figures_in(

@@ -48,7 +48,7 @@ def judged_cell(
             "history": f"{HISTORIES}/{planned.kept_as}{TABLE}",
             "outcome": record.outcome,
             "overturned_at": comparison.overturned_at,
-            "notes": record.notes,
+            "notes": (*record.notes, *comparison.hints),
             "cost": record.cost,
             "figures": tuple(compared.figure for compared in comparison.figures),
             "checks": tuple(checks),

@@ -113,7 +113,9 @@ class SuiteTasks(TaskSource):
 
         def compared() -> comparing.ComparisonRecord:
             landing = scene_results.landing_of(self.store, cell.scene)
-            request = comparing.Request(cell.scene, wanted, ends, landing)
+            request = comparing.Request(
+                cell.scene, wanted, ends, landing, offset=_offset_of(cell.variant)
+            )
             histories = {
                 against: self._reference(references[against], with_laws=landing is not None)
                 for against in wanted
@@ -133,8 +135,15 @@ class SuiteTasks(TaskSource):
         return cell.key
 
     def _reference(self, cell: PlannedCell, *, with_laws: bool) -> comparing.Reference:
-        history = self.store.load(cell.kept_as)
+        history, offset = self.store.load(cell.kept_as), _offset_of(cell.variant)
         if not with_laws:
-            return comparing.Reference(history)
+            return comparing.Reference(history, offset=offset)
         others = comparing.histories_under_other_laws(cell.scene, cell.variant)
-        return comparing.Reference(history, others)
+        return comparing.Reference(history, others, offset)
+
+
+def _offset_of(variant: models.Work) -> float | None:
+    """What a measured history's model adds to its times, s; None of a model that plays."""
+    if variant.family != "measured":
+        return None
+    return float(variant.settings.get("offset", 0.0))
