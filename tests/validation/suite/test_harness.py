@@ -63,8 +63,8 @@ FAULTS = [
     (
         "the record's last sample dropped",
         "scenes/excitations.py",
-        r"found\.samples\.tolist\(\)",
-        "found.samples[:-1].tolist()",
+        r"recording\.samples\.tolist\(\)",
+        "recording.samples[:-1].tolist()",
         0,
     ),
     (
