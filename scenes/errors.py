@@ -35,13 +35,6 @@ class ModelFailure(RuntimeError):
     """
 
 
-def refuse(*faults: tuple[object, str, str]) -> None:
-    """Raise `InputError` for the first fault that is there: (whether it is, reason, key)."""
-    for there, reason, key in faults:
-        if there:
-            raise InputError(reason, key)
-
-
 def check_kind(value: object, kind: type, how: str, key: str) -> None:
     """Raise `InputError` unless `value` is a `kind`; `how` names a source of one."""
     if not isinstance(value, kind):

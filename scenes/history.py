@@ -21,7 +21,7 @@ from rockcheck.scenes import tables
 from rockcheck.scenes.base import MOST, Floats, Frozen, NonNegative, Positive, Shown
 from rockcheck.scenes.block import Block
 from rockcheck.scenes.columns import COLUMNS, meanings_of
-from rockcheck.scenes.errors import InputError, printable, refuse
+from rockcheck.scenes.errors import InputError, printable
 from rockcheck.scenes.events import Event
 from rockcheck.scenes.experience import Expected, expected, trust_of
 from rockcheck.scenes.extremes import Extremes
@@ -349,19 +349,13 @@ def check_format(path: Path, more: str = "") -> None:
     The message ends with `more` that is allowed.
     """
     kind, shown = path.suffix.lower(), printable(path)
-    refuse(
-        (
-            kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")),
+    if kind not in FORMATS or (kind == ".gz" and not path.name.lower().endswith(".csv.gz")):
+        raise InputError(
             f"{shown}: a history is written as .csv, .csv.gz, .json, .mat or .parquet,"
-            f" not as {printable(path.suffix)}{more}",
-            "",
-        ),
-        (
-            kind == ".parquet" and not find_spec("pyarrow"),
-            f"{shown}: Parquet needs the package pyarrow: pip install pyarrow",
-            "",
-        ),
-    )
+            f" not as {printable(path.suffix)}{more}"
+        )
+    if kind == ".parquet" and not find_spec("pyarrow"):
+        raise InputError(f"{shown}: Parquet needs the package pyarrow: pip install pyarrow")
 
 
 def _mat(

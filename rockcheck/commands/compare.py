@@ -9,7 +9,7 @@ from pydantic import FiniteFloat, TypeAdapter
 
 from rockcheck.commands import PlotOption, check_file, scene_names, told
 from rockcheck.reports.style import save_as
-from rockcheck.scenes import History, InputError, Scene, errors, load_scene, printable
+from rockcheck.scenes import History, InputError, Scene, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
 from rockcheck.validation.discrepancy import figures, hints, measured, measures
 from rockcheck.validation.discrepancy.compare import motion_of, motion_words
@@ -59,21 +59,10 @@ def run(
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
     """
-    errors.refuse(
-        *(
-            (
-                value is not None and (reference.is_dir() or candidate.is_dir()),
-                "is for histories, not for finished runs",
-                option,
-            )
-            for option, value in (
-                ("--align", align),
-                ("--until", until),
-                ("--scene", scene),
-                ("--plot", plot),
-            )
+    if reference.is_dir() or candidate.is_dir():
+        _refuse_for_runs(
+            {"--align": align, "--until": until, "--scene": scene, "--plot": plot},
         )
-    )
     if reference.is_dir() or reference.suffix == ".json":
         from rockcheck.validation.studies.conformance import changes
 
@@ -98,6 +87,13 @@ def run(
     )
     drawn = (("figure", save_as(found.plot(), path)) for path in (plot,) if path)
     told(finding, said=drawn, value=finding.as_dict())
+
+
+def _refuse_for_runs(options: Mapping[str, object]) -> None:
+    """Raise `InputError` for an option of histories where finished runs are compared."""
+    for option, value in options.items():
+        if value is not None:
+            raise InputError("is for histories, not for finished runs", option)
 
 
 def _hint_words(hint: hints.Hint | None, shift: float) -> str:

@@ -115,28 +115,18 @@ def compare(
         ", ".join(f"{key} = {value}" for key, value in one.model_dump(exclude_none=True).items())
         for one in blocks
     )
-    errors.refuse(
-        (
-            scene is None and len(blocks) == 2 and not _same(*blocks),
-            f"is needed: the histories are of two blocks, {' and '.join(said)}",
-            "scene",
-        ),
-        (
-            scene is not None and blocks and not any(_same(scene.block, one) for one in blocks),
-            "its block is none of the histories'",
-            "scene",
-        ),
-    )
-    end = math.inf if until is None else until
-    errors.refuse((not end > 0.0, f"{end:g} is not allowed: give a positive time in s", "until"))
-    pair = Pair(reference, candidate, scene, end)
-    errors.refuse(
-        (
-            len(pair.time) == 0,
-            f"{reference.model} and {candidate.model} have no time in common",
-            "",
+    if scene is None and len(blocks) == 2 and not _same(*blocks):
+        raise errors.InputError(
+            f"is needed: the histories are of two blocks, {' and '.join(said)}", "scene"
         )
-    )
+    if scene is not None and blocks and not any(_same(scene.block, one) for one in blocks):
+        raise errors.InputError("its block is none of the histories'", "scene")
+    end = math.inf if until is None else until
+    if not end > 0.0:
+        raise errors.InputError(f"{end:g} is not allowed: give a positive time in s", "until")
+    pair = Pair(reference, candidate, scene, end)
+    if len(pair.time) == 0:
+        raise errors.InputError(f"{reference.model} and {candidate.model} have no time in common")
     return Discrepancy(
         reference.model,
         candidate.model,
@@ -176,9 +166,8 @@ def describe(
     Raises `InputError` if a measure is unknown, or the history begins only after `until`.
     """
     motion = WindowedHistory(history, scene, math.inf if until is None else until)
-    errors.refuse(
-        (len(motion.channel("t")) == 0, f"{history.model} has no row up to {motion.until:g} s", "")
-    )
+    if len(motion.channel("t")) == 0:
+        raise errors.InputError(f"{history.model} has no row up to {motion.until:g} s")
     return _figures(FIGURES, measures, motion, "alpha", until)
 
 
@@ -193,12 +182,9 @@ def _figures(
     """The figures of the measures of these names; None: of all but those that are `on_request`."""
     if names is None:
         names = [name for name, measure in known.items() if not measure.on_request]
-    errors.refuse(
-        *(
-            (one not in known, f"{one!r} is not allowed: {', '.join(known)}", "measures")
-            for one in names
-        )
-    )
+    for one in names:
+        if one not in known:
+            raise errors.InputError(f"{one!r} is not allowed: {', '.join(known)}", "measures")
     return tuple(evaluate(known[name], what, angle, against=against, until=until) for name in names)
 
 

@@ -19,7 +19,6 @@ from rockcheck.scenes import (
     History,
     InputError,
     Scene,
-    errors,
     interpolation,
     printable,
 )
@@ -101,16 +100,9 @@ def time_shift(reference: History, candidate: History) -> float:
     `InputError` where one does not rotate, so that nothing can be aligned.
     """
     both = [history.channels for history in (reference, candidate)]
-    errors.refuse(
-        *(
-            (
-                len(one["t"]) < 3 or not np.any(one["theta"]),
-                f"{history.name}: no rotation by which it could be aligned",
-                "align",
-            )
-            for history, one in zip((reference, candidate), both, strict=True)
-        )
-    )
+    for history, one in zip((reference, candidate), both, strict=True):
+        if len(one["t"]) < 3 or not np.any(one["theta"]):
+            raise InputError(f"{history.name}: no rotation by which it could be aligned", "align")
     step = min(float(one["t"][-1] - one["t"][0]) / (len(one["t"]) - 1) for one in both)
     grids = [np.arange(one["t"][0], one["t"][-1] + 0.5 * step, step) for one in both]
     first, second = (
