@@ -431,19 +431,7 @@ def live_data(plot: Plot) -> dict[str, Any]:
         "intensities": axis.tolist(),
         "log": plot.x.log,
         "curves": [
-            {
-                "label": series.label,
-                "values": _short(_on(axis, series)),
-                "fell": np.flatnonzero(np.array(series.y, float) == math.inf).tolist(),
-                "colour": colour,
-                "low": _short(series.low),
-                "high": _short(series.high),
-                "fit": _short(fits[series.label].y)
-                if series.label in fits and series.style != "thin"
-                else [],
-                "dash": {"dashed": [8, 4], "dotted": [2, 3]}.get(series.style, []),
-                "width": 0.7 if series.style == "thin" else 2.0,
-            }
+            _live_curve(series, axis, colour, fits.get(series.label))
             for series, colour in zip(panel.series, colours(panel), strict=True)
             if series.style != "dots"
         ],
@@ -451,6 +439,24 @@ def live_data(plot: Plot) -> dict[str, Any]:
         "most": plot.y.limits[1] if plot.y.limits else None,
         "single": any(series.style == "thin" for series in panel.series),
         **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),
+    }
+
+
+def _live_curve(
+    series: Series, axis: Floats, colour: tuple[str, str], fit: Series | None
+) -> dict[str, Any]:
+    """One curve of a live chart, and the `fit` that is drawn with it."""
+    is_thin = series.style == "thin"
+    return {
+        "label": series.label,
+        "values": _short(_on(axis, series)),
+        "fell": np.flatnonzero(np.array(series.y, float) == math.inf).tolist(),
+        "colour": colour,
+        "low": _short(series.low),
+        "high": _short(series.high),
+        "fit": [] if fit is None or is_thin else _short(fit.y),
+        "dash": {"dashed": [8, 4], "dotted": [2, 3]}.get(series.style, []),
+        "width": 0.7 if is_thin else 2.0,
     }
 
 

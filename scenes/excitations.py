@@ -5,6 +5,7 @@ m/s^2, horizontal motion positive to the right, vertical motion positive upward.
 """
 
 import math
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
 
@@ -154,7 +155,7 @@ class Ricker(Pulse):
         return extremes_by_samples(self)
 
 
-class Wave(Pulse):
+class Wave(Pulse, ABC):
     """A piece of a sine: amplitude times sin(2 pi (t + lead)/period), then rest."""
 
     #: How much of a period has passed at the start.
@@ -166,9 +167,9 @@ class Wave(Pulse):
         return self.lead_share * self.period
 
     @property
+    @abstractmethod
     def quiet_after(self) -> float:
         """Time in s at which the piece ends."""
-        raise NotImplementedError
 
     @property
     def kinks(self) -> tuple[float, ...]:
