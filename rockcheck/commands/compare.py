@@ -132,6 +132,7 @@ def _finding(
     models = f"{found.candidate} against {found.reference}"
     blocks: list[Block] = [
         Text(headline),
+        Text(hint, verdict="changed"),
         Text(
             facts=[
                 (role, ", ".join(words))
@@ -147,7 +148,6 @@ def _finding(
         ),
         Text(f"the candidate is shifted by {shift:+.4g} s" if shift else ""),
         Text(f"not the whole time: {found.gap}" if found.gap else ""),
-        Text(hint, verdict="changed"),
         Text(
             items=[
                 f"note on the {role}: {note}"

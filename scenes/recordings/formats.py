@@ -122,13 +122,14 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
 def _end_of_samples(lines: list[str], first: int, count: int) -> int:
     """Index behind the line that completes `count` numbers; of all lines where none does.
 
-    It is also that of all lines where a number stands behind, as too many are then.
+    It is also that of all lines where a line of numbers stands behind, as too many are then.
     """
     samples = 0
     for index, line in enumerate(lines[first:], first):
         if samples == count and line.strip():
-            has_number = any(is_number(word) for text in lines[index:] for word in text.split())
-            return len(lines) if has_number else index
+            behind = [text.split() for text in lines[index:] if text.strip()]
+            has_numbers = any(all(map(is_number, words)) for words in behind)
+            return len(lines) if has_numbers else index
         words = line.split()
         if not all(map(is_number, words)):
             break

@@ -37,6 +37,9 @@ PEAK_TOLERANCE = 0.03
 #: Peaks in g: above the first a note tells it, above the second the unit is taken to be wrong. The
 #: largest that a network has recorded is about 4 g (Iwate-Miyagi 2008, vertical).
 LARGE_PEAK, LARGEST_PEAK = 5.0, 20.0
+#: Time steps in s: above the first a note tells it, above the second the times are taken to be in
+#: another unit. Records have 0.001 to 0.02 s, digitised film at most 0.04 s.
+LONG_STEP, LONGEST_STEP = 0.05, 1.0
 
 Value = TypeVar("Value")
 
@@ -188,10 +191,26 @@ def peak_notes(samples: Floats, unit: str, stated: Stated, reading: Reading) -> 
 
 
 def size_notes(recording: Recording, reading: Reading) -> list[str]:
-    """A note on a peak that few earthquakes reach.
+    """Notes on a peak that few earthquakes reach, and on a time step that few records have.
 
-    Raises `InputError` for one that none does, unless its unit was given with an exclamation mark.
+    Raises `InputError` for a size that none has, unless it was given with an exclamation mark.
     """
+    return [*_largest_notes(recording, reading), *_step_notes(recording.time_step, reading)]
+
+
+def _step_notes(step: float, reading: Reading) -> list[str]:
+    if step > LONGEST_STEP and "time_step" not in reading.overriding:
+        raise fault(
+            f"a time step of {step:.4g} s; no record of an earthquake is so coarse: are the times"
+            " in ms? Give the right step with an exclamation mark, or this one to read it all the"
+            f" same: {option('time_step', f'{step:g}!')}"
+        )
+    if step > LONG_STEP:
+        return [f"a time step of {step:.4g} s is longer than that of records: is it right?"]
+    return []
+
+
+def _largest_notes(recording: Recording, reading: Reading) -> list[str]:
     peak = float(np.max(np.abs(recording.samples), initial=0.0)) / GRAVITY_OF_RECORDS
     if peak > LARGEST_PEAK and "unit" not in reading.overriding:
         raise fault(

@@ -30,10 +30,12 @@ from rockcheck.scenes.recordings.stated import Fact, Stated, recording_of
 
 #: Names of a column of accelerations that say its unit.
 NAMED = {f"acceleration_{unit.replace('/', '_')}": unit for unit in UNITS}
-_SECONDS = r"s(?:ec(?:ond)?s?)?"
+_SECONDS = r"(?:m|milli)?s(?:ec(?:ond)?s?)?"
 _TIMES = re.compile(
     rf"(?:time|t)(?:[_ ]?{_SECONDS}|\s*+[\[(]\s*+{_SECONDS}\s*+[\])])?", re.IGNORECASE
 )
+#: The end of a name of times that are in ms.
+_MILLISECONDS = re.compile(r"m(?:illi)?s(?:ec(?:ond)?s?)?\s*+[\])]?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(]([^\])]{1,20})[\])]")
 _ACCELERATION = re.compile(r"a(?:cc(?:el(?:erations?)?)?)?\.?(?=[\s_\-\[(,]|$)", re.IGNORECASE)
 #: Most lines whose first number is looked at, to know whether it is a time.
@@ -121,10 +123,12 @@ def _column(
             )
         facts, notes = _without_count(facts, len(samples), notes)
     if time is not None:
+        if cells.names and _are_milliseconds(cells.names[time]):
+            times, words = 1e-3 * times, [f"{1e-3 * float(seconds):.12g}" for seconds in times]
         step, step_notes = _checked_step(times, words, [n for n, _ in cells.rows], facts, reading)
         facts = replace(facts, time_step=Fact(step))
         notes += step_notes
-        if not cells.names or cells.names[time].lower() in ("t", "time"):
+        if not cells.names or not _states_unit_of_time(cells.names[time]):
             notes.append(f"column {time + 1} is taken as the time in s")
         reading = reading.model_copy(update={"time_step": None})
     component = f"column {place + 1}" * (cells.width > 1)
@@ -247,6 +251,16 @@ def unit_of_name(name: str) -> str:
     return ""
 
 
+def _are_milliseconds(name: str) -> bool:
+    """Whether the name of a column of times says that they are in ms."""
+    return bool(_TIMES.fullmatch(name) and _MILLISECONDS.search(name.lower().removeprefix("time")))
+
+
+def _states_unit_of_time(name: str) -> bool:
+    """Whether the name of a column of times states a unit."""
+    return bool(_TIMES.fullmatch(name)) and name.lower() not in ("t", "time")
+
+
 def _names_columns(names: Sequence[str], layout: Layout, reading: Reading) -> bool:
     """Whether the line above the numbers names columns, and is no other line of as many words."""
     if layout.separator is not None or reading.column in names:
@@ -257,11 +271,11 @@ def _names_columns(names: Sequence[str], layout: Layout, reading: Reading) -> bo
 
 
 def _time_of(cells: _Cells, reading: Reading) -> int | None:
-    """The column of times, by its name, or where columns have none by its numbers; or None."""
+    """The column of times, by its name, else the first one where its numbers are times; or None."""
     times = [index for index, name in enumerate(cells.names) if _TIMES.fullmatch(name)]
     if len(times) == 1:
         return times[0]
-    if cells.names or cells.width < 2:
+    if times or cells.width < 2:
         return None
     words = [cells.layout.words(*row)[:1] for row in cells.rows[:_LOOKED_AT]]
     numbers = [
@@ -269,7 +283,8 @@ def _time_of(cells: _Cells, reading: Reading) -> int | None:
         for (n, _), (word,) in zip(cells.rows, filter(None, words), strict=False)
         if is_number(word)
     ]
-    is_time = are_times(numbers, is_step_given=reading.time_step is not None)
+    is_named_otherwise = bool(cells.names)
+    is_time = are_times(numbers, is_step_given=is_named_otherwise or reading.time_step is not None)
     return 0 if is_time and len(numbers) == len(words) else None
 
 

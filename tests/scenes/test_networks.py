@@ -548,15 +548,16 @@ def test_raw_counts_of_cosmos_are_refused_by_name(written):
         recordings.read_components(written("record.V0", text.encode()))
 
 
-def test_text_behind_the_last_value_of_a_peer_file_is_left_out_with_a_note(written):
+@pytest.mark.parametrize("words", ["*** End Data ***", "End of data, made in 2020"])
+def test_text_behind_the_last_value_of_a_peer_file_is_left_out_with_a_note(written, words):
     text = (
         "PEER\nmade up\nACCELERATION TIME SERIES IN UNITS OF G\nNPTS=  10, DT= .0200 SEC\n"
         + fixed(0.1 * np.arange(10.0), 5, "15.7E")
-        + "*** End Data ***\n"
+        + f"{words}\n"
     )
     recording = recordings.read_record(written("record.AT2", text.encode()))
     assert len(recording.samples) == 10
-    assert recording.notes == ("left out behind the last sample: '*** End Data ***'",)
+    assert recording.notes == (f"left out behind the last sample: '{words}'",)
 
 
 def test_numbers_behind_the_last_value_of_a_peer_file_are_refused(written):

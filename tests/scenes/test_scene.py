@@ -103,7 +103,11 @@ def test_numbers_that_are_refused(key, value, fault_of):
             "two walls on one side",
         ),
         ({"excitation": {"kind": "quake"}}, "excitation", "ricker"),
-        ({"excitation": {"kind": "rickr"}}, "excitation", "did you mean 'ricker'? allowed: record"),
+        (
+            {"excitation": {"kind": "rickr"}},
+            "excitation",
+            "did you mean 'ricker'? allowed: cosine, half-sine, record",
+        ),
         ({"excitation": {"amplitude": 1.0}}, "excitation", "kind"),
         (
             {"excitation": {"kind": "sine", "amplitude": 1.0, "period": 1.0, "cycles": 0}},

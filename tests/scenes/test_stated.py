@@ -110,3 +110,39 @@ def test_a_peak_above_20_g_is_refused_unless_it_is_asked_for(written, fault_of):
     assert "a peak of 299.9 g in the unit g" in fault
     assert "--read unit=g!" in fault
     assert Record.from_file(path, unit="g!").peak == pytest.approx(299.9)
+
+
+def stepped(step, header="time_s"):
+    rows = "".join(f"{step * n:.10g},{0.1 * (n % 2)}\n" for n in range(200))
+    return f"{header},acceleration_g\n{rows}"
+
+
+@pytest.mark.parametrize("header", ["time_ms", "t_ms", "Time [ms]", "time (msec)"])
+def test_times_may_be_in_milliseconds(written, header):
+    recording = recordings.read_record(written("a.csv", stepped(10, header)))
+    assert recording.time_step == pytest.approx(0.01)
+    assert recording.notes == ()
+
+
+def test_milliseconds_that_are_called_seconds_are_refused(written, fault_of):
+    path = written("a.csv", stepped(10))
+    fault = str(fault_of(Record.from_file, path))
+    assert "a time step of 10 s; no record of an earthquake is so coarse" in fault
+    assert "--read time_step=10!" in fault
+    assert Record.from_file(path, time_step="10!").time_step == 10.0
+
+
+def test_a_step_longer_than_that_of_records_is_told(written):
+    recording = recordings.read_record(written("a.csv", stepped(0.1)))
+    assert "a time step of 0.1 s is longer than that of records" in recording.notes[0]
+    assert recordings.read_record(written("b.csv", stepped(0.05))).notes == ()
+
+
+def test_a_first_column_of_times_is_known_whatever_it_is_called(written, fault_of):
+    path = written("a.csv", stepped(0.01, "Zeit"))
+    recording = recordings.read_record(path)
+    assert recording.time_step == pytest.approx(0.01)
+    assert recording.notes == ("column 1 is taken as the time in s",)
+    assert "the times have a step of 0.01 s, not 0.1 s" in (
+        str(fault_of(Record.from_file, path, time_step=0.1))
+    )

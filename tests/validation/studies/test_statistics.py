@@ -224,7 +224,7 @@ def test_what_falls_nowhere_is_told_with_how_finely_was_looked():
     answer = gap_answer(a=search())
     assert answer.safe_up_to == 0.1
     assert sentences.gap_sentences([answer])[0].startswith(
-        "It stands at gaps of 0 mm to 0.1 m (looked at every 1 mm)"
+        "It stands at any gap (looked at every 1 mm): without the wall it reaches 0.1 m"
     )
 
 

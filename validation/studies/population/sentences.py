@@ -135,7 +135,9 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
     single = answer.free_runs == 1
     none_falls, first_falls = ("It stands", "it falls") if single else ("No run falls", "")
     sentences = []
-    if answer.first is None:
+    if answer.first is None and answer.low == 0.0 and answer.high >= answer.clearance:
+        sentences.append(f"{where}{none_falls} at any gap ({looked}): {reach} at most.")
+    elif answer.first is None:
         span = f"{length(answer.low)} to {length(answer.high)}"
         sentences.append(f"{where}{none_falls} at gaps of {span} ({looked}); {reach}.")
     elif answer.safe_up_to is None:
@@ -176,7 +178,7 @@ def again_words(answer: GapAnswer) -> str:
 def looked_words(answer: GapAnswer) -> str:
     """How finely was looked."""
     if answer.low == answer.high:
-        return "the only gap asked for"
+        return "the only gap looked at"
     words = f"looked at every {length(answer.looked_every)}"
     if answer.finely_up_to < answer.high:
         words += f" up to {length(answer.finely_up_to)}"
