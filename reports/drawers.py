@@ -468,6 +468,8 @@ def _on(axis: Floats, series: Series) -> Floats:
     x, y = np.array(series.x, float), np.array(series.y, float)
     if np.array_equal(x, axis):
         return y
+    if not len(x):
+        return np.full(len(axis), math.nan)
     if series.style != "step":
         return np.interp(axis, x, y, left=math.nan, right=math.nan)
     last = np.searchsorted(x, axis, side="right") - 1
