@@ -127,14 +127,17 @@ def _end_of_samples(lines: list[str], first: int, count: int) -> int:
     samples = 0
     for index, line in enumerate(lines[first:], first):
         if samples == count and line.strip():
-            behind = [text.split() for text in lines[index:] if text.strip()]
-            has_numbers = any(all(map(is_number, words)) for words in behind)
-            return len(lines) if has_numbers else index
+            return len(lines) if _has_numbers(lines[index:]) else index
         words = line.split()
         if not all(map(is_number, words)):
             break
         samples += len(words)
     return len(lines)
+
+
+def _has_numbers(lines: list[str]) -> bool:
+    """Whether one of these lines has numbers alone."""
+    return any(all(map(is_number, line.split())) for line in lines if line.strip())
 
 
 def read_esm(lines: list[str], reading: Reading) -> list[Recording]:

@@ -109,32 +109,38 @@ def _column(
     if time is None and reading.time_step is None and facts.time_step is None:
         raise fault(f"no column of times; give the time step: {option('time_step', 0.01)}")
     samples, times, words = cells.read(place, time)
-    notes = list(notes)
     if unit:
         facts = replace(facts, unit=Fact(unit))
     if cells.width > 2:
         facts = replace(facts, peak=None)  # of which column is not known
-    if facts.count is not None and facts.count.value != len(samples):
-        if "order" not in reading.overriding:
-            raise fault(
-                f"the header states {facts.count.value} samples, the table has {len(samples)}; to"
-                f" read it all the same: {option('order', 'columns!')}",
-                facts.count.line,
-            )
-        facts, notes = _without_count(facts, len(samples), notes)
+    facts, notes = _with_count_checked(facts, len(samples), reading, notes)
     if time is not None:
-        if cells.names and _are_milliseconds(cells.names[time]):
+        name = cells.names[time] if cells.names else ""
+        if _are_milliseconds(name):
             times, words = 1e-3 * times, [f"{1e-3 * float(seconds):.12g}" for seconds in times]
         step, step_notes = _checked_step(times, words, [n for n, _ in cells.rows], facts, reading)
         facts = replace(facts, time_step=Fact(step))
-        notes += step_notes
-        if not cells.names or not _states_unit_of_time(cells.names[time]):
-            notes.append(f"column {time + 1} is taken as the time in s")
+        notes += [*step_notes, *_time_notes(name, time)]
         reading = reading.model_copy(update={"time_step": None})
     component = f"column {place + 1}" * (cells.width > 1)
     if cells.names:
         component = printable(cells.names[place], 30)
     return recording_of(samples, facts, reading, form=cells.form, component=component, notes=notes)
+
+
+def _with_count_checked(
+    facts: Stated, samples: int, reading: Reading, notes: Sequence[str]
+) -> tuple[Stated, list[str]]:
+    """The facts, their count held against a column of so many samples, and notes on it."""
+    if facts.count is None or facts.count.value == samples:
+        return facts, [*notes]
+    if "order" not in reading.overriding:
+        raise fault(
+            f"the header states {facts.count.value} samples, the table has {samples}; to read it"
+            f" all the same: {option('order', 'columns!')}",
+            facts.count.line,
+        )
+    return _without_count(facts, samples, notes)
 
 
 @dataclass(frozen=True)
@@ -249,6 +255,11 @@ def unit_of_name(name: str) -> str:
     if start := _ACCELERATION.match(name):
         return known_unit(name[start.end() :].strip(" _-,"))
     return ""
+
+
+def _time_notes(name: str, time: int) -> list[str]:
+    """A note where the name of the column of times does not state their unit."""
+    return [] if _states_unit_of_time(name) else [f"column {time + 1} is taken as the time in s"]
 
 
 def _are_milliseconds(name: str) -> bool:
