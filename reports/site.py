@@ -387,6 +387,8 @@ def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:
             peak = float(np.max(np.abs(excitation.unscaled), initial=0.0))
             if peak > stated.LARGEST_PEAK * GRAVITY_OF_RECORDS:
                 tables[key]["unit"] = "m/s2!"  # it is meant, however large
+            if excitation.time_step > stated.LONGEST_STEP:
+                tables[key]["time_step"] = f"{excitation.time_step!r}!"  # however coarse
             rows = (
                 (f"{excitation.time_step * n:.12g}", value)
                 for n, value in enumerate(excitation.unscaled)
