@@ -182,7 +182,7 @@ def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History
         if result.refused:
             raise errors.InputError(result.reason)
         where = f"; its traceback: {report_file(result.traceback)}" if result.traceback else ""
-        raise errors.ModelFailure(f"{result.reason}{where}")
+        raise errors.ModelFailure(f"{model}: {result.reason}{where}")
     return cast(History, result.history)
 
 

@@ -36,7 +36,8 @@ from rockcheck.scenes.recordings.stated import Fact, Stated, last_digit, recordi
 AT2_HEADER = re.compile(rf"NPTS\s*+=\s*+(\d++)\s*+(?:,\s*+)?DT\s*+=\s*+({NUMBER})", re.IGNORECASE)
 AT2_HEADER_PLAIN = re.compile(rf"^\s*+(\d++)\s++({NUMBER})\s++NPTS\s*+(?:,\s*+)?DT", re.IGNORECASE)
 _UNITS = re.compile(
-    r"UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)",
+    r"(?:UNITS?(?:\s++|\s*+:\s*+)(?:(?:OF|IN|ARE|:)\s*+)?|\bACC(?:EL(?:ERATIONS?)?)?\.?\s++IN\s++)"
+    r"\(?([A-Z0-9^*'²]++(?:\s*+/\s*+[A-Z0-9^*²]++)*+)",
     re.IGNORECASE,
 )
 _OTHER_KIND = re.compile(r"\b(?:VELOCITY|DISPLACEMENT)\s++TIME\s++(?:SERIES|HIST)", re.IGNORECASE)
@@ -99,7 +100,7 @@ def read_at2(lines: list[str], reading: Reading) -> list[Recording]:
     _refuse_other_kinds(lines[:header])
     if not stated and reading.unit is None:
         raise InputError(
-            "no header line that states UNITS OF G or another; give the unit:"
+            "no header line states the unit, as UNITS OF G or ACCELERATION IN CM/S2; give it:"
             f" {option('unit', 'cm/s2')}"
         )
     count = checked_count(header, "NPTS", match[1])

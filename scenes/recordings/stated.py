@@ -21,6 +21,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from rockcheck.scenes.base import Floats
+from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.recordings.recording import (
     GRAVITY_OF_RECORDS,
     UNITS,
@@ -91,6 +92,8 @@ def recording_of(
     where unit or time step are neither stated nor given.
     """
     _check_count(len(values), stated.count)
+    if stated.time_step is None and reading.time_step is None:
+        raise missing("the time step is not stated; ", stated, reading)
     unit, unit_notes = _unit(stated.unit, reading)
     time_step, step_notes = _time_step(stated.time_step, reading)
     samples = np.asarray(values, dtype=float) * UNITS[unit]
@@ -107,6 +110,17 @@ def recording_of(
             *duration_notes(len(samples), time_step, stated, reading),
             *peak_notes(samples, unit, stated, reading),
         ),
+    )
+
+
+def missing(reason: str, stated: Stated, reading: Reading) -> InputError:
+    """The error of a file without a time step: asks for it, and for a unit that is missing too."""
+    if stated.unit is not None or reading.unit is not None:
+        return fault(f"{reason}give the time step: {option('time_step', 0.01)}")
+    return fault(
+        f"{reason}the unit is not stated either; give both: --read time_step=0.01 --read unit=g"
+        ' (in a scene file: time_step = 0.01, unit = "g"); units are'
+        f" {', '.join(UNITS)}"
     )
 
 
@@ -135,8 +149,7 @@ def _unit(stated: Fact[str] | None, reading: Reading) -> tuple[str, list[str]]:
 def _time_step(stated: Fact[float] | None, reading: Reading) -> tuple[float, list[str]]:
     """The time step in s, and a note where it is not the one that is stated."""
     if stated is None:
-        if reading.time_step is None:
-            raise fault(f"the time step is not stated; give it: {option('time_step', 0.01)}")
+        assert reading.time_step is not None  # `recording_of` has looked
         return reading.time_step, []
     step = settled_step(stated.value, reading)
     if step != stated.value:

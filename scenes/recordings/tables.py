@@ -26,7 +26,7 @@ from rockcheck.scenes.recordings.recording import (
     option,
     place_of,
 )
-from rockcheck.scenes.recordings.stated import Fact, Stated, recording_of
+from rockcheck.scenes.recordings.stated import Fact, Stated, missing, recording_of
 
 #: Names of a column of accelerations that say its unit.
 NAMED = {f"acceleration_{unit.replace('/', '_')}": unit for unit in UNITS}
@@ -106,11 +106,11 @@ def _column(
 ) -> Recording:
     """One column of accelerations, and perhaps one of times."""
     time, place, unit = _columns(cells, time, reading)
-    if time is None and reading.time_step is None and facts.time_step is None:
-        raise fault(f"no column of times; give the time step: {option('time_step', 0.01)}")
-    samples, times, words = cells.read(place, time)
     if unit:
         facts = replace(facts, unit=Fact(unit))
+    if time is None and reading.time_step is None and facts.time_step is None:
+        raise missing("no column of times; ", facts, reading)
+    samples, times, words = cells.read(place, time)
     if cells.width > 2:
         facts = replace(facts, peak=None)  # of which column is not known
     facts, notes = _with_count_checked(facts, len(samples), reading, notes)
@@ -217,11 +217,18 @@ def _names_of(
     names = first if numeric[0] != numeric[-1] else []
     if len(numeric[-1]) == len(first) and (names or reading.header_lines is not None):
         return names, rows[bool(names) :]
+    if not any(_is_mostly_numbers(layout.words(*row)) for row in rows):
+        raise fault("no line of numbers")
     raise fault(
         f"no line of numbers within the first {MOST_HEADER}; give the lines to leave out:"
         f" {option('header_lines', 3)}",
         rows[0][0],
     )
+
+
+def _is_mostly_numbers(words: Sequence[str]) -> bool:
+    """Whether at least half of the words of a line are numbers, as in no line of prose."""
+    return 2 * sum(map(is_number, words)) >= len(words)
 
 
 def _closed_up(line: str) -> str:

@@ -146,6 +146,12 @@ def test_an_allowed_model_is_imported_by_a_worker_only(folder, words, code):
     assert f"imported-{process}" not in traces(folder) != []
 
 
+def test_a_model_that_raises_is_named(typed):
+    words = ["simulate", "scene.toml", "--model", "faulty:Bug", "--allow-code", "faulty:Bug"]
+    _, errors = typed(*words, code=3)
+    assert "faulty:Bug: ZeroDivisionError: a bug" in errors
+
+
 OWN = "rockcheck: short, a: ZeroDivisionError: a bug.*traceback in rockcheck-report/faults/short"
 
 

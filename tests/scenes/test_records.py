@@ -95,12 +95,12 @@ FAULTS = {
         (NAMED.format(npts="9" * 40, dt=0.01) + "0.1", "line 4: NPTS 9"),
         (
             NAMED.format(npts=2, dt=0.01).replace(" IN UNITS OF G", "") + "0.1 0.2",
-            "no header line that states UNITS OF G",
+            "no header line states the unit, as UNITS OF G",
         ),
         *(
             (
                 NAMED.format(npts=2, dt=0.01).replace("UNITS OF G", f"UNITS OF {word}") + "0.1 0.2",
-                "no header line that states UNITS OF G",
+                "no header line states the unit, as UNITS OF G",
             )
             for word in ("CM/S", "CM", "INCHES")
         ),
@@ -165,13 +165,22 @@ UNKNOWN = [
         "3 columns; give that of the accelerations: --read column=2 (in a scene file: column = 2)",
     ),
     ("1 2 3\n4 5 6\n", {"column": 4}, "no single column 4; there are 1 to 3"),
-    *(
-        (
-            text,
-            {"unit": "g", "column": 2, "time_step": 1.0},
-            "no line of numbers within the first 200; give the lines to leave out: --read header",
-        )
-        for text in ("words\nand more of them\n", "A 1\nA 2\n")
+    (
+        "1\n2\n",
+        {},
+        "no column of times; the unit is not stated either; give both: --read time_step=0.01"
+        " --read unit=g (in a scene file:",
+    ),
+    (
+        "1 2\n-3 4\n",
+        {"order": "rows"},
+        "the time step is not stated; the unit is not stated either; give both: --read time_step",
+    ),
+    ("words\nand more of them in 1999\n", {}, "no line of numbers"),
+    (
+        "A 1\nA 2\n",
+        {"unit": "g", "column": 2, "time_step": 1.0},
+        "no line of numbers within the first 200; give the lines to leave out: --read header",
     ),
     *(
         (
@@ -224,10 +233,19 @@ SPELT = {
 
 
 @pytest.mark.parametrize(
-    ("unit", "word"), [(unit, word) for unit, words in SPELT.items() for word in words]
+    ("unit", "line"),
+    [
+        *(
+            (unit, f"ACCELERATION TIME SERIES IN UNITS OF {word}")
+            for unit, words in SPELT.items()
+            for word in words
+        ),
+        ("cm/s2", "ACCELERATION IN CM/SEC2"),
+        ("g", "Accel. in g"),
+    ],
 )
-def test_the_header_states_the_unit(written, unit, word):
-    text = f"A\nACCELERATION TIME SERIES IN UNITS OF {word}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
+def test_the_header_states_the_unit(written, unit, line):
+    text = f"A\n{line}\nNPTS= 2, DT= .01 SEC\n 1.0 2.0\n"
     found = recordings.read_record(written("a.AT2", text))
     assert found.unit == unit
     np.testing.assert_allclose(

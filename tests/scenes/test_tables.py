@@ -9,6 +9,7 @@ from rockcheck.scenes.recordings import Reading, sets
 from rockcheck.scenes.recordings.headers import facts_of
 from rockcheck.scenes.recordings.layout import has_decimal_commas, is_ambiguous_comma
 from rockcheck.scenes.recordings.order import Shape, are_times, runs_along_rows
+from rockcheck.scenes.recordings.recording import known_unit
 from rockcheck.scenes.recordings.tables import unit_of_name
 from rockcheck.validation.studies.population.intensities import measure_of
 from rockcheck.validation.suite.motions import RecordSet
@@ -150,6 +151,13 @@ def test_a_header_that_is_right_needs_no_option(written):
     recording = read(written, header + along_lines())
     np.testing.assert_allclose(recording.samples, 0.01 * VALUES, atol=1e-7)
     assert recording.time_step == 0.01
+
+
+@pytest.mark.parametrize("unit", ["cm/sec2", "g", "m/s2"])
+def test_a_line_of_the_header_may_say_in_what_unit_accelerations_are(unit):
+    facts = facts_of([(1, "EW component"), (2, f"ACCELERATION IN {unit.upper()}")])
+    assert facts.unit is not None
+    assert facts.unit.value == known_unit(unit)
 
 
 def test_values_of_a_header_that_differ_count_for_nothing():
