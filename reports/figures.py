@@ -33,7 +33,7 @@ from rockcheck.reports.view import (
     slugs_of,
 )
 from rockcheck.scenes import Scene, excitations
-from rockcheck.validation.discrepancy import figures, measures
+from rockcheck.validation.discrepancy import ensemble, figures, impacts, measures
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -251,14 +251,15 @@ def payload(view: SceneView) -> dict[str, Any]:
 
 def summary(view: SceneView) -> str:
     """The figure of a scene in words: each model's peak rotation, impacts and outcome."""
-    said = []
+    sentences = []
     for model, history in view.histories.items():
         whole = figures.WindowedHistory(history)
-        impacts = "" if whole.silent else f"{len(whole.events(*figures.IMPACTS))} impacts, "
+        count = len(whole.events(*impacts.IMPACTS))
+        impact_count = "" if whole.silent else f"{count} impacts, "
         peak = number(history.peak_rotation / view.scene.block.alpha)
         reached = f"peak {peak} α, " if history.overturned_at is None else ""
-        said.append(f"{model}: {reached}{impacts}{history.fate}")
-    return "; ".join(said) + "."
+        sentences.append(f"{model}: {reached}{impact_count}{history.fate}")
+    return "; ".join(sentences) + "."
 
 
 def fineness(view: SceneView, channel: Channel, bands: Sequence[Band]) -> float:
@@ -566,10 +567,10 @@ class EnsembleView(View):
             for model, (peaks, _) in self.curves.items()
         }
         known, reference = self.looks, self.references[0]
-        same = float(kstwobign.ppf(measures.CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
+        same = float(kstwobign.ppf(ensemble.CONFIDENCE)) * math.sqrt(2.0 / min(counts.values()))
         ends = (0.0, float(grid[-1]))
         band = Series(
-            f"no difference at the {measures.CONFIDENCE:.0%} level",
+            f"no difference at the {ensemble.CONFIDENCE:.0%} level",
             ends,
             (0.0,),
             (-same, -same),
@@ -602,7 +603,7 @@ class EnsembleView(View):
         """Peak rotation of each scene by each model against the reference's."""
         reference, known, panels = self.references[0], self.looks, []
         for model in [one for one in self.curves if one != reference]:
-            pair = measures.Samples(self.record.samples[reference], self.record.samples[model])
+            pair = ensemble.Samples(self.record.samples[reference], self.record.samples[model])
             x, y = (
                 np.where(one.fallen, FALLEN, np.clip(one.peaks, LOWEST, MOST * 1.6))
                 for one in (pair.reference, pair.candidate)

@@ -24,7 +24,7 @@ from rockcheck.scenes import (
     errors,
 )
 from rockcheck.validation import Discrepancy
-from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.discrepancy import figures, impacts
 
 
 def number(value: float | None, digits: int = 3) -> str:
@@ -137,7 +137,7 @@ def history_html(history: History) -> str:
     time, size, cost = history.channels["t"], history.alpha or 1.0, history.cost
     peak = f"{number(history.peak_rotation / size)} {'α' if history.alpha else 'rad'}"
     whole = figures.WindowedHistory(history)
-    kinds = Counter(event.kind for event in whole.events(*figures.IMPACTS))
+    kinds = Counter(event.kind for event in whole.events(*impacts.IMPACTS))
     facts = {
         "outcome": history.fate,
         "peak rotation": peak if history.overturned_at is None else "",

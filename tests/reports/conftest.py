@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import PAPER_BLOCK, Cost, Event, Floor, Ricker, Scene, Wall, observation
-from rockcheck.validation.discrepancy import figures, measures
+from rockcheck.validation.discrepancy import ensemble, figures, measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.execute.store import HISTORIES
 from rockcheck.validation.suite import results
@@ -167,7 +167,7 @@ def crowd(scatter: float) -> tuple[results.EnsembleRecord, list[results.Cell]]:
     peaks = np.geomspace(0.02, 2.0, 40)
     other = peaks * np.exp(scatter * np.sin(np.arange(40.0)))
     samples = {
-        model: measures.Sample(
+        model: ensemble.Sample(
             values, tuple("overturned left" if value > 1.0 else "at rest" for value in values)
         )
         for model, values in (("ebm-unilateral", peaks), ("cm", other))
@@ -191,7 +191,7 @@ def crowd(scatter: float) -> tuple[results.EnsembleRecord, list[results.Cell]]:
         outcomes={model: tuple(sample.outcomes) for model, sample in samples.items()}
         | {"mujoco": (NASTY,) * 40},
     )
-    pair = measures.Samples(samples["ebm-unilateral"], samples["cm"])
+    pair = ensemble.Samples(samples["ebm-unilateral"], samples["cm"])
     figures = tuple(
         evaluate(measure, pair, "alpha", against="ebm-unilateral")
         for measure in measures.STATISTICS.values()

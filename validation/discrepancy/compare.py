@@ -22,7 +22,6 @@ from rockcheck.scenes import (
     errors,
 )
 from rockcheck.validation.discrepancy.figures import (
-    TURNS,
     Figure,
     Measure,
     Pair,
@@ -30,6 +29,7 @@ from rockcheck.validation.discrepancy.figures import (
     WindowedHistory,
     extremes_in,
 )
+from rockcheck.validation.discrepancy.impacts import TURNS
 from rockcheck.validation.discrepancy.measures import DIFFERENCES, FIGURES
 from rockcheck.validation.finding import Column
 

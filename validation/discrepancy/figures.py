@@ -6,10 +6,9 @@ Measures see one history (`WindowedHistory`) or two on one time axis (`Pair`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import compress, pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +24,14 @@ from rockcheck.scenes import (
     history,
     interpolation,
     kinematics,
+)
+from rockcheck.validation.discrepancy.impacts import (
+    IMPACTS,
+    SAME_IMPACT,
+    TURNS,
+    MatchedImpacts,
+    joined,
+    match_impacts,
 )
 
 #: Start of the note of a figure that is undefined here, such as a ratio to zero.
@@ -84,15 +91,6 @@ class Figure(Stored):
 
 Value = float | tuple[float, str]
 STANDARD_GRAVITY = 9.81
-#: Impacts of two histories are the same impact if they lie within this time, s.
-SAME_IMPACT = 0.020
-#: Impacts of one kind in one history are one if they lie within this time, s: of corners that
-#: strike together, which models tell as one or one by one, and of a corner that rattles.
-ONE_IMPACT = 2e-3
-#: Impacts weaker than this share of the history's strongest of their kind need no counterpart.
-WEAK_IMPACT = 0.01
-IMPACTS = ("floor impact", "wall impact")
-TURNS = ("overturned left", "overturned right")
 
 
 class Unavailable(Exception):
@@ -238,15 +236,15 @@ class WindowedHistory:
         """The extremes of the whole run, or between the rows in the window."""
         if self.is_whole:
             return extremes_in(self.history, self.scene)
-        inside = [one for one in self.history.event_list if self.since <= one.t <= self.until]
-        fell = [one.kind for one in inside if one.kind in TURNS]
+        inside = [event for event in self.history.event_list if self.since <= event.t <= self.until]
+        falls = [event.kind for event in inside if event.kind in TURNS]
         track = interpolation.track_of(self.history.channels, self.history.event_list)
         return interpolation.extremes_of(
             track.since(self.since).until(self.until),
             self.history.block if self.scene is None else self.scene.block,
             () if self.scene is None else self.scene.walls,
             inside,
-            fell[0] if fell else "moving",
+            falls[0] if falls else "moving",
             source="rows",
             gravity=self.gravity,
         )
@@ -262,12 +260,11 @@ class WindowedHistory:
             else event
             for event in sorted(self.history.event_list, key=lambda event: event.t)
         ]
-        return [
-            event
-            for kind in kinds
-            for event in _joined([event for event in named if event.kind == kind])
-            if start - 1e-9 <= event.t <= self.until + 1e-9
-        ]
+        selected: list[Event] = []
+        for kind in kinds:
+            of_kind = joined([event for event in named if event.kind == kind])
+            selected += [event for event in of_kind if start - 1e-9 <= event.t <= self.until + 1e-9]
+        return selected
 
     @property
     def silent(self) -> bool:
@@ -278,15 +275,6 @@ class WindowedHistory:
     def heights(self) -> Floats:
         """Height of the lowest corner above the floor, m."""
         return kinematics.pivot_height(self.block, self.channel("y"), self.channel("theta"))
-
-
-def _joined(events: Sequence[Event]) -> list[Event]:
-    """Of events of one kind, in order of time, the strongest of those within `ONE_IMPACT`."""
-    starts = np.flatnonzero(np.diff([e.t for e in events], prepend=-math.inf) > ONE_IMPACT)
-    return [
-        max(events[i:j], key=lambda e: abs(e.impulse))
-        for i, j in pairwise([*starts.tolist(), len(events)])
-    ]
 
 
 class Pair:
@@ -306,9 +294,10 @@ class Pair:
         until: float = math.inf,
     ) -> None:
         self.reference, self.candidate = reference, candidate
-        t, other = (np.asarray(one.channels["t"], float) for one in (reference, candidate))
-        self.start = max(float(t[0]), float(other[0]))
-        self.end = min(float(t[-1]), float(other[-1]), until)
+        t = np.asarray(reference.channels["t"], float)
+        candidate_t = np.asarray(candidate.channels["t"], float)
+        self.start = max(float(t[0]), float(candidate_t[0]))
+        self.end = min(float(t[-1]), float(candidate_t[-1]), until)
         self.scene = scene
         self.time: Floats = t[(t >= self.start - 1e-9) & (t <= self.end + 1e-9)]
         known = candidate if reference.alpha is None else reference
@@ -317,8 +306,12 @@ class Pair:
 
     def channels(self, name: str) -> Floats:
         """One column of both on `time`: reference and candidate, a row each."""
-        both = WindowedHistory(self.reference), WindowedHistory(self.candidate)
-        return np.array([one.at(name, self.time) for one in both])
+        return np.array(
+            [
+                WindowedHistory(self.reference).at(name, self.time),
+                WindowedHistory(self.candidate).at(name, self.time),
+            ]
+        )
 
     @cached_property
     def theta(self) -> Floats:
@@ -335,13 +328,14 @@ class Pair:
     @property
     def peaks(self) -> tuple[float, float]:
         """Largest |theta| of both, rad; raises `Unavailable` as `rocking`."""
-        peaks = [
-            WindowedHistory(one, self.scene, until=self.end, since=self.start).extremes
-            for one in (self.reference, self.candidate)
-        ]
-        if peaks[0].peak_rotation <= history.STILL:
+        reference, candidate = (
+            WindowedHistory(model_history, self.scene, until=self.end, since=self.start)
+            for model_history in (self.reference, self.candidate)
+        )
+        reference_peak = reference.extremes.peak_rotation
+        if reference_peak <= history.STILL:
             raise Unavailable(f"{NOT_DEFINED}: the reference does not rotate")
-        return peaks[0].peak_rotation, peaks[1].peak_rotation
+        return reference_peak, candidate.extremes.peak_rotation
 
     @cached_property
     def energies(self) -> Floats:
@@ -350,7 +344,11 @@ class Pair:
             kinematics.energy(
                 self.known.block,
                 self.known.gravity,
-                *map(self.channels, ("y", "theta", "x_dot", "y_dot", "theta_dot")),
+                self.channels("y"),
+                self.channels("theta"),
+                self.channels("x_dot"),
+                self.channels("y_dot"),
+                self.channels("theta_dot"),
             )
         )
 
@@ -369,9 +367,9 @@ class Pair:
     def sprague_geers(self) -> tuple[float, float]:
         """Magnitude and phase errors M and P of theta (Sprague and Geers)."""
         reference, candidate = self.rocking
-        rr, cc, rc = (
-            self.mean(product) for product in (reference**2, candidate**2, reference * candidate)
-        )
+        rr = self.mean(reference**2)
+        cc = self.mean(candidate**2)
+        rc = self.mean(reference * candidate)
         if cc == 0.0:
             raise Unavailable("only one of the two rotates")
         cosine = rc / math.sqrt(rr * cc)
@@ -385,68 +383,29 @@ class Pair:
         A counterpart may lie just beyond it. A history without any event, unlike the other's, does
         not record them: raises `Unavailable`; so does one that is `silent`.
         """
-        both = [
-            WindowedHistory(one, until=self.end + SAME_IMPACT).events(
-                *IMPACTS, *TURNS, start=self.start - SAME_IMPACT
-            )
-            for one in (self.reference, self.candidate)
-        ]
-        for one, others in ((self.reference, both[1]), (self.candidate, both[0])):
-            if WindowedHistory(one).silent or (others and not one.event_list):
-                raise Unavailable(f"{one.model} has no events")
-
-        def inside(*events: Event) -> bool:
-            return any(self.start - 1e-9 <= event.t <= self.end + 1e-9 for event in events)
-
-        pairs, *alone = match_impacts(*both)
-        first, second = ([event for event in events if inside(event)] for events in alone)
-        return [pair for pair in pairs if inside(*pair)], first, second
-
-
-#: Matched impacts as (reference, candidate), and those of either without a counterpart.
-MatchedImpacts = tuple[list[tuple[Event, Event]], list[Event], list[Event]]
-
-
-def match_impacts(reference: Sequence[Event], candidate: Sequence[Event]) -> MatchedImpacts:
-    """Match impacts of one kind within `SAME_IMPACT`, nearest first.
-
-    Weak impacts (`WEAK_IMPACT`) need no counterpart, and take none from those that do. Overturning
-    counts as an event of its own kind.
-    """
-    kinds = IMPACTS + TURNS
-    reference, candidate = (
-        sorted(events, key=lambda e: (e.t, kinds.index(e.kind)))
-        for events in (reference, candidate)
-    )
-    # exactly so far apart: a pair, whichever of the two comes first
-    times, within = np.array([e.t for e in candidate]), SAME_IMPACT + 1e-9
-    needs, others_need = strong(reference), strong(candidate)
-    near = [
-        # of two equally near the first
-        (not (needs[i] and others_need[j]), round(abs(times[j] - first.t), 9), i, j)
-        for i, first in enumerate(reference)
-        for j in range(*np.searchsorted(times, [first.t - within, first.t + within]))
-        if candidate[j].kind == first.kind
-    ]
-    partners: dict[int, int] = {}
-    taken: set[int] = set()
-    for *_, i, j in sorted(near):
-        if i not in partners and j not in taken:
-            partners[i] = j
-            taken.add(j)
-    only_reference, only_candidate = (
-        [e for n, e in compress(enumerate(events), need) if n not in matched]
-        for events, need, matched in (
-            (reference, needs, partners),
-            (candidate, others_need, taken),
+        reference_events = self._events_near(self.reference)
+        candidate_events = self._events_near(self.candidate)
+        _check_records_events(self.reference, candidate_events)
+        _check_records_events(self.candidate, reference_events)
+        matched, only_reference, only_candidate = match_impacts(reference_events, candidate_events)
+        return (
+            [match for match in matched if self._is_inside(match[0]) or self._is_inside(match[1])],
+            [event for event in only_reference if self._is_inside(event)],
+            [event for event in only_candidate if self._is_inside(event)],
         )
-    )
-    pairs = [(reference[i], candidate[j]) for i, j in sorted(partners.items())]
-    return pairs, only_reference, only_candidate
+
+    def _events_near(self, model_history: History) -> list[Event]:
+        """Impacts and falls within the common time, or so near that they may have counterparts."""
+        windowed = WindowedHistory(model_history, until=self.end + SAME_IMPACT)
+        start = self.start - SAME_IMPACT
+        return windowed.events(*IMPACTS, *TURNS, start=start)
+
+    def _is_inside(self, event: Event) -> bool:
+        return self.start - 1e-9 <= event.t <= self.end + 1e-9
 
 
-def strong(impacts: Sequence[Event]) -> list[bool]:
-    """Which impacts are not weak (`WEAK_IMPACT`) among those of their kind."""
-    kinds = {event.kind for event in impacts}
-    most = {k: max(abs(event.impulse) for event in impacts if event.kind == k) for k in kinds}
-    return [abs(event.impulse) >= WEAK_IMPACT * most[event.kind] for event in impacts]
+def _check_records_events(model_history: History, others: list[Event]) -> None:
+    """Raises `Unavailable` for a history without events, where the other history has `others`."""
+    no_events = others and not model_history.event_list
+    if no_events or WindowedHistory(model_history).silent:
+        raise Unavailable(f"{model_history.model} has no events")

@@ -23,7 +23,7 @@ from rockcheck.scenes import (
     printable,
 )
 from rockcheck.scenes.history import outcome_of
-from rockcheck.validation.discrepancy.figures import TURNS
+from rockcheck.validation.discrepancy.impacts import TURNS
 
 CONFIDENCE = 0.95
 #: Columns that are averaged; a mode or an event has no mean.

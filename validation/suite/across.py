@@ -27,8 +27,8 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from rockcheck.scenes import InputError, errors, experience, printable, reading
+from rockcheck.validation.discrepancy.ensemble import SMALLEST_PEAK
 from rockcheck.validation.discrepancy.figures import Stored
-from rockcheck.validation.discrepancy.measures import SMALLEST_PEAK
 from rockcheck.validation.finding import (
     Axis,
     Block,

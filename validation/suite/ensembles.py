@@ -13,6 +13,7 @@ import numpy as np
 
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
+from rockcheck.validation.discrepancy.ensemble import Sample, Samples
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.suite import judging, motions, results, suites
 from rockcheck.validation.suite.comparing import ComparedFigure
@@ -86,7 +87,7 @@ def _total_cost(records: Sequence[BatchRecord]) -> results.CostRecord:
     return results.CostRecord(**totals)
 
 
-def _failure(sample: measures.Sample) -> str:
+def _failure(sample: Sample) -> str:
     """Why an ensemble has no result of a model: its first failure; empty if it has one."""
     if not sample.failures:
         return ""
@@ -119,6 +120,6 @@ def _figures(
     for yardstick in yardsticks:
         if yardstick == model or yardstick not in finished:
             continue
-        samples = measures.Samples(finished[yardstick], finished[model])
+        samples = Samples(finished[yardstick], finished[model])
         for measure in measures.STATISTICS.values():
             yield ComparedFigure(evaluate(measure, samples, "alpha", against=yardstick))

@@ -8,7 +8,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from rockcheck.scenes import Scene
-from rockcheck.validation.discrepancy.figures import SAME_IMPACT, Figure
+from rockcheck.validation.discrepancy.figures import Figure
+from rockcheck.validation.discrepancy.impacts import SAME_IMPACT
 from rockcheck.validation.suite import results
 from rockcheck.validation.uncertainty import numerical, population
 

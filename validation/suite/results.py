@@ -26,7 +26,8 @@ import numpy as np
 from pydantic import Field, ValidationError, field_validator
 
 from rockcheck.scenes import Cost, InputError, Scene, errors, printable, reading, writing
-from rockcheck.validation.discrepancy import impact_laws, measures
+from rockcheck.validation.discrepancy import impact_laws
+from rockcheck.validation.discrepancy.ensemble import Sample
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.finding import Verdict
 from rockcheck.validation.uncertainty import population
@@ -222,15 +223,15 @@ class EnsembleRecord(Stored):
     outcomes: dict[str, tuple[str, ...]]
 
     @cached_property
-    def samples(self) -> dict[str, measures.Sample]:
+    def samples(self) -> dict[str, Sample]:
         """By model: peaks (alpha, NaN where it failed) and outcomes of all scenes."""
         return {
-            model: measures.Sample(np.array(peaks, dtype=float), self.outcomes[model])
+            model: Sample(np.array(peaks, dtype=float), self.outcomes[model])
             for model, peaks in self.peaks.items()
         }
 
     @property
-    def finished(self) -> dict[str, measures.Sample]:
+    def finished(self) -> dict[str, Sample]:
         """The `samples` of the models that have a result in every scene."""
         return {model: sample for model, sample in self.samples.items() if not sample.failures}
 

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Floats
-from rockcheck.validation.discrepancy import measures
+from rockcheck.validation.discrepancy import ensemble
 
 #: Sets of motions drawn anew for the band.
 DRAWS = 400
@@ -40,7 +40,7 @@ class Lognormal:
     def band(self, intensity: Floats) -> tuple[Floats, Floats]:
         """The band of `CONFIDENCE` around the curve."""
         curves = [_curve(intensity, median, dispersion) for median, dispersion in self.draws]
-        half = 0.5 * measures.CONFIDENCE
+        half = 0.5 * ensemble.CONFIDENCE
         low, high = np.quantile(curves, (0.5 - half, 0.5 + half), axis=0)
         return low, high
 
@@ -62,7 +62,7 @@ def fit_least(least: Sequence[float], beyond: Sequence[float]) -> Lognormal | No
     median, dispersion = _fit(known, happened)
     sets = np.random.default_rng(_SEED).integers(len(known), size=(DRAWS, len(known)))
     draws = tuple(_fit(known[rows], happened[rows]) for rows in sets if happened[rows].sum() > 1)
-    half = 0.5 * measures.CONFIDENCE
+    half = 0.5 * ensemble.CONFIDENCE
     low, high = np.quantile([one for one, _ in draws], (0.5 - half, 0.5 + half)).tolist()
     return Lognormal(median, dispersion, low, high, draws)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Floats, InputError, Scene, files, kinematics
-from rockcheck.validation.discrepancy import measures
+from rockcheck.validation.discrepancy import ensemble
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.uncertainty.proportions import exact_interval
 
@@ -244,7 +244,7 @@ def propagate(
     )
     stands, fallen = found.side == 0, found.side[1:] != 0
     share = scipy.stats.binomtest(int(np.sum(fallen)), count).proportion_ci(
-        measures.CONFIDENCE, method="wilson"
+        ensemble.CONFIDENCE, method="wilson"
     )
     return Inputs(
         samples=count,
@@ -321,7 +321,7 @@ def sensitivities(
 
 def _ends(values: Floats | list[float]) -> Floats:
     """The ends of the interval of `CONFIDENCE` of values, which may be rows."""
-    half = 0.5 * measures.CONFIDENCE
+    half = 0.5 * ensemble.CONFIDENCE
     return np.quantile(values, (0.5 - half, 0.5 + half), axis=0)
 
 

@@ -18,7 +18,7 @@ import scipy
 from numpy.typing import NDArray
 
 from rockcheck.scenes import Floats
-from rockcheck.validation.discrepancy import measures
+from rockcheck.validation.discrepancy import ensemble
 
 #: Fewer records than this are called few: with six an interval of 95 % is half of the axis long.
 FEW_RECORDS = 7
@@ -65,7 +65,7 @@ def wilson_interval(
     share: float | Floats, count: float | NDArray[np.int64]
 ) -> tuple[Floats, Floats]:
     """The ends of Wilson's interval (1927) of a share of `count` independent runs."""
-    z = NormalDist().inv_cdf(0.5 + 0.5 * measures.CONFIDENCE)
+    z = NormalDist().inv_cdf(0.5 + 0.5 * ensemble.CONFIDENCE)
     z2 = z * z / count
     middle = (share + 0.5 * z2) / (1.0 + z2)
     half = np.sqrt(z2 * share * (1.0 - share) + 0.25 * z2 * z2) / (1.0 + z2)
@@ -76,7 +76,7 @@ def exact_interval(
     share: float | Floats, count: float | NDArray[np.int64]
 ) -> tuple[Floats, Floats]:
     """The ends of the interval of Clopper and Pearson (1934), also for parts of a run."""
-    tail = 0.5 - 0.5 * measures.CONFIDENCE
+    tail = 0.5 - 0.5 * ensemble.CONFIDENCE
     hits, misses = np.multiply(share, count), np.multiply(1.0 - np.asarray(share), count)
     with np.errstate(invalid="ignore"):
         low = scipy.special.betaincinv(hits, misses + 1.0, tail)

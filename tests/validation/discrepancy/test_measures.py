@@ -10,7 +10,8 @@ from rockcheck import Event, EventBasedModel, Floor, compare, load_scene
 from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import describe
-from rockcheck.validation.discrepancy.figures import Pair, match_impacts
+from rockcheck.validation.discrepancy.figures import Pair
+from rockcheck.validation.discrepancy.impacts import match_impacts
 from rockcheck.validation.suite import suites
 
 T = np.linspace(0.0, 10.0, 4001)

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import ttest_1samp
 
 from rockcheck.reports.figures import EnsembleView
-from rockcheck.validation.discrepancy import measures
+from rockcheck.validation.discrepancy import ensemble, measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.runner import run_suite
@@ -68,8 +68,8 @@ def test_scenes_are_drawn_alike_whatever_the_count(loaded):
 
 
 def test_the_order_of_blocks_that_hardly_rock_is_no_distance():
-    still, noise = (measures.Sample(np.full(10, size), ["at rest"] * 10) for size in (1e-12, 1e-9))
-    assert measures.STATISTICS["ks_distance"].evaluate(measures.Samples(still, noise)) == (
+    still, noise = (ensemble.Sample(np.full(10, size), ["at rest"] * 10) for size in (1e-12, 1e-9))
+    assert measures.STATISTICS["ks_distance"].evaluate(ensemble.Samples(still, noise)) == (
         0.0,
         "p = 1",
     )
@@ -93,8 +93,8 @@ def test_noise_has_the_spectrum_that_it_states(loaded):
 
 def test_statistics_of_a_sample_against_itself():
     peaks = np.exp(0.3 * np.random.default_rng(3).standard_normal(4000) - 1.5)
-    sample = measures.Sample(peaks, tuple(np.where(peaks > 0.4, "overturned left", "at rest")))
-    same = measures.Samples(sample, sample)
+    sample = ensemble.Sample(peaks, tuple(np.where(peaks > 0.4, "overturned left", "at rest")))
+    same = ensemble.Samples(sample, sample)
     assert {name: measure.evaluate(same)[0] for name, measure in measures.STATISTICS.items()} == {
         "ks_distance": 0.0,
         "area_metric": 0.0,
@@ -107,21 +107,21 @@ def test_statistics_of_a_sample_against_itself():
 
 
 def test_statistics_of_known_outcomes():
-    reference = measures.Sample(
+    reference = ensemble.Sample(
         np.ones(4), ("overturned left", "at rest", "moving", "overturned right")
     )
-    other = measures.Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving"))
+    other = ensemble.Sample(np.ones(4), ("overturned left", "overturned left", "moving", "moving"))
     names = ("overturning_accuracy", "overturning_precision", "overturning_recall", "ks_distance")
     found = [
-        measures.STATISTICS[name].evaluate(measures.Samples(reference, other))[0] for name in names
+        measures.STATISTICS[name].evaluate(ensemble.Samples(reference, other))[0] for name in names
     ]
     assert found == [0.5, 0.5, 0.5, 0.0]
-    lost = measures.Sample(
+    lost = ensemble.Sample(
         np.array([1.0, math.nan, math.inf, 1.0]), ("moving", "", *reference.outcomes[:2])
     )
     assert (lost.failures, list(lost.fallen)) == (2, [False, False, True, False])
     unknown = evaluate(
-        measures.STATISTICS["ks_distance"], measures.Samples(reference, lost), "alpha"
+        measures.STATISTICS["ks_distance"], ensemble.Samples(reference, lost), "alpha"
     )
     assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
 
@@ -176,11 +176,11 @@ def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
 
 def samples(
     reference: list[float], candidate: list[float], fallen: tuple[int, ...] = ()
-) -> measures.Samples:
+) -> ensemble.Samples:
     """Peaks of both; in the scenes `fallen` the candidate falls."""
     ends = tuple("overturned left" if n in fallen else "at rest" for n in range(len(candidate)))
-    safe = measures.Sample(np.array(reference), ("at rest",) * len(reference))
-    return measures.Samples(safe, measures.Sample(np.array(candidate), ends))
+    safe = ensemble.Sample(np.array(reference), ("at rest",) * len(reference))
+    return ensemble.Samples(safe, ensemble.Sample(np.array(candidate), ends))
 
 
 @pytest.mark.parametrize(
@@ -285,7 +285,7 @@ def test_what_a_statistic_tells_apart():
 BIAS, SCATTER, AGREE = 0.05, 0.2, 0.9
 
 
-def made_up(chance) -> measures.Samples:
+def made_up(chance) -> ensemble.Samples:
     """Peaks whose ratios are lognormal, and outcomes of which nine in ten agree; who falls has no
     ratio."""
     peaks = chance.uniform(0.2, 0.8, 60)
@@ -293,8 +293,8 @@ def made_up(chance) -> measures.Samples:
     other = np.where(outcomes == "at rest", "overturned left", "at rest")
     theirs = np.where(chance.random(60) < AGREE, outcomes, other)
     ratios = np.exp(BIAS + SCATTER * chance.standard_normal(60))
-    return measures.Samples(
-        measures.Sample(peaks, list(outcomes)), measures.Sample(peaks * ratios, list(theirs))
+    return ensemble.Samples(
+        ensemble.Sample(peaks, list(outcomes)), ensemble.Sample(peaks * ratios, list(theirs))
     )
 
 

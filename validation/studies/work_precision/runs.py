@@ -19,7 +19,7 @@ import pandas as pd
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon, spectrum
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
-from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.discrepancy import impacts
 from rockcheck.validation.discrepancy.compare import compare
 from rockcheck.validation.execute import models
 from rockcheck.validation.study import Task
@@ -381,7 +381,7 @@ class Play(Task):
         errors = compare(reference, history, measures=["theta_rms", "theta_peak"])
         first = [
             min(
-                (event.t for event in h.event_list if event.kind in figures.IMPACTS),
+                (event.t for event in h.event_list if event.kind in impacts.IMPACTS),
                 default=math.nan,
             )
             for h in (reference, history)
