@@ -30,7 +30,7 @@ test-all: $(VENV)/.ready ## also the slow ones
 	$(BIN)/python -m pytest -q
 
 nightly: $(VENV)/.ready ## what is too long for each change; NIGHTLY_QUICK=1 for a short form; the results go to docs/nightly.json
-	$(INSTALL) --editable '.[audit,fuzz,engines,parquet]'
+	$(INSTALL) --editable '.[audit,fuzz,engines]'
 	$(BIN)/python .ci/nightly.py
 
 # The core is compiled, and its lines are then not seen: the second run interprets it, on fewer tests.

@@ -14,7 +14,7 @@ from rockcheck.reports.show.words import duration, number, ratio, unit, window
 from rockcheck.reports.style import Look, label_of, looks
 from rockcheck.reports.view import FALL, SceneView, fall_to
 from rockcheck.scenes import Side, experience
-from rockcheck.scenes.history import events_path
+from rockcheck.scenes.history_files import events_path
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import (
     Axis,

@@ -23,7 +23,8 @@ from rockcheck.scenes import (
     kinematics,
     reading,
 )
-from rockcheck.scenes.history import COLUMNS, events_path
+from rockcheck.scenes.columns import COLUMNS
+from rockcheck.scenes.history_files import events_path
 from rockcheck.validation.discrepancy import compare
 from rockcheck.validation.suite import results
 

@@ -35,7 +35,6 @@ HERE: dict[str, bool] = {
     "POSIX": os.name == "posix",
     "Linux": Path("/proc/self/task").exists(),
     "git": shutil.which("git") is not None,
-    "pyarrow": find_spec("pyarrow") is not None,
     "obspy": find_spec("obspy") is not None,
 }
 #: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the
@@ -43,7 +42,6 @@ HERE: dict[str, bool] = {
 MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
-    "needs pyarrow": True,  # an extra of 50 MB, which `make nightly` installs
     "needs obspy": True,  # the extra `seismology`
     "needs POSIX": sys.platform == "win32",
 }

@@ -29,7 +29,7 @@ from rockcheck.commands import (
 )
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
-from rockcheck.scenes.history import check_format
+from rockcheck.scenes.history_files import check_format
 from rockcheck.scenes.progress import LISTENER, ONE_RUN, announcing, within
 from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.execute import models, pool, store
@@ -101,8 +101,8 @@ def run(
         typer.Option(
             "-o",
             "--output",
-            help="File to write, repeatable: a history as .csv, .csv.gz, .json or .mat, its figure"
-            f" as {ENDINGS} (default: SCENE--MODEL.csv).",
+            help="File to write, repeatable: a history as .csv or .csv.gz, its figure as"
+            f" {ENDINGS} (default: SCENE--MODEL.csv).",
         ),
     ] = None,
     settings: Annotated[
@@ -113,7 +113,7 @@ def run(
 ) -> None:
     """Simulate one scene with one model.
 
-    Writes the history as CSV, its events to a second file beside it; or both to one .json or .mat.
+    Writes the history as CSV, its events to a second file beside it.
     A figure shows rotation, slip and impacts.
     """
     check_one_model(model, "simulate")

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 
 from rockcheck.commands.cli import main
-from rockcheck.scenes import history
 from rockcheck.validation.execute.models import FAMILIES, not_installed
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
@@ -100,10 +99,9 @@ FILES = {
         (["compare", "a.csv", "b.csv", "--until", "1", "--until=2"], "--until: is given twice"),
         (
             ["simulate", "fig5a", "-o", "x.xlsx"],
-            "x.xlsx: a history is written as .csv, .csv.gz, .json, .mat or .parquet, not as .xlsx;"
-            " its figure as .svg, .png, .pdf",
+            "x.xlsx: a history is written as .csv or .csv.gz, not as .xlsx; its figure as .svg,"
+            " .png, .pdf",
         ),
-        (["simulate", "fig5a", "-o", "x.parquet"], "needs the package pyarrow: pip install"),
         (["simulate", "fig5a", "-o", "no/a.png"], "--output: no: no such folder"),
         (["accept", "scene.toml"], "scene.toml: is a scene, not a suite; `rockcheck validate`"),
         (["validate", "scene.toml", "--strict"], "--strict: scene.toml is a scene, and nothing"),
@@ -204,9 +202,8 @@ FILES = {
         ),
     ],
 )
-def test_bad_input_is_one_line_and_exit_2(words, said, refused, monkeypatch):
+def test_bad_input_is_one_line_and_exit_2(words, said, refused):
     """Before anything is played or written."""
-    monkeypatch.setattr(history, "find_spec", lambda name: None)  # as without pyarrow
     for name, text in FILES.items():
         Path(name).write_text(text, "utf-8")
     assert said in refused(*words)

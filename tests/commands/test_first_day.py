@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.io import loadmat
+from scipy.io import loadmat, savemat
 
 from rockcheck.scenes import History
 
@@ -65,43 +65,15 @@ def test_without_a_model_the_reference_plays(typed):
     assert Path("fig5a--ebm-unilateral.csv").exists()
 
 
-#: Of each format: what reads it, and from that the channels, all about it and what happened.
-FORMATS = {
-    "a.json": (
-        lambda: json.loads(Path("a.json").read_text()),
-        lambda found: (found["channels"], found, found["events"]["kind"]),
-    ),
-    "a.mat": (
-        lambda: loadmat("a.mat", simplify_cells=True),  # which makes no list of one event
-        lambda found: (found["channels"], found["about"], [found["events"]["kind"]]),
-    ),
-    "a.parquet": (
-        lambda: (pd.read_parquet("a.parquet"), pd.read_parquet("a.events.parquet")),
-        lambda found: (
-            found[0],
-            found[0].attrs["rockcheck_history"],
-            list(found[1]["kind"]),
-        ),
-    ),
-}
-
-
-@pytest.mark.parametrize(
-    "file", ["a.json", "a.mat", pytest.param("a.parquet", marks=pytest.mark.needs("pyarrow"))]
-)
-def test_a_history_in_another_format_is_that_of_the_csv(typed, file):
-    simulated(typed, "Falls", "a.csv", "-o", file)
-    table = History.load("a.csv")
-    read, parts = FORMATS[file]
-    channels, about, kinds = parts(read())
-    assert (about["outcome"], [*about["centre_of_mass"]], kinds, list(channels)) == (
-        table.outcome,
-        [0.05, -0.25],
-        [event.kind for event in table.event_list],
-        list(table.channels),
-    )
-    for name, column in table.channels.items():
-        np.testing.assert_array_equal(channels[name], column)
+def test_pandas_takes_a_history_to_other_formats(typed):
+    """As docs/tutorial.md says: a file of JSON that `json` reads, and one of MATLAB."""
+    simulated(typed, "Falls", "a.csv")
+    table = pd.read_csv("a.csv", comment="#")
+    table.to_json("a.json", double_precision=15)
+    savemat("a.mat", dict(table.items()))
+    theta = History.load("a.csv").channels["theta"]
+    np.testing.assert_allclose(pd.read_json("a.json")["theta"], theta, atol=1e-14)
+    np.testing.assert_array_equal(loadmat("a.mat")["theta"].ravel(), theta)
 
 
 def test_of_a_fallen_block_the_time_is_told_not_the_peak(typed):

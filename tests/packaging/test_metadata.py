@@ -92,7 +92,7 @@ def test_every_import_is_a_declared_dependency(top):
     declared = names_of(everywhere) | {"llvmlite"}  # which is numba's
     extras = {
         name
-        for extra in ("iso", "cluster", "parquet", "pybullet", "engines", "seismology")
+        for extra in ("iso", "cluster", "pybullet", "engines", "seismology")
         for name in names_of(PROJECT["project"]["optional-dependencies"][extra])
     }
     for path, tree in sources(top).items():

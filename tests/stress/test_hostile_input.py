@@ -26,7 +26,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import History, InputError, Scene, load_scene, recordings
-from rockcheck.scenes.history import HEAD
+from rockcheck.scenes.history_files import HEAD
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import (
     COMPARISONS,

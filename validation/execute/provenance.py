@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from rockcheck.scenes import InputError, Scene
-from rockcheck.scenes.history import events_path
+from rockcheck.scenes.history_files import events_path
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import Store, name_of
 
