@@ -49,7 +49,9 @@ def _decide(block, base, state):
     One that nothing decides is given up in time.
     """
     watches, late = state.control.extremes, state.t >= state.t_end
-    still = state.t >= state.quiet_from and stands_still(state.mode)
+    # What the base has held against a wall until now may be released.
+    held = INSTANT if on_wall(state.mode) else 0.0
+    still = state.t >= state.quiet_from + held and stands_still(state.mode)
     if state.repeats or still or (watches and all_is_met(block, state)):
         state.ending = Ending.DONE
         return

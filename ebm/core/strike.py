@@ -241,6 +241,8 @@ def _strike_all(block, base, run, resting):
         state.rules[Rule.WEDGED] += 1
         impact.e_tip = impact.e_far = 0.0
     contact_impact(block, state)
+    if state.event == Event.FLOOR_IMPACT and not floor:
+        state.event = Event.WALL_IMPACT  # in flight along a wall it turns flush against it
     given = impact.given
     _push_by_wall(state, sign, given[Contact.TIP_TOP] + given[Contact.TIP_BOTTOM])
     _push_by_wall(state, -sign, given[Contact.FAR_BOTTOM] + given[Contact.FAR_TOP])

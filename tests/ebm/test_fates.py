@@ -18,7 +18,17 @@ from rockcheck.ebm.fates import (
     RunTable,
     play_fates,
 )
-from rockcheck.scenes import PAPER_BLOCK, Floor, InputError, Record, Rest, Ricker, Scene, Wall
+from rockcheck.scenes import (
+    PAPER_BLOCK,
+    Block,
+    Floor,
+    InputError,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Wall,
+)
 from rockcheck.scenes.history import OUTCOMES
 from tests.ebm.cases import pulse_scene, random_scene
 
@@ -94,6 +104,20 @@ def test_fates_are_those_of_histories_of_a_minute():
     assert fates.overturned.tolist() == fell
     assert fates.outcome[fell].tolist() == np.array(ends)[fell].tolist()
     assert 10 < sum(fell) < 70
+
+
+@pytest.mark.parametrize("seconds", [1.0, 2.0, 4.0])
+@pytest.mark.parametrize("push", [4.0, 6.0])
+def test_a_block_held_against_a_wall_is_released_where_the_push_ends(push, seconds):
+    """It leans to the left at rest, and falls over its weaker corner once nothing holds it."""
+    scene = resting(duration=60.0).replace(
+        block=Block(half_width=0.25, half_height=1.0, centre_of_mass=(0.1, 0.0)),
+        walls=[Wall(side="left", gap=0.5, restitution=0.0)],
+        excitation=Record.from_samples([push] * 5, 0.25 * seconds),
+        output_step=0.1,
+    )
+    assert MODEL.simulate(scene).outcome == "overturned right"
+    assert OUTCOMES[fates_of(scene).outcome[0]] == "overturned right"
 
 
 def test_fates_of_blocks_with_an_offset_mass():

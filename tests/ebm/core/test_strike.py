@@ -222,3 +222,22 @@ def test_a_tilt_of_rounding_is_set_upright_about_its_pivot(tilt):
 def test_a_gap_that_is_closed_to_rounding(gap, rate, seen):
     """It rests where it closes slowly, and has no depth where it is let go."""
     assert contacts.closed_gap(gap, rate) == seen
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", -1.0), ("right", 1.0)])
+def test_a_flying_block_that_turns_flush_against_a_wall_strikes_no_floor(side, sign):
+    """In the air its upper corner strikes, then its lower one as the block passes upright."""
+    scene = Scene(
+        name="flies",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.3),
+        walls=[Wall(side=side, gap=0.1, restitution=0.0)],
+        initial_height=0.5,
+        initial_rotation=0.02 * sign,
+        initial_velocity=sign,
+        duration=0.3,
+    )
+    history = EventBasedModel(pivot="unilateral").simulate(scene)
+    strikes = history.extremes.walls[side].strikes
+    assert strikes == 3
+    assert [event.kind for event in history.event_list] == ["wall impact"] * strikes
