@@ -324,9 +324,9 @@ class Plan:
                     fine,
                     coarse,
                     asked.values or coarse,
-                    tuple(run.reach.get(asked.side, math.inf) for run in runs.results),
+                    tuple(_reach_of(run, asked.side) for run in runs.results),
                     tuple(run.stands for run in runs.results),
-                    **self._batch_effort(len(fine) + 2 * len(coarse) * len(runs.results)),
+                    **self._batch_effort(len(fine) + len(coarse) * len(runs.results)),
                 )
                 for case, runs in free.items()
             }
@@ -416,6 +416,11 @@ def clearance_of(free: Mapping[str, results.Drawn], side: Side) -> float | None:
         run.reach[side] for runs in free.values() for run in runs.results if side in run.reach
     ]
     return max(reaches, default=None)
+
+
+def _reach_of(run: results.RunResult, side: Side) -> float:
+    """How far (m) a run reaches; a run that was not decided may reach any wall."""
+    return run.reach.get(side, math.inf) if run.decided else math.inf
 
 
 def least_gap(scene: Scene, side: Side) -> float:

@@ -163,8 +163,9 @@ class GapTask(DrawTask):
     """The search over the gap of the wall on one side.
 
     `fine` are the gaps (m) at which the scene as it is is looked at, `coarse` those for its draws,
-    `tabulated` those at which all runs are counted with their speeds. `reach` and `free_stands` are
-    of each run without the wall: a wall beyond its reach changes nothing.
+    `tabulated`, which are among both, those at which all runs are counted with their speeds.
+    `reach` and `free_stands` are of each run without the wall: a wall beyond its reach changes
+    nothing. The reach is infinite where that run was not decided.
     """
 
     side: Side = "left"
@@ -180,46 +181,81 @@ class GapTask(DrawTask):
         counter = _Counter()
 
         def stands(which: NDArray[np.int64], gaps: Floats) -> NDArray[np.bool_]:
-            struck = gaps <= np.array(self.reach)[which]
-            standing = np.array(self.free_stands)[which]
-            if struck.any():
-                played = self.batch(which[struck], (self.side, gaps[struck]), self.restitution)
-                standing[struck] = counter.standing(played)
-            return standing
+            return self._at(which, gaps, counter).stands
 
-        as_it_is, draws = np.array([0]), np.arange(1, len(self.scenes))
+        as_it_is = np.array([0])
         intervals = _searched(stands, as_it_is, np.array(self.fine), GAP_RESOLUTION)
-        intervals += _searched(stands, draws, np.array(self.coarse), GAP_RESOLUTION)
+        # The look at the draws is the table, too: no run of them is played twice.
+        counted = np.arange(1 if self.draws else 0, len(self.scenes))
+        grid = np.unique(np.round(self.coarse if self.draws else self.tabulated, 12))
+        look = self._at(
+            np.repeat(counted, len(grid)), np.tile(grid, len(counted)), counter, speeds=True
+        )
+        if self.draws:
+            seen = look.stands.reshape(len(counted), -1)
+            intervals += _narrowed(stands, counted, seen, grid, GAP_RESOLUTION)
         return results.GapSearch(
             intervals=tuple(intervals),
-            rows=self._tabulated(counter),
+            rows=self._rows_of(look, grid),
             undecided=counter.undecided,
             runs=counter.runs,
         )
 
-    def _tabulated(self, counter: "_Counter") -> tuple[results.GapRow, ...]:
-        """The runs that count, at the tabulated gaps: the draws, or the scene as it is."""
-        runs = np.arange(1 if self.draws else 0, len(self.scenes))
-        which = np.tile(runs, len(self.tabulated))
-        gaps = np.repeat(np.array(self.tabulated), len(runs))
-        played = self.batch(which, (self.side, gaps), self.restitution, extremes=True)
-        counter.standing(played)
-        assert played.extremes is not None, "asked for"
-        strikes = played.extremes[f"wall_{self.side}_strikes"].reshape(-1, len(runs))
-        speeds = played.extremes[f"wall_{self.side}_speed"].reshape(-1, len(runs))
-        outcome = played.outcome.reshape(-1, len(runs))
+    def _at(
+        self,
+        which: NDArray[np.int64],
+        gaps: Floats,
+        counter: "_Counter",
+        *,
+        speeds: bool = False,
+    ) -> "_AtGaps":
+        """What becomes of rows of `scenes` at gaps. A wall out of reach is not played."""
+        count = len(which)
+        at_gaps = _AtGaps(
+            stands=np.array(self.free_stands)[which],
+            overturned=~np.array(self.free_stands)[which],
+            undecided=np.zeros(count, dtype=bool),
+            speed=np.full(count, np.nan),
+        )
+        near = np.flatnonzero(gaps <= np.array(self.reach)[which])
+        if not near.size:
+            return at_gaps
+        played = self.batch(which[near], (self.side, gaps[near]), self.restitution, extremes=speeds)
+        at_gaps.stands[near] = counter.standing(played)
+        at_gaps.overturned[near] = np.isin(played.outcome, OVERTURNED)
+        at_gaps.undecided[near] = played.outcome >= fates.UNDECIDED
+        if played.extremes is not None:
+            strikes = played.extremes[f"wall_{self.side}_strikes"]
+            speed = played.extremes[f"wall_{self.side}_speed"]
+            at_gaps.speed[near] = np.where(strikes > 0, speed, np.nan)
+        return at_gaps
+
+    def _rows_of(self, look: "_AtGaps", grid: Floats) -> tuple[results.GapRow, ...]:
+        """The table: the runs that count at each tabulated gap."""
+        overturned = look.overturned.reshape(-1, len(grid))
+        undecided = look.undecided.reshape(-1, len(grid))
+        speed = look.speed.reshape(-1, len(grid))
+        columns = np.searchsorted(grid, np.round(self.tabulated, 12))
         return tuple(
             results.GapRow(
                 gap=gap,
-                runs=len(runs),
-                overturned=int(np.isin(codes, OVERTURNED).sum()),
-                undecided=int((codes >= fates.UNDECIDED).sum()),
-                speeds=tuple(speed[struck > 0].tolist()),
+                runs=len(speed),
+                overturned=int(overturned[:, column].sum()),
+                undecided=int(undecided[:, column].sum()),
+                speeds=tuple(speed[~np.isnan(speed[:, column]), column].tolist()),
             )
-            for gap, codes, struck, speed in zip(
-                self.tabulated, outcome, strikes, speeds, strict=True
-            )
+            for gap, column in zip(self.tabulated, columns, strict=True)
         )
+
+
+@dataclass(frozen=True)
+class _AtGaps:
+    """What became of runs, an array element a run; `speed` is NaN where the wall is not struck."""
+
+    stands: NDArray[np.bool_]
+    overturned: NDArray[np.bool_]
+    undecided: NDArray[np.bool_]
+    speed: Floats
 
 
 @dataclass(frozen=True)
@@ -293,6 +329,17 @@ def _searched(
     if not len(runs) or not len(grid):
         return []
     seen = stands(np.repeat(runs, len(grid)), np.tile(grid, len(runs))).reshape(len(runs), -1)
+    return _narrowed(stands, runs, seen, grid, resolution)
+
+
+def _narrowed(
+    stands: search.Stands,
+    runs: NDArray[np.int64],
+    seen: NDArray[np.bool_],
+    grid: Floats,
+    resolution: Floats | float,
+) -> list[results.FallInterval]:
+    """The same, where it is `seen` (runs x values) which of them stand at the grid's values."""
     found = search.falls_within(lambda which, at: stands(runs[which], at), seen, grid, resolution)
     return [
         results.FallInterval(
