@@ -4,11 +4,9 @@ Each block is rendered from one description. All pages have one look, made of th
 `data/templates`.
 """
 
-import hashlib
 import math
-import re
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, replace
 from importlib import resources
@@ -18,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
-from rockcheck.reports import drawers, style
+from rockcheck.reports import drawers, manifest, style
 from rockcheck.reports.show.words import (
     duration,
     moment,
@@ -35,8 +33,6 @@ from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Tex
 FIGURES = "figures"
 #: The data of a figure, and limits of drawing it anew: s, and MB.
 PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
-#: The files of a study in its run.json: their hashes by their names.
-FILES = TypeAdapter(dict[str, str])
 #: Characters above which a text has a wide column.
 LONG_TEXT = 24
 #: Of a verdict: its sign, and its colour on a terminal.
@@ -161,32 +157,23 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     return path
 
 
-def hash_of(content: str | bytes) -> str:
-    """SHA-256 of a file's content, by which the next run knows it for its own."""
-    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
-
-
 def _left_by_another(folder: Path, hashes: Mapping[str, str]) -> Iterator[str]:
     """Files of the run that was in the folder, which this one does not have.
 
-    No other file is taken for one: it has the hash that run.json says, and a figure's stamp is that
-    of the data beside it.
+    A figure goes with its data, where its stamp is that of the data.
     """
     before: dict[str, str] = {}
     with suppress(InputError, KeyError, TypeError, ValidationError):
-        before = FILES.validate_python(
+        before = manifest.HASHES.validate_python(
             reading.read_json(reading.within(folder, "run.json"))["files"]
         )
-    for name in before.keys() - hashes.keys():
-        with suppress(InputError):
-            content = reading.read_bytes(reading.within(folder, name))
-            if hash_of(content) != before[name]:
-                continue
-            yield name
-            stamp, figure = style.stamp_of(content.decode(errors="replace")), Path(name)
-            drawn = figure.with_suffix(".svg")
-            if figure.parts[0] == FIGURES and stamp.split()[0] in style.stamp_in(folder / drawn):
-                yield str(drawn)
+    left_over = {name: before[name] for name in before.keys() - hashes.keys()}
+    for name, content in manifest.unchanged(folder, left_over):
+        yield name
+        stamp, data = style.stamp_of(content.decode(errors="replace")), Path(name)
+        drawn = data.with_suffix(".svg")
+        if data.parts[0] == FIGURES and stamp.split()[0] in style.stamp_in(folder / drawn):
+            yield str(drawn)
 
 
 def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
@@ -207,8 +194,8 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
         **data,
         "summary.md": markdown(found),
     }
-    hashes = {name: hash_of(content) for name, content in contents.items()}
-    remove(folder, _left_by_another(folder, hashes))
+    hashes = {name: manifest.hash_of(content) for name, content in contents.items()}
+    manifest.remove(folder, _left_by_another(folder, hashes))
     contents["run.json"] = writing.json_text(found.as_dict() | {"files": hashes}) + "\n"
     for name, content in contents.items():
         *parts, last = name.split("/")
@@ -284,32 +271,9 @@ def write_page(folder: Path, address: str, template: str, **context: Any) -> Pat
     )
 
 
-def belongings(page: Path) -> set[str]:
-    """The figures and data of a page of a run, from its folder; none of a page without a stamp.
-
-    No other file is taken for one, whatever is linked by a page that somebody sent.
-    """
-    if not style.stamp_in(page):
-        return set()
-    names = re.findall(
-        r'(?:href|src)="((?:pages/)?(?:figures|data|scene-files)/\w[\w.~-]*)"',
-        reading.head_of(page, reading.MOST_BYTES),
-        re.ASCII,
-    )
-    drawn = [name.removesuffix(".svg") + ".json" for name in names if name.endswith(".svg")]
-    return {*names, *drawn, f"{FIGURES}/{page.stem}~small.svg"}
-
-
 def folder_argument(folder: Path) -> str:
     """A page's folder in its commands: as the user gave it, of an absolute path the name."""
     return shlex.quote(folder.name if folder.is_absolute() else folder.as_posix())
-
-
-def remove(folder: Path, names: Iterable[str]) -> None:
-    """Remove files of a folder; raises `InputError` where a link leads out of it."""
-    for name in names:
-        *parts, last = name.split("/")
-        (reading.within(folder, *parts) / last).unlink(missing_ok=True)
 
 
 def write_assets(folder: Path) -> None:

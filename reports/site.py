@@ -7,7 +7,7 @@ import os
 import platform
 import re
 import sys
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from rockcheck.reports import document, drawers, figures, style, tables
+from rockcheck.reports import document, drawers, figures, manifest, style, tables
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import (
@@ -97,17 +97,19 @@ def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     The histories are there already. Pages of an earlier run are removed, since they show other
     numbers: the index, the trend, and unless it is to have `pages` all. Two runs take turns.
     """
-    told = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
-    told |= {"junit.xml": junit(run), "summary.md": markdown(run)}
+    contents = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
+    contents |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
-        if not pages:
-            _remove(folder)
+        earlier = manifest.read(folder)
+        if pages:
+            index = {name: content_hash for name, content_hash in earlier.items() if name == INDEX}
+            manifest.remove_left_over(folder, index)
+        else:
+            manifest.remove_left_over(folder, earlier)
+            manifest.remove(folder, [manifest.MANIFEST])
         if (folder / "trend/run.json").is_file():
-            document.remove(folder, ["trend/index.html"])
-        index = document.belongings(folder / INDEX)  # none of a page that is not ours
-        document.remove(folder, {name for name in index if "~small." not in name})
-        document.remove(folder, [INDEX] * bool(index))
-        writing.write_together({folder / name: content for name, content in told.items()})
+            manifest.remove(folder, ["trend/index.html"])
+        writing.write_together({folder / name: content for name, content in contents.items()})
         return run.save(folder)
 
 
@@ -131,7 +133,6 @@ def write_site(
     folder: Path,
     *,
     jobs: int = 1,
-    afresh: bool = True,
     wanted: Sequence[str] = (),
     all_figures: bool = False,
     on_progress: progress.OnProgress = progress.unheard,
@@ -145,38 +146,18 @@ def write_site(
     shows over time it draws itself.
 
     In a large run the scenes that are `shown` have a page, and those that are `wanted`. Pages are
-    made in up to `jobs` processes. Unless `afresh`, one stays that shows the same as it would now.
-    What belonged to scenes without a page is removed. Raises `InputError` where a wanted scene is
-    not of the run.
+    made in up to `jobs` processes. Files of earlier pages that these do not have are removed.
+    Raises `InputError` where a wanted scene is not of the run.
     """
     with _turn(folder):
+        earlier = manifest.read(folder)
         pages = _Pages(folder, wanted, all_figures)
         document.write_assets(folder)
-        stamps = {name: pages.stamp(view) for name, view in pages.views.items()}
-        waiting = {
-            name: stamp
-            for name, stamp in stamps.items()
-            if afresh or style.stamp_in(folder / pages.links[name]) != stamp
-        }
-        few = sum(PRINTED if pages.views[name].printed else 1 for name in waiting) < FEW
-        calls = [
-            pool.Call(pages.write, one)
-            if few
-            else pool.Call(_write_page, (folder, pages.wanted, all_figures, *one))
-            for one in (*waiting.items(), ("", ""))
-        ]
-        written = drawers.side_by_side(calls, 1 if few else min(jobs, len(waiting)), least=2)
-        for done, _ in enumerate(written, 1):
-            on_progress(done, len(calls))
-        _remove(folder, {INDEX, *pages.links.values()})
+        paths = _write_pages(pages, jobs, on_progress)
+        written = {path.relative_to(folder).as_posix() for path in paths}
+        manifest.remove_left_over(folder, earlier, written)
+        manifest.write(folder, paths)
     return folder / INDEX
-
-
-def _remove(folder: Path, kept: Collection[str] = ()) -> None:
-    """Remove pages with their figures and data, by their stamps; addresses that are `kept` stay."""
-    for page in (folder / INDEX, *(folder / document.PAGES).glob("*.html")):
-        if page.relative_to(folder).as_posix() not in kept and style.stamp_in(page):
-            document.remove(page.parent, [page.name, *document.belongings(page)])
 
 
 class _Pages:
@@ -196,19 +177,19 @@ class _Pages:
             raise errors.unknown_name("scene of the run", unknown[0], slugs)
         self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
-            figures.EnsembleView(self.run, one.name, slugs[one.name], one)
-            for one in self.run.ensembles
+            figures.EnsembleView(self.run, record.name, slugs[record.name], record)
+            for record in self.run.ensembles
         ]
-        found: list[SceneView | figures.EnsembleView] = [*self.scenes, *self.ensembles]
-        self.views = {view.name: view for view in found}
-        self.links = {view.name: f"{document.PAGES}/{view.slug}.html" for view in found}
+        views: list[SceneView | figures.EnsembleView] = [*self.scenes, *self.ensembles]
+        self.views = {view.name: view for view in views}
+        self.links = {view.name: f"{document.PAGES}/{view.slug}.html" for view in views}
         #: What every page shows, and calls.
         self.common: dict[str, Any] = {
             "site": {
                 "name": f"rockcheck: {self.run.suite}",
                 "links": [
                     *self.links.items(),
-                    *(one for one in STUDIES if (folder / one[1]).exists()),
+                    *((title, page) for title, page in STUDIES if (folder / page).exists()),
                 ],
             },
             "run": self.run,
@@ -222,25 +203,26 @@ class _Pages:
             "row_cells": document.row_cells,
         }
 
-    def write(self, name: str, stamp: str) -> None:
-        """Write figures and data, and last the page, with its `stamp`; without a name the index."""
+    def write(self, name: str) -> list[Path]:
+        """Write figures and data, and last the page; without a name the index.
+
+        Returns the files that it has written.
+        """
         view, address = self.views.get(name), self.links.get(name, INDEX)
-        page = self.folder / address
-        before = document.belongings(page)
         match view:
             case SceneView():
-                template, shown = "scene.html", self._write_scene(view)
+                template, (context, paths) = "scene.html", self._write_scene(view)
             case figures.EnsembleView():
-                template, shown = "finding.html", self._write_ensemble(view)
+                template, (context, paths) = "finding.html", self._write_ensemble(view)
             case None:
-                template, shown = "index.html", self._write_index()
-        document.write_page(
-            self.folder, address, template, view=view, stamp=stamp, **shown, **self.common
+                template, (context, paths) = "index.html", self._write_index()
+        page = document.write_page(
+            self.folder, address, template, view=view, **context, **self.common
         )
-        document.remove(page.parent, before - document.belongings(page))
+        return [*paths, page]
 
-    def _write_scene(self, view: SceneView) -> dict[str, Any]:
-        """Write a scene's figures and data; returns what its page shows beside the view.
+    def _write_scene(self, view: SceneView) -> tuple[dict[str, Any], list[Path]]:
+        """Write a scene's figures and data; returns what its page shows beside the view, and them.
 
         The figures are a thumbnail of all rotations, and where the run asks for them those for a
         paper.
@@ -249,27 +231,30 @@ class _Pages:
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
-        style.save_as(figures.thumbnail(curves), drawn / f"{view.slug}~small.svg", named=False)
+        thumbnail = drawn / f"{view.slug}~small.svg"
+        paths = [style.save_as(figures.thumbnail(curves), thumbnail, named=False)]
         stems = self._stems(view)
         for against, stem in stems.items():
-            style.save(figures.histories_figure(view, against), drawn / stem, self.formats)
-        writing.write_whole(
-            writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js",
-            writing.script_text("window.rockcheck", figures.payload(view)),
-        )
-        beside = [None, *self.scenes, None]
-        place = beside.index(view)
-        return {
-            "files": write_scene_file(
-                view.scene, writing.made(self.folder, document.PAGES, "scene-files"), view.slug
-            ),
-            "previous": beside[place - 1],
-            "following": beside[place + 1],
+            figure = figures.histories_figure(view, against)
+            paths += style.save(figure, drawn / stem, self.formats)
+        data = writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js"
+        payload = writing.script_text("window.rockcheck", figures.payload(view))
+        paths.append(writing.write_whole(data, payload))
+        scene_folder = writing.made(self.folder, document.PAGES, "scene-files")
+        scene_files = write_scene_file(view.scene, scene_folder, view.slug)
+        paths += [scene_folder / name for name in scene_files]
+        neighbours = [None, *self.scenes, None]
+        number = neighbours.index(view)
+        context = {
+            "files": scene_files,
+            "previous": neighbours[number - 1],
+            "following": neighbours[number + 1],
             "facts": scene_facts(view.scene),
             "beyond": experience.outside(view.scene),
             "summary": figures.summary(view),
             "stems": stems,
         }
+        return context, paths
 
     def _stems(self, view: SceneView) -> dict[str | None, str]:
         """The names of a scene's figures for print, by the reference of their differences."""
@@ -282,34 +267,33 @@ class _Pages:
             for number, against in enumerate(references)
         }
 
-    def _write_ensemble(self, view: figures.EnsembleView) -> dict[str, Any]:
-        """Write an ensemble's figures and tables; returns what its page shows beside the view."""
+    def _write_ensemble(self, view: figures.EnsembleView) -> tuple[dict[str, Any], list[Path]]:
+        """Write an ensemble's figures and tables; returns what its page shows, and them."""
         page, drawn = view.page(), writing.made(self.folder, document.PAGES, document.FIGURES)
         curves = [
             (*view.curves[model], look)
             for model, look in view.looks.items()
             if model in view.curves
         ]
-        style.save_as(
-            figures.thumbnail(curves, step=True), drawn / f"{view.slug}~small.svg", named=False
-        )
+        thumbnail = drawn / f"{view.slug}~small.svg"
+        paths = [style.save_as(figures.thumbnail(curves, step=True), thumbnail, named=False)]
         for plot in page.plots():
-            style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
+            paths += style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
         for table in page.tables():
             *parts, name = table.name.split("/")
-            writing.write_whole(
-                writing.made(self.folder, document.PAGES, *parts) / f"{name}.csv",
-                document.csv(table),
-            )
-        return {"found": page}
+            path = writing.made(self.folder, document.PAGES, *parts) / f"{name}.csv"
+            paths.append(writing.write_whole(path, document.csv(table)))
+        return {"found": page}, paths
 
-    def _write_index(self) -> dict[str, Any]:
-        """Write the figures of the index; returns what it shows."""
+    def _write_index(self) -> tuple[dict[str, Any], list[Path]]:
+        """Write the figures of the index; returns what it shows, and them."""
         drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
         blocks, matrix = tables.accuracy(self.run), tables.matrix(self.run)
-        for plot in (block for block in blocks if isinstance(block, Plot)):
-            style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
-        return {
+        paths = []
+        for block in blocks:
+            if isinstance(block, Plot):
+                paths += style.save(drawers.figure_of(block), drawn / block.name, self.formats)
+        context = {
             "scenes": self.scenes,
             "ensembles": self.ensembles,
             "links": self.links,
@@ -323,48 +307,34 @@ class _Pages:
             "accuracy": blocks,
             "glance": tables.glance(self.run, matrix),
         }
+        return context, paths
 
-    def stamp(self, view: SceneView | figures.EnsembleView) -> str:
-        """The stamp of a page (`stamp_of`), for all that it shows.
 
-        When the run was, and what was read back, does not count.
-        """
-        return style.stamp_of(
-            {
-                "what": view.record.model_dump(mode="json")
-                if isinstance(view, figures.EnsembleView)
-                else [self.run.scenes[view.name], view.stride, view.printed],
-                "cells": [
-                    cell.model_dump(mode="json", exclude={"read_back"}) for cell in view.cells
-                ],
-                "run": self.run.model_dump(
-                    mode="json",
-                    include={
-                        "suite": True,
-                        "reference": True,
-                        "model_form": True,
-                        "models": True,
-                        "measures": True,
-                        "versions": True,
-                        "hardware": True,
-                        "judged": True,
-                        "inputs": {view.name},
-                    },
-                ),
-                "links": self.common["site"]["links"],
-                "formats": self.formats,
-            }
-        )
+def _write_pages(pages: _Pages, jobs: int, on_progress: progress.OnProgress) -> list[Path]:
+    """Write all pages, the index last; returns the files that belong to them."""
+    views = pages.views.values()
+    are_few = sum(PRINTED if view.printed else 1 for view in views) < FEW
+    if are_few:
+        calls = [pool.Call(pages.write, (name,)) for name in pages.views]
+        jobs = 1
+    else:
+        arguments = pages.folder, pages.wanted, pages.all_figures
+        calls = [pool.Call(_write_page, (*arguments, name)) for name in pages.views]
+    paths = []
+    for done, of_page in enumerate(drawers.side_by_side(calls, jobs, least=2), 1):
+        paths += of_page
+        on_progress(done, len(calls) + 1)
+    paths += pages.write("")
+    on_progress(len(calls) + 1, len(calls) + 1)
+    return paths
 
 
 #: A process of the pool reads the run once for all its pages.
 _pages_of = cache(_Pages)
 
 
-def _write_page(
-    folder: Path, wanted: Sequence[str], all_figures: bool, name: str, stamp: str
-) -> None:
-    _pages_of(folder, wanted, all_figures).write(name, stamp)
+def _write_page(folder: Path, wanted: Sequence[str], all_figures: bool, name: str) -> list[Path]:
+    return _pages_of(folder, wanted, all_figures).write(name)
 
 
 def write_scene_file(scene: Scene, folder: Path, slug: str) -> dict[str, str]:

@@ -218,9 +218,6 @@ def drawn_by() -> str:
 
 
 def stamp_in(path: Path) -> str:
-    """The stamp that an SVG or a page names near its beginning, empty where there is none."""
-    found = re.search(
-        r'(?:<meta name="rockcheck-stamp" content="|<dc:identifier>)([\w ]+)',
-        reading.head_of(path, 4000),
-    )
-    return found[1] if found else ""
+    """The stamp that an SVG names near its beginning, empty where there is none."""
+    identifier = re.search(r"<dc:identifier>([\w ]+)", reading.head_of(path, 4000))
+    return identifier[1] if identifier else ""

@@ -167,7 +167,6 @@ def run(
             page = site.write_site(
                 folder,
                 jobs=played.jobs or os.cpu_count() or 1,
-                afresh=False,
                 all_figures=pages.figures,
                 on_progress=on_progress,
             )
@@ -386,7 +385,6 @@ def report(
             path = site.write_site(
                 folder,
                 jobs=os.cpu_count() or 1,
-                afresh=not scene,
                 wanted=scene or (),
                 all_figures=all_figures,
                 on_progress=on_progress,

@@ -9,6 +9,7 @@ import stat
 
 import pytest
 
+from rockcheck.reports.manifest import MANIFEST, hash_of
 from rockcheck.reports.site import LOCK, keep, write_site
 from rockcheck.validation.execute.store import HISTORIES, Store
 from rockcheck.validation.suite import results
@@ -67,6 +68,15 @@ def test_no_folder_of_a_run_is_written_through(tmp_path, received, fault_of, par
     (received / part).symlink_to(tmp_path / "elsewhere")
     assert f"{part}: a link" in str(fault_of(write, received))
     assert not list((tmp_path / "elsewhere").iterdir())
+
+
+def test_no_file_outside_a_run_is_removed_for_its_list_of_pages(tmp_path, received):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    (received / MANIFEST).parent.mkdir()
+    (received / MANIFEST).write_text(json.dumps({"../victim": hash_of("mine")}), "utf-8")
+    published(received)
+    assert victim.read_text() == "mine"
 
 
 TRAPS = {

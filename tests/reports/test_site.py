@@ -4,7 +4,6 @@ are reproducible."""
 import html
 import inspect
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from rockcheck.commands import OUT, assess, studies
 from rockcheck.reports.document import PAGES, folder_argument
 from rockcheck.reports.drawers import GREY, colours
 from rockcheck.reports.figures import EnsembleView
+from rockcheck.reports.manifest import MANIFEST
 from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
@@ -195,69 +195,67 @@ def test_the_command_of_the_page_runs_as_it_stands(site, monkeypatch, tmp_path, 
     assert History.load(tmp_path / "again.csv").model == "ebm-unilateral"
 
 
-def files_of(site):
-    """By name: time of writing and content of all that belongs to the scenes' pages, not to the
-    index."""
+def files_of(site) -> dict[str, bytes]:
+    """By name, all that belongs to the scenes' pages, not to the index."""
     return {
-        path.relative_to(site / PAGES).as_posix(): (path.stat().st_mtime_ns, path.read_bytes())
+        path.relative_to(site / PAGES).as_posix(): path.read_bytes()
         for path in (site / PAGES).rglob("*")
-        if path.is_file() and path.parent.name != "assets" and path.stem != PEAKS
+        if path.is_file()
+        and path.parent.name != "assets"
+        and path.stem != PEAKS
+        and path != site / MANIFEST
     }
 
 
-def test_only_what_would_show_something_else_is_written_again_and_what_is_gone_goes(
-    tmp_path, site, finished
-):
-
-    def again(**change: object) -> dict[str, tuple[int, bytes]]:
-        finished.model_copy(update=change).save(tmp_path)
-        write_site(tmp_path, afresh=False)
-        return files_of(tmp_path)
-
+def test_pages_made_side_by_side_are_those_made_one_by_one(tmp_path, site, finished, monkeypatch):
+    monkeypatch.setattr("rockcheck.reports.site.FEW", 0)
     write_site(tmp_path, jobs=2)
-    first = files_of(tmp_path)
     # Commands on a page name its folder.
     here, there = (f"rockcheck report {folder.name}".encode() for folder in (tmp_path, site))
-    written = {name: content.replace(here, there) for name, (_, content) in first.items()}
-    assert written == {name: content for name, (_, content) in files_of(site).items()}
+    written = {name: content.replace(here, there) for name, content in files_of(tmp_path).items()}
+    assert written == files_of(site)
 
-    cells = tuple(cell.model_copy(update={"read_back": True}) for cell in finished.cells)
-    assert again(created="2026-01-02T00:00:00+00:00", wall_seconds=1.0, cells=cells) == first
-    assert "2026-01-02" in (tmp_path / "index.html").read_text("utf-8")
 
-    one, *others = finished.cells
-    second = again(
-        cells=(one.model_copy(update={"cost": replace(one.cost, wall_seconds=9.0)}), *others),
-        inputs={
-            "Free": population.Inputs(
-                samples=7,
-                model="ebm",
-                names=("mu",),
-                figures=(),
-                overturns={"name": "overturns", "value": 0.5, "low": 0.2, "high": 0.8, "unit": "1"},
-                sensitivities=(),
-            )
-        },
+def test_pages_are_written_again_and_those_of_scenes_that_are_gone_go(tmp_path, finished):
+    write_site(tmp_path)
+    inputs = population.Inputs(
+        samples=7,
+        model="ebm",
+        names=("mu",),
+        figures=(),
+        overturns={"name": "overturns", "value": 0.5, "low": 0.2, "high": 0.8, "unit": "1"},
+        sensitivities=(),
     )
-    changed = {name for name in first | second if second[name][1] != first[name][1]}
-    assert (
-        changed,
-        b"7 draws of mu" in second["Free-2.html"][1],
-        all(second[name] == first[name] for name in first if "beside-a-wall" in name),
-    ) == ({"free.html", "Free-2.html"}, True, True)
+    change: dict[str, object] = {"created": "2026-01-02T00:00:00+00:00", "inputs": {"Free": inputs}}
+    finished.model_copy(update=change).save(tmp_path)
+    write_site(tmp_path)
+    assert "2026-01-02" in (tmp_path / "index.html").read_text("utf-8")
+    assert b"7 draws of mu" in files_of(tmp_path)["Free-2.html"]
 
     (tmp_path / PAGES / "figures" / "study.svg").touch()  # of another command, in the same folder
-    left = again(
-        scenes={"free": finished.scenes["free"]},
-        cells=tuple(finished.by_scene["free"].values()),
-        ensembles=(),
-    )
-    assert sorted(left) == [
+    change = {
+        "scenes": {"free": finished.scenes["free"]},
+        "cells": tuple(finished.by_scene["free"].values()),
+        "ensembles": (),
+    }
+    finished.model_copy(update=change).save(tmp_path)
+    write_site(tmp_path)
+    assert sorted(files_of(tmp_path)) == [
         "data/free.js",
         *(f"figures/{name}" for name in ("free.svg", "free~small.svg", "study.svg")),
         "free.html",
         "scene-files/free.toml",
     ]
+
+
+def test_a_page_that_a_user_has_changed_stays(tmp_path, finished):
+    write_site(tmp_path)
+    (tmp_path / PAGES / "crowd.html").write_text("mine", "utf-8")
+    finished.model_copy(
+        update={"ensembles": (), "cells": tuple(c for c in finished.cells if c.scene != "crowd")}
+    ).save(tmp_path)
+    write_site(tmp_path)
+    assert files_of(tmp_path)["crowd.html"] == b"mine"
 
 
 @pytest.mark.long
@@ -272,7 +270,7 @@ def test_a_large_run_has_pages_of_the_scenes_that_are_shown_and_of_those_that_ar
     assert {scenes[one] for one in scenes.keys() & addresses(index)} == {"free"}
     assert re.findall('data-scene="(.*?)"', index) == ["free"]
 
-    write_site(tmp_path, wanted=("beside a wall",), afresh=False)
+    write_site(tmp_path, wanted=("beside a wall",))
     assert (tmp_path / PAGES / "beside-a-wall.html").is_file()
     assert "did you mean 'free'" in str(fault_of(write_site, tmp_path, wanted=("fre",)))
 
@@ -292,7 +290,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
     write_site(tmp_path)
     drawn = (tmp_path / PAGES / "figures" / "free.svg").read_bytes()
     finished.model_copy(update={"printed": ("beside a wall",)}).save(tmp_path)
-    write_site(tmp_path, afresh=False)
+    write_site(tmp_path)
     figures = {path.name for path in (tmp_path / PAGES / "figures").iterdir()}
     assert {name for name in figures if name.startswith(("free", "beside-a-wall."))} == {
         "free~small.svg",
@@ -334,7 +332,7 @@ def test_all_figures_are_written_for_who_asks_and_go_for_who_does_not(tmp_path, 
     assert {"free.svg", "free.pdf", "free.png", "overview~peaks.pdf"} <= written
     assert any("~against-" in name for name in written)
     assert "figures/free.pdf" in addresses((tmp_path / PAGES / "free.html").read_text("utf-8"))
-    write_site(tmp_path, afresh=False)
+    write_site(tmp_path)
     assert {path.suffix for path in figures.iterdir()} == {".svg"}
 
 
