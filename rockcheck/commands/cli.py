@@ -4,10 +4,8 @@ Each command is a function of a module of rockcheck.commands.
 """
 
 import inspect
-import itertools
 import os
 import pkgutil
-import re
 import sys
 import time
 import traceback
@@ -56,8 +54,6 @@ AT_ONCE = ("scenes", "new", "record", "compare")
 
 #: Options that name models: a command has one, and takes the other as well.
 MODEL_OPTIONS = ("--models", "--model")
-#: Options whose value may be left out: the default, and the pattern of a value.
-BARE = {"--strict": ("worse", "worse|both"), "--align": ("best", r"best|[-+.0-9]+(e[-+]?\d+)?")}
 
 EXIT_CODES = {
     0: "done; of a verdict: within tolerance",
@@ -126,8 +122,8 @@ def _options(given: inspect.Parameter) -> list[inspect.Parameter]:
 class _EachOnce(typer.core.TyperCommand):
     """A command that refuses an option given twice, unless the option gathers values.
 
-    Otherwise the last value would silently win. An option of `BARE` may be given without its value.
-    Either of `MODEL_OPTIONS` stands for that which the command has.
+    Otherwise the last value would silently win. Either of `MODEL_OPTIONS` stands for that which the
+    command has.
     """
 
     def __init__(self, name: str | None, **settings: Any) -> None:
@@ -137,13 +133,6 @@ class _EachOnce(typer.core.TyperCommand):
                 option.opts[:0] = [other for other in MODEL_OPTIONS if other not in option.opts]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        own = BARE.keys() & itertools.chain.from_iterable(one.opts for one in self.params)
-        args = [
-            f"{word}={BARE[word][0]}"
-            if word in own and not re.fullmatch(BARE[word][1], after)
-            else word
-            for word, after in itertools.pairwise([*args, ""])
-        ]
         _, _, order = self.make_parser(ctx).parse_args(args=list(args))
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (

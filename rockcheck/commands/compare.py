@@ -16,7 +16,7 @@ from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
 from rockcheck.validation.suite import across, results
 
-#: Value of --align without a time.
+#: Value of --align for the shift at which the rotations agree best.
 BEST = "best"
 
 
@@ -35,8 +35,8 @@ def run(
         str | None,
         typer.Option(
             "--align",
-            metavar="[SECONDS]",
-            help="Shift the candidate in time, by SECONDS, else to where the rotations agree best.",
+            metavar="SECONDS|best",
+            help="Shift the candidate in time, by SECONDS, or to where the rotations agree best.",
         ),
     ] = None,
     until: Annotated[
@@ -72,21 +72,31 @@ def run(
         told(across.difference(results.Run.load(reference), results.Run.load(candidate)))
     if plot is not None:
         check_file(plot, "--plot")
-    what = load_scene(scene) if scene else None
+    common_scene = load_scene(scene) if scene else None
+    seconds = _seconds(align)
+    histories = {"reference": History.load(reference), "candidate": History.load(candidate)}
+    if seconds is None:
+        shift = measured.time_shift(histories["reference"], histories["candidate"])
+    else:
+        shift = seconds
+    shifted = measured.shifted(histories["candidate"], shift)
+    discrepancy = compare(histories["reference"], shifted, until=until, scene=common_scene)
+    hint = hints.hint(histories["reference"], shifted, until, common_scene)
+    finding = _finding(discrepancy, histories, common_scene, shift, _hint_words(hint, shift))
+    figures = [("figure", save_as(discrepancy.plot(), plot))] if plot is not None else []
+    told(finding, said=figures, value=finding.as_dict())
+
+
+def _seconds(align: str | None) -> float | None:
+    """The shift that --align gives, s; None for that at which the rotations agree best."""
+    if align is None:
+        return 0.0
+    if align == BEST:
+        return None
     try:
-        offset = TypeAdapter(FiniteFloat).validate_python(0.0 if align in (None, BEST) else align)
+        return TypeAdapter(FiniteFloat).validate_python(align)
     except ValueError:
-        raise InputError(f"{printable(align)!r}: give seconds, or nothing", "--align") from None
-    given, other = History.load(reference), History.load(candidate)
-    shift = measured.time_shift(given, other) if align == BEST else offset
-    moved = measured.shifted(other, shift)
-    found = compare(given, moved, until=until, scene=what)
-    hint = hints.hint(given, moved, until, what)
-    finding = _finding(
-        found, {"reference": given, "candidate": other}, what, shift, _hint_words(hint, shift)
-    )
-    drawn = (("figure", save_as(found.plot(), path)) for path in (plot,) if path)
-    told(finding, said=drawn, value=finding.as_dict())
+        raise InputError(f"{printable(align)!r}: give seconds, or {BEST}", "--align") from None
 
 
 def _refuse_for_runs(options: Mapping[str, object]) -> None:

@@ -111,8 +111,8 @@ def run(
         Literal["worse", "both"] | None,
         typer.Option(
             "--strict",
-            help="Figures that left their drift band for the worse fail; with `--strict both`"
-            " better ones, too.",
+            help="Figures that left their drift band for the worse fail; with both, better ones,"
+            " too.",
         ),
     ] = None,
     allow_code: AllowCodeOption = None,

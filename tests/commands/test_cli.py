@@ -72,6 +72,8 @@ FILES = {
         (["compare", "gone.csv", "gone.csv"], "gone.csv: cannot be read"),
         (["compare", "scene.toml", "scene.toml"], "scene.toml"),
         (["compare", "a.csv", "b.csv", "--align=nan"], "--align: 'nan': give seconds"),
+        (["compare", "a.csv", "b.csv", "--align"], "'--align' requires an argument"),
+        (["validate", "--strict", "smoke"], "'smoke' is not one of 'worse', 'both'"),
         (["compare", ".", ".", "--until", "1"], "--until: is for histories, not for finished runs"),
         (["record", "one.AT2", "--read", "column=0"], "rockcheck: column: 0 is not allowed"),
         (["report", "gone"], "no finished run here"),
@@ -104,7 +106,10 @@ FILES = {
         ),
         (["simulate", "fig5a", "-o", "no/a.png"], "--output: no: no such folder"),
         (["accept", "scene.toml"], "scene.toml: is a scene, not a suite; `rockcheck validate`"),
-        (["validate", "scene.toml", "--strict"], "--strict: scene.toml is a scene, and nothing"),
+        (
+            ["validate", "scene.toml", "--strict", "both"],
+            "--strict: scene.toml is a scene, and nothing",
+        ),
         (["validate", "scene.toml", "--history", "r"], "--history: scene.toml is a scene, and"),
         (["validate", "smoke", "--history", "no/runs.jsonl"], "--history: no: no such folder"),
         *(
@@ -272,7 +277,7 @@ def test_validate_keeps_the_run_before_it_tells(typed):
     assert [name for name in said if said[name] not in (folder / name).read_text()] == []
     Path("mine.toml").write_text(SUITE.replace("1e-3", "1.2e-3") + LINE.format("0.01"))
     typed(*validate)
-    typed(*validate, "--strict", code=1, holds=["verdict: changed"])
+    typed(*validate, "--strict", "worse", code=1, holds=["verdict: changed"])
     typed(*accept, code=1)
     typed(*accept, "--reason", "it leans more")
-    typed(*validate, "--strict")
+    typed(*validate, "--strict", "worse")

@@ -131,7 +131,7 @@ def test_a_figure_without_tolerance_has_not_failed(typed):
     text = Path("mine.tolerances.toml").read_text()
     assert "outcome_agrees = {expected = 1.0, limit = 0.0, drift = 0.0," in text
     # what agrees is near to no limit, and not listed
-    typed(*validate, "--strict", holds=["verdict: pass"], lacks=["outcome_agrees"])
+    typed(*validate, "--strict", "worse", holds=["verdict: pass"], lacks=["outcome_agrees"])
 
 
 def test_a_no_is_no_share_of_a_limit(typed):
@@ -195,4 +195,4 @@ def test_accept_writes_nothing_that_validate_refuses(typed):
     )
     Path("mine.toml").write_text(aligned, "utf-8")
     typed("accept", *words)
-    typed("validate", *words, "--no-report", "--strict")
+    typed("validate", *words, "--no-report", "--strict", "worse")

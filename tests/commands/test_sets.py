@@ -163,7 +163,7 @@ def test_a_suite_has_tables_of_records(typed):
     )
     assert suite.scenes["rack, RSN1_H2"].excitation.scale == 2.0
     typed("accept", "mine.toml", *CODE, "--jobs", "1")
-    typed("validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict")
+    typed("validate", "mine.toml", *CODE, "--jobs", "1", "--no-report", "--strict", "worse")
 
 
 def test_what_a_reader_assumed_is_told(typed):

@@ -103,7 +103,9 @@ def test_the_action_installs_itself_and_keeps_the_report_whatever_happened():
 
 
 def test_the_action_judges_marks_and_keeps(project):
-    fine, _ = action(project, suite="rockcheck.toml", arguments="--strict --no-report", out="kept")
+    fine, _ = action(
+        project, suite="rockcheck.toml", arguments="--strict worse --no-report", out="kept"
+    )
     assert {name: code for name, (code, _) in fine.items()} == dict.fromkeys(
         ("validate", "annotate", "verdict"), 0
     ), fine

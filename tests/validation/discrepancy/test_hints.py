@@ -109,6 +109,13 @@ def test_compare_adds_the_shift_that_was_given(table, tmp_path, typed):
     typed("compare", *files, "--align", "0.1", holds=["shifted by -0.5 s", "--align -0.4"])
 
 
+def test_compare_shifts_to_where_the_rotations_agree_best(table, tmp_path, typed):
+    table("a.csv", pulse(T), T)
+    table("b.csv", pulse(T, delay=0.4), T)
+    files = str(tmp_path / "a.csv"), str(tmp_path / "b.csv")
+    typed("compare", *files, "--align", "best", holds=["the candidate is shifted by -0.4 s"])
+
+
 @pytest.fixture
 def notes_of_table(tmp_path, written):
     """A function that writes the measured table of a suite, runs it, and gives the notes of it."""

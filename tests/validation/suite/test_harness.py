@@ -51,7 +51,7 @@ def project(tmp_path_factory):
     shutil.copytree(
         ROOT / "rockcheck", folder / "rockcheck", ignore=shutil.ignore_patterns("__pycache__")
     )
-    code, out = run(folder, "--strict")
+    code, out = run(folder, "--strict", "worse")
     assert code == 0, out
     return folder
 
@@ -133,7 +133,7 @@ FAULTS = [
     ("fault", "file", "old", "new", "untouched"), FAULTS, ids=[fault[0] for fault in FAULTS]
 )
 def test_a_deliberate_fault_fails_the_smoke_suite(project, fault, file, old, new, untouched):
-    code, out = run_changed(project, file, old, new, "--strict")
+    code, out = run_changed(project, file, old, new, "--strict", "worse")
     assert code in (1, 3), f"{fault}: {out}"
     assert f"{untouched} of 30 simulations were up to date" in out
     assert "Traceback" not in out

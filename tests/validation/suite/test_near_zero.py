@@ -313,15 +313,14 @@ floor = { friction = 0.5 }
 @pytest.mark.usefixtures("in_an_empty_folder")
 def test_a_better_step_passes_and_is_accepted_without_a_reason(typed):
     """The peak falls from 3.1e-4 to 7.7e-5 alpha, nearer to that of a reference that stands: to
-    which no ratio is defined. Back where it was is worse. The suite is no value of --strict."""
+    which no ratio is defined. Back where it was is worse."""
     figures = {"theta_rms": " against still", "peak_rotation": "", "last_rotation": ""}
     told = [f"short, leans: {name}{against}: 7.67" for name, against in figures.items()]
     better = ["verdict: pass", *told]
     for offset, command, code, holds in (
         ("8e-5", "accept mine.toml", 0, [" new: "]),
-        ("8e-5", "validate mine.toml --strict", 0, ["verdict: pass"]),
-        ("2e-5", "validate mine.toml --strict", 0, better),
-        ("2e-5", "validate --strict mine.toml", 0, better),
+        ("8e-5", "validate mine.toml --strict worse", 0, ["verdict: pass"]),
+        ("2e-5", "validate mine.toml --strict worse", 0, better),
         ("2e-5", "validate mine.toml --strict both", 1, []),
         ("2e-5", "accept mine.toml", 0, [f"{name}: tightened: " for name in figures]),
         ("2e-5", "validate mine.toml --strict both", 0, []),

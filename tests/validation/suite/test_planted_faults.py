@@ -123,7 +123,7 @@ def test_smoke_or_paper_notices(each_night, fault, place):
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", planted.BELOW_TOLERANCE)
 def test_what_no_suite_notices_is_a_change_all_the_same(each_night, fault):
-    """As docs/reliability.md says: only `--strict` fails it."""
+    """As docs/reliability.md says: only `--strict worse` fails it."""
     figures = {
         strict: list(out_of_tolerance(each_night["smoke"], fault, "pybullet", strict))
         for strict in (False, True)

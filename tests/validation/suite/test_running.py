@@ -101,8 +101,8 @@ def test_every_kind_of_failure_fails_its_cell_alone(tmp_path, run, where):
 @pytest.mark.parametrize("strict", [False, True])
 @pytest.mark.parametrize(("python", "status"), [((3, 99), "absent"), ((3, 10), "unavailable")])
 def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, strict, python, status):
-    """Its cells are not played, all others are; the run is incomplete, which `--strict` does not
-    accept. What has no wheel for this Python is named too, and weighs nothing."""
+    """Its cells are not played, all others are; the run is incomplete, which `--strict worse` does
+    not accept. What has no wheel for this Python is named too, and weighs nothing."""
     monkeypatch.setattr("rockcheck.engines.PyBullet.last_python", python)
     monkeypatch.setattr(
         "rockcheck.validation.execute.models.not_installed",
