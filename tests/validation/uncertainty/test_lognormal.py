@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy
 
 from rockcheck.validation.uncertainty.lognormal import fit_least
 
@@ -41,3 +42,23 @@ def test_the_band_holds_the_curve():
 
 def test_one_motion_has_no_curve():
     assert fit_least([0.4], [1.0]) is None
+
+
+def test_the_band_has_no_hole_where_draws_have_no_dispersion():
+    least = [0.2, 0.4, 0.5]
+    low, high = fit_least(least, []).band(np.array(least))
+    assert np.isfinite(low).all()
+    assert np.isfinite(high).all()
+
+
+def test_a_censored_fit_has_the_greatest_likelihood():
+    least, beyond = np.array([0.2, 0.4, 0.5, 0.9]), np.array([0.6, 1.0])
+    fit = fit_least(least.tolist(), beyond.tolist())
+
+    def likelihood(median, dispersion):
+        curve = scipy.stats.lognorm(dispersion, scale=median)
+        return curve.logpdf(least).sum() + curve.logsf(beyond).sum()
+
+    best = likelihood(fit.median, fit.dispersion)
+    for median, dispersion in ((1.001, 1.0), (0.999, 1.0), (1.0, 1.001), (1.0, 0.999)):
+        assert likelihood(fit.median * median, fit.dispersion * dispersion) < best

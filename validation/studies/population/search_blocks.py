@@ -166,7 +166,9 @@ def _curve_plot(answer: IntensityAnswer) -> list[Block]:
     least = sorted(record.least for record in answer.records if record.least is not None)
     if answer.fit is None or not answer.fit.dispersion > 0.0:
         return []
-    x = np.union1d(np.geomspace(0.5 * least[0], 2.0 * least[-1], 100), least)
+    # Just below each step, too: the chart joins the points by lines.
+    steps_at = np.array([least, [(1.0 - 1e-6) * value for value in least]])
+    x = np.union1d(np.geomspace(0.5 * least[0], 2.0 * least[-1], 100), steps_at)
     low, high = answer.fit.band(x)
     steps = [(rank + 1) / len(answer.records) for rank in range(len(least))]
     series = [
