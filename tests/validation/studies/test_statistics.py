@@ -1,6 +1,7 @@
 """The answers of an assessment, of results whose figures can be worked out by hand."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from rockcheck.validation.studies.population import (
     statistics,
 )
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.plan import GapRange, Plan
+from rockcheck.validation.studies.population.plan import GapRange, Plan, gaps_looked_at
 from rockcheck.validation.studies.population.study import finding_of
 from rockcheck.validation.uncertainty import numerical
 
@@ -225,6 +226,28 @@ def test_what_falls_nowhere_is_told_with_how_finely_was_looked():
     assert answer.safe_up_to == 0.1
     assert sentences.gap_sentences([answer])[0].startswith(
         "It stands at any gap (looked at every 1 mm): without the wall it reaches 0.1 m"
+    )
+
+
+def test_most_gaps_of_draws_are_where_blocks_stand():
+    _, of_draws = gaps_looked_at(2.0, ())
+    assert len(of_draws) == 33
+    assert sum(gap <= 0.4 for gap in of_draws) == 25
+    assert of_draws[-1] == 2.0
+
+
+def test_how_finely_was_looked_is_told_on_both_sides_of_where_it_changes():
+    answer = replace(
+        gap_answer(a=search()),
+        high=2.0,
+        finely_up_to=0.4,
+        beyond_every=0.04,
+        draws_every=0.0167,
+        draws_beyond_every=0.2,
+    )
+    assert sentences.looked_words(answer) == (
+        "looked at every 1 mm up to 0.4 m, for draws at every 16.7 mm; beyond, at every 40 mm and"
+        " 0.2 m"
     )
 
 

@@ -39,8 +39,9 @@ BATCH_MODEL = "ebm-unilateral"
 #: Up to `FINE_UP_TO` (m) the scene as it is is looked at every `FINE_GAP` (m): islands of 1 mm are
 #: real. Beyond it, where only a block that falls reaches, `FAR_GAPS` values are looked at.
 FINE_GAP, FINE_UP_TO, FAR_GAPS = 1e-3, 0.4, 40
-#: Parts of the range of gaps at which draws are looked at, and runs are counted.
-COARSE_GAPS = 32
+#: Parts of the range of gaps at which draws are looked at, and runs are counted; where the range
+#: goes beyond `FINE_UP_TO`, how many of them are up to there.
+COARSE_GAPS, COARSE_NEAR = 32, 24
 #: Factors on a motion are looked at from where the block may move, over this range, a share apart.
 FACTOR_RANGE, FACTOR_STEP = 32.0, 0.01
 
@@ -441,7 +442,11 @@ def gaps_looked_at(
     fine_end = min(high, low + FINE_UP_TO)
     fine = low + FINE_GAP * np.arange(math.floor((fine_end - low) / FINE_GAP * (1 + 1e-12)) + 1)
     far = np.linspace(fine_end, high, FAR_GAPS + 1) if high > fine_end else [high]
-    coarse = np.linspace(low, high, COARSE_GAPS + 1) if high > low else [low]
+    if high > fine_end:
+        near = np.linspace(low, fine_end, COARSE_NEAR + 1)
+        coarse = np.append(near, np.linspace(fine_end, high, COARSE_GAPS - COARSE_NEAR + 1)[1:])
+    else:
+        coarse = np.linspace(low, high, COARSE_GAPS + 1) if high > low else np.array([low])
     looked = np.unique(np.round(np.concatenate([fine, far, coarse, values]), 12))
     at_draws = np.unique(np.round(np.concatenate([coarse, values]), 12))
     return tuple(looked.tolist()), tuple(at_draws.tolist())

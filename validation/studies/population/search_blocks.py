@@ -20,6 +20,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.population.results import FallInterval
+from rockcheck.validation.studies.population.sentences import looked_words
 from rockcheck.validation.studies.population.statistics import (
     GapAnswer,
     IntensityAnswer,
@@ -74,8 +75,8 @@ def _interval_tables(answer: GapAnswer) -> list[Block]:
             columns,
             rows,
             "At which gaps it falls",
-            note=f"Looked at every {1e3 * answer.looked_every:.3g} mm, each change narrowed to"
-            " 0.1 mm. Narrower intervals may be missed.",
+            note=f"{looked_words(answer).capitalize()}, each change narrowed to 0.1 mm. Narrower"
+            " intervals may be missed.",
             on="page" if rows else "file",
             folded=len(rows) > 12,
         )

@@ -184,6 +184,10 @@ def looked_words(answer: GapAnswer) -> str:
         words += f" up to {length(answer.finely_up_to)}"
     if answer.draws_every is not None:
         words += f", for draws at every {length(answer.draws_every)}"
+    if answer.beyond_every > 0.0:
+        words += f"; beyond, at every {length(answer.beyond_every)}"
+        if answer.draws_beyond_every is not None:
+            words += f" and {length(answer.draws_beyond_every)}"
     return words
 
 

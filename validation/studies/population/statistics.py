@@ -133,7 +133,8 @@ class GapAnswer:
     """Which gaps on one side are safe.
 
     Gaps (m) from `low` to `high` were looked at: the scene as it is every `looked_every` up to
-    `finely_up_to`, and beyond that as its draws, every `draws_every` (None without draws).
+    `finely_up_to`, and beyond that every `beyond_every`; its draws every `draws_every` and
+    `draws_beyond_every` (None without draws).
     `clearance` is how far the block reaches without the wall, falls included, of which there are
     `free_overturned`. `safe_up_to` is the largest gap up to which no run was seen to fall, None
     where one falls at the smallest; `first` is what falls first above it. `complete` tells whether
@@ -145,7 +146,9 @@ class GapAnswer:
     high: float
     looked_every: float
     finely_up_to: float
+    beyond_every: float
     draws_every: float | None
+    draws_beyond_every: float | None
     clearance: float
     free_overturned: int
     free_runs: int
@@ -183,15 +186,18 @@ def _gap_answer(gathered: Gathered, side: Side) -> GapAnswer | None:
     )
     first = min(falls, key=lambda case: case.intervals[0].low, default=None)
     counted = [run for drawn in free.values() for run in counted_runs(drawn)]
-    fine, coarse = np.array(task.fine), np.array(task.coarse)
     finely = min(task.fine[-1], task.fine[0] + FINE_UP_TO)
+    every, beyond_every = _widest_steps(np.array(task.fine), finely)
+    draws_every, draws_beyond_every = _widest_steps(np.array(task.coarse), finely)
     return GapAnswer(
         side=side,
         low=task.fine[0],
         high=task.fine[-1],
-        looked_every=_widest_step(fine[: np.searchsorted(fine, finely) + 1]),
+        looked_every=every,
         finely_up_to=finely,
-        draws_every=_widest_step(coarse) if task.draws else None,
+        beyond_every=beyond_every,
+        draws_every=draws_every if task.draws else None,
+        draws_beyond_every=draws_beyond_every if task.draws else None,
         clearance=clearance,
         free_overturned=sum(run.overturned for run in counted),
         free_runs=len(counted),
@@ -205,8 +211,12 @@ def _gap_answer(gathered: Gathered, side: Side) -> GapAnswer | None:
     )
 
 
-def _widest_step(grid: np.ndarray) -> float:
-    return float(np.max(np.diff(grid))) if len(grid) > 1 else 0.0
+def _widest_steps(grid: np.ndarray, middle: float) -> tuple[float, float]:
+    """The widest steps of an increasing grid up to `middle` and beyond it; 0 where it has none."""
+    steps = np.diff(grid)
+    is_beyond = grid[:-1] >= middle * (1.0 - 1e-9)
+    near = np.max(steps[~is_beyond], initial=0.0)
+    return float(near), float(np.max(steps[is_beyond], initial=0.0))
 
 
 def counted_runs(drawn: results.Drawn) -> Sequence[results.RunResult]:
