@@ -395,7 +395,7 @@ class Plan:
     def _all_runs(self) -> float:
         """About how many runs there are, but for those of `levels`."""
         rows = 1.0 + max(map(len, self.numbers.values()), default=0)
-        gaps = len(self.gaps) * (300.0 + 2.0 * COARSE_GAPS * rows)
+        gaps = len(self.gaps) * (300.0 + COARSE_GAPS * rows)
         factors = math.log(FACTOR_RANGE) / FACTOR_STEP if self.measure is not None else 0.0
         return len(self.cases) * (6.0 + rows + gaps + factors)
 
