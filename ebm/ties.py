@@ -7,11 +7,12 @@ A scene on a knife edge (friction equal to tan alpha, a base acceleration that j
 moves the block, a block balanced over its corner, a side that touches a wall) is where two motions
 meet. Rigid-body mechanics then names no one of them, and rounding chooses. Such an equality is
 looked for to rounding; then the scene is played on both sides of it, the number moved by
-`NUDGE`. It is a tie only where the two sides part.
+`NUDGE`. It is a tie only where the two sides part. Equal gaps tie only where both walls are struck
+at one instant: else the sides part where the motion amplifies any small difference.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import get_args
 
@@ -29,6 +30,8 @@ EQUAL = 1e-12
 NUDGE = 1e-7
 #: Rotations (alpha) and slips (alpha R) that differ by more have parted.
 PARTED = 1e-3
+#: Sides this many times as far from the equality part as soon: within so many rows.
+FARTHER, AS_SOON = 10.0, 2
 
 
 @dataclass(frozen=True)
@@ -47,10 +50,22 @@ class Tie:
 
 @dataclass(frozen=True)
 class Edge:
-    """An equality of a scene, and the scenes on its sides."""
+    """An equality of a scene; `sides` are the scenes that are off it by a relative change.
+
+    `at_once`: where the sides tie they part as soon however far off they are.
+    """
 
     what: str
-    sides: tuple[Scene, ...]
+    sides: Callable[[float], tuple[Scene, ...]]
+    at_once: bool = False
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Times (s) of the last rows at which two histories are one, and are within `PARTED`."""
+
+    begins_s: float
+    apart_s: float
 
 
 def ties_of(scene: Scene, model: EventBasedModel | None = None) -> tuple[Tie, ...]:
@@ -85,12 +100,14 @@ def _friction_edges(scene: Scene) -> Iterator[Edge]:
     slopes = {pivot.arm / pivot.height for pivot in map(scene.block.pivot, get_args(Side))}
     for slope in slopes:
         if _equal(scene.floor.mu_s, slope) or _equal(scene.floor.friction, slope):
-            yield Edge("friction equals B/H", tuple(_with_friction(scene, k) for k in (-1, 1)))
+            yield Edge(
+                "friction equals B/H",
+                lambda by: (_with_friction(scene, 1.0 - by), _with_friction(scene, 1.0 + by)),
+            )
             return
 
 
-def _with_friction(scene: Scene, sign: int) -> Scene:
-    factor = 1.0 + sign * NUDGE
+def _with_friction(scene: Scene, factor: float) -> Scene:
     floor = scene.floor
     static = None if floor.static_friction is None else floor.static_friction * factor
     return scene.replace(
@@ -112,8 +129,11 @@ def _excitation_edges(scene: Scene) -> Iterator[Edge]:
         }
         for what, limit in names.items():
             if _equal(reached, limit):
-                sides = (scene.excitation.scaled(1.0 + k * NUDGE) for k in (-1, 1))
-                yield Edge(what, tuple(scene.replace(excitation=moved) for moved in sides))
+                yield Edge(what, lambda by: (_shaken(scene, 1.0 - by), _shaken(scene, 1.0 + by)))
+
+
+def _shaken(scene: Scene, factor: float) -> Scene:
+    return scene.replace(excitation=scene.excitation.scaled(factor))
 
 
 def largest_accelerations(excitation: Excitation) -> dict[Side, float]:
@@ -131,17 +151,26 @@ def _balance_edges(scene: Scene) -> Iterator[Edge]:
     if tilt == 0.0 or scene.initial_angular_velocity or scene.initial_velocity:
         return
     if _equal(abs(tilt), scene.block.pivot("left" if tilt > 0.0 else "right").alpha):
-        moved = tuple(scene.replace(initial_rotation=tilt * (1.0 + k * NUDGE)) for k in (-1, 1))
-        yield Edge("balanced over its corner", moved)
+        yield Edge(
+            "balanced over its corner",
+            lambda by: tuple(
+                scene.replace(initial_rotation=tilt * factor) for factor in (1.0 - by, 1.0 + by)
+            ),
+        )
 
 
 def _flush_edges(scene: Scene) -> Iterator[Edge]:
     """A side that touches a wall at first: from 0 a gap can only grow."""
     for wall in scene.walls:
         if wall.gap == 0.0:
-            apart = wall.replace(gap=NUDGE * scene.block.radius)
-            others = [other for other in scene.walls if other is not wall]
-            yield Edge(f"it touches the {wall.side} wall", (scene.replace(walls=[apart, *others]),))
+            yield _flush_edge(scene, wall.side)
+
+
+def _flush_edge(scene: Scene, side: Side) -> Edge:
+    return Edge(
+        f"it touches the {side} wall",
+        lambda by: (_with_gap(scene, side, by * scene.block.radius),),
+    )
 
 
 def _two_wall_edges(scene: Scene) -> Iterator[Edge]:
@@ -150,11 +179,19 @@ def _two_wall_edges(scene: Scene) -> Iterator[Edge]:
         return
     left, right = scene.walls
     if left.gap > 0.0 and _equal(left.gap, right.gap):
-        moved = tuple(
-            scene.replace(walls=[left.replace(gap=left.gap * (1.0 + k * NUDGE)), right])
-            for k in (-1, 1)
+        yield Edge(
+            "both walls are equally far",
+            lambda by: tuple(
+                _with_gap(scene, left.side, left.gap * factor) for factor in (1.0 - by, 1.0 + by)
+            ),
+            at_once=True,
         )
-        yield Edge("both walls are equally far", moved)
+
+
+def _with_gap(scene: Scene, side: Side, gap: float) -> Scene:
+    """The scene with another gap (m) of the wall on this side."""
+    walls = [wall.replace(gap=gap) if wall.side == side else wall for wall in scene.walls]
+    return scene.replace(walls=walls)
 
 
 def _equal(one: float, other: float) -> bool:
@@ -163,11 +200,12 @@ def _equal(one: float, other: float) -> bool:
 
 def _parted(edge: Edge, scene: Scene, model: EventBasedModel) -> Tie | None:
     """The tie of an equality; None where its sides, and the scene, are one motion."""
-    played = [(each, model.simulate(each)) for each in (scene, *edge.sides)]
-    first, *others = [history for _, history in played]
-    compared = (_parting(scene, first, other) for other in others)
-    partings = [parting for parting in compared if parting is not None]
-    fates = tuple(dict.fromkeys(fate_words(each, model) for each in (scene, *edge.sides)))
+    near, played = edge.sides(NUDGE), model.simulate(scene)
+    fates = tuple(dict.fromkeys(fate_words(each, model) for each in (scene, *near)))
+    partings = _partings(near, scene, played, model)
+    if edge.at_once and len(fates) == 1:
+        farther = _partings(edge.sides(FARTHER * NUDGE), scene, played, model)
+        partings = [each for each in partings if _as_soon(each, farther, scene)]
     if not partings and len(fates) == 1:
         return None
     begins = min((parting.begins_s for parting in partings), default=scene.duration)
@@ -175,12 +213,18 @@ def _parted(edge: Edge, scene: Scene, model: EventBasedModel) -> Tie | None:
     return Tie(edge.what, begins, apart, fates)
 
 
-@dataclass(frozen=True)
-class Parting:
-    """Times (s) of the last rows at which two histories are one, and are within `PARTED`."""
+def _partings(
+    sides: tuple[Scene, ...], scene: Scene, played: History, model: EventBasedModel
+) -> list[Parting]:
+    """How the motions on the sides part from that of the scene; without those that do not."""
+    compared = (_parting(scene, played, model.simulate(side)) for side in sides)
+    return [parting for parting in compared if parting is not None]
 
-    begins_s: float
-    apart_s: float
+
+def _as_soon(parting: Parting, farther: list[Parting], scene: Scene) -> bool:
+    """Whether sides farther off part no sooner: what grows with time from a difference does."""
+    room = (AS_SOON + 0.5) * scene.output_step
+    return parting.apart_s <= min((other.apart_s for other in farther), default=0.0) + room
 
 
 def _parting(scene: Scene, one: History, other: History) -> Parting | None:

@@ -5,9 +5,21 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck import Block, Floor, Record, Rest, Ricker, Scene, Sine, Wall, load_scene
+from rockcheck import (
+    Block,
+    EventBasedModel,
+    Floor,
+    Record,
+    Rest,
+    Ricker,
+    Scene,
+    Sine,
+    Wall,
+    load_scene,
+)
 from rockcheck.ebm.horizon import predictability_horizon
 from rockcheck.ebm.ties import edges_of, ties_of
+from rockcheck.scenes import PAPER_BLOCK
 
 
 def cube(friction=1.0, push=-10.0):
@@ -107,6 +119,53 @@ def test_walls_at_equal_gaps_are_an_edge():
     assert [edge.what for edge in edges_of(standing(pulse, walls))] == [
         "both walls are equally far"
     ]
+
+
+def between(*, turns: float, **more) -> Scene:
+    """The paper's block in the middle between two walls; it turns in the air about its centre."""
+    walls = [Wall(side=side, gap=0.02, restitution=0.5) for side in ("left", "right")]
+    scene = Scene(
+        **{
+            "name": "between",
+            "block": PAPER_BLOCK,
+            "floor": Floor(friction=0.5),
+            "walls": walls,
+            "initial_height": 0.3 if turns else 0.0,
+            "initial_angular_velocity": turns,
+            "duration": 1.5,
+        }
+        | more
+    )
+    return scene.replace(initial_velocity=-scene.initial_state[3])
+
+
+@pytest.mark.parametrize("turns", [0.3, 2.0])
+def test_both_walls_struck_at_one_instant_tie(turns):
+    scene = between(turns=turns)
+    struck = EventBasedModel(pivot="unilateral").simulate(scene).extremes.walls["left"].first_s
+    (tie,) = ties_of(scene)
+    assert tie.what == "both walls are equally far"
+    assert tie.apart_s == pytest.approx(struck, abs=2.0 * scene.output_step)
+    assert predictability_horizon(scene) <= tie.apart_s + scene.output_step
+
+
+def test_a_motion_that_amplifies_every_difference_is_no_tie_of_equal_gaps():
+    """Its sides part after seven seconds of hits, ten times as far off half a second sooner."""
+    tall = Block(half_width=0.13969982337845474, half_height=0.9635464891106362)
+    walls = [Wall(side=s, gap=0.046044562282075346, restitution=0.3) for s in ("left", "right")]
+    scene = between(
+        turns=0.0,
+        block=tall,
+        floor=Floor(friction=0.7075134252450574),
+        walls=walls,
+        excitation=load_scene("statue").excitation.scaled(1.2823859267211977),
+        duration=12.0,
+    )
+    model = EventBasedModel(pivot="unilateral")
+    (edge,) = edges_of(scene)
+    theta = [model.simulate(side).channels["theta"] for side in edge.sides(1e-7)]
+    assert np.max(np.abs(theta[0] - theta[1])) > 1e-3 * tall.alpha
+    assert ties_of(scene) == ()
 
 
 def test_a_scene_off_every_edge_is_not_played_again():

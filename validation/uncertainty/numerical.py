@@ -30,6 +30,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rockcheck.ebm.ties import ties_of
 from rockcheck.scenes import History, InputError, ModelFailure, Scene, printable
 from rockcheck.validation.discrepancy.figures import Stored, end_of, extremes_in, last_slip_of
 
@@ -100,10 +101,28 @@ def numerical_uncertainty(
     runs (together 13/12 of its cost), or one of an event-based model at a hundredth of its
     tolerance. One that fails leaves nothing converged. Raises what `simulate` raises of the run
     itself.
+
+    Where the mechanics has more than one answer (`ebm.ties`) nothing is converged: what a run
+    converges to is the answer that rounding has chosen.
     """
     if not (hasattr(model, "coarser") or hasattr(model, "finer")):
         return None
-    given = history or model.simulate(scene)
+    numerical = _by_other_runs(model, scene, history or model.simulate(scene))
+    found = ties_of(scene)
+    if found:
+        return _undone(numerical, f"a tie: {found[0].what}")
+    return numerical
+
+
+def _undone(numerical: Numerical, reason: str) -> Numerical:
+    """The same with no converged quantity, for this reason."""
+    change = {"u_num": None, "order": None, "verdict": "not converged", "reason": reason}
+    quantities = (quantity.model_copy(update=change) for quantity in numerical.quantities)
+    return numerical.model_copy(update={"quantities": tuple(quantities)})
+
+
+def _by_other_runs(model: Any, scene: Scene, given: History) -> Numerical:
+    """The uncertainty of a run by coarser ones, or by a finer one."""
     method = "a hundredth of the tolerance"
     try:
         if hasattr(model, "coarser"):

@@ -7,7 +7,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rockcheck import Block, ContinuousModel, EventBasedModel, Floor, MuJoCo, Ricker, Scene, Wall
+from rockcheck import (
+    Block,
+    ContinuousModel,
+    EventBasedModel,
+    Floor,
+    MuJoCo,
+    Rest,
+    Ricker,
+    Scene,
+    Wall,
+)
 from rockcheck.scenes import ModelFailure, observation
 from rockcheck.validation.uncertainty import numerical
 
@@ -227,6 +237,17 @@ def test_where_a_coarser_run_ends_otherwise_nothing_is_converged(at_4h, reason):
         {("not converged", None)},
         reason not in "".join(found.reasons),
     )
+
+
+@pytest.mark.parametrize("model", [EventBasedModel(pivot="unilateral"), Made(lambda h: 1.0)])
+def test_on_a_tie_nothing_is_converged(model):
+    """However little a run changes with its step or tolerance: rounding has chosen its answer."""
+    tie = BOOKCASE.replace(walls=[], excitation=Rest(), initial_rotation=BOOKCASE.block.alpha)
+    found = numerical.numerical_uncertainty(model, tie)
+    assert {(q.verdict, q.u_num) for q in found.quantities} == {("not converged", None)}
+    assert found.reasons == ("a tie: balanced over its corner",)
+    off = tie.replace(initial_rotation=0.999 * BOOKCASE.block.alpha)
+    assert numerical.numerical_uncertainty(model, off).converged
 
 
 def test_a_model_without_a_step_is_not_judged():

@@ -25,7 +25,7 @@ from rockcheck.validation.studies.population import results, search
 from rockcheck.validation.studies.population.rows import table_of
 from rockcheck.validation.study import Task
 from rockcheck.validation.uncertainty import population
-from rockcheck.validation.uncertainty.numerical import Numerical, numerical_uncertainty
+from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
 Numbers = tuple[tuple[str, float], ...]
 Settings = tuple[tuple[str, Any], ...]
@@ -363,24 +363,12 @@ class CertaintyTask(CaseTask):
         landing = None
         if self.scene.floor.restitution < 1.0:  # no event-based model plays a floor without loss
             landing = impact_laws.parting_landing(self.scene)
-        numerical = numerical_uncertainty(self.built(), self.scene)
         found = ties.ties_of(self.scene)
-        if numerical is not None and found:
-            numerical = undone_by(found[0], numerical)
         return results.Certainty(
-            numerical=numerical,
+            numerical=numerical_uncertainty(self.built(), self.scene),
             depends_on_law_from_s=None if landing is None else landing.t,
             ties=tuple((tie.what, tie.from_s, tie.fates) for tie in found),
         )
-
-
-def undone_by(tie: ties.Tie, numerical: Numerical) -> Numerical:
-    """No figure is converged where the mechanics has more than one answer."""
-    reason = f"a tie: {tie.what}"
-    change = {"u_num": None, "order": None, "verdict": "not converged", "reason": reason}
-    return numerical.model_copy(
-        update={"quantities": tuple(one.model_copy(update=change) for one in numerical.quantities)}
-    )
 
 
 @dataclass(frozen=True)
