@@ -21,6 +21,7 @@ from rockcheck.scenes import (
     Wall,
     kinematics,
 )
+from rockcheck.validation.studies.stress import ends, extremes
 from rockcheck.validation.studies.stress.conditions import conditions
 from rockcheck.validation.studies.stress.energy import GROUP, energy_error
 from rockcheck.validation.studies.stress.horizon import Horizon
@@ -34,6 +35,8 @@ FINE, MOST_ROWS = 64, 4000
 SETTLED, MOST_STEPS = 300.0, 50_000
 #: The reach of a block is known where it is this many times the largest change between two rows.
 RESOLVES = 4.0
+#: Invariants of an audited run that cannot always be judged.
+UNSURE = ("energy", "fate")
 SWAPPED = {"overturned left": "overturned right", "overturned right": "overturned left"}
 
 
@@ -42,7 +45,8 @@ def check_run(
 ) -> CheckedRun:
     """Plays a scene and checks every invariant, or only one.
 
-    With `audit` also those that ask for many rows or a long run: energy, clearance, decided.
+    With `audit` also those that ask for many rows or a long run: energy, clearance, decided, fate,
+    and what the rows show of extremes.
     """
     played = audited(scene) if audit else scene
     try:
@@ -54,13 +58,9 @@ def check_run(
         return CheckedRun(figures=figures, outcome=history.outcome)
     motion, cost = Motion(played, history), history.cost
     figures |= {"outcome": float(_contradicts(played, history)), **conditions(model, motion)}
-    if audit:  # at the finer tolerance, whose error does not disturb the balance
-        with suppress(ModelFailure):
-            energy = _energy(model.finer(), played)
-            figures |= {"energy": energy} if energy is not None else {}
-        with suppress(ModelFailure):
-            figures["clearance"] = float(_is_clearance_wrong(model, played, seed))
-        figures["decided"] = _decided_difference(model, scene)
+    figures["extremes"] = extremes.beyond(motion)
+    if audit:
+        figures |= _audit(model, scene, motion, seed)
     bounces = max([scene.floor.restitution, *(wall.restitution for wall in scene.walls)]) > 0.0
     if model.pivot == "unilateral":
         figures["impacts"] = (
@@ -86,8 +86,26 @@ def check_run(
         largest_gain=cost.largest_energy_gain,
         rules=cost.rules,
         failure=horizon.failure,
-        unjudged=("energy",) if audit and "energy" not in figures else (),
+        unjudged=tuple(name for name in UNSURE if audit and name not in figures),
     )
+
+
+def _audit(model: EventBasedModel, scene: Scene, motion: Motion, seed: int) -> dict[str, float]:
+    """The figures that ask for many rows or a long run; what cannot be judged is left out."""
+    audited_scene, history = motion.scene, motion.history
+    figures = {"decided": _decided_difference(model, scene)}
+    with suppress(ModelFailure):  # at the finer tolerance, whose error does not disturb the balance
+        energy = _energy(model.finer(), audited_scene)
+        figures |= {"energy": energy} if energy is not None else {}
+    with suppress(ModelFailure):
+        figures["clearance"] = float(_is_clearance_wrong(model, audited_scene, seed))
+    with suppress(ModelFailure):
+        figures["rows"] = extremes.change_with_rows(motion, model.simulate)
+    with suppress(ModelFailure):
+        figures["unseen"] = extremes.unseen(motion, model.simulate)
+    fate = ends.contradictions(model, audited_scene, history)
+    figures |= {"fate": fate} if fate is not None else {}
+    return figures
 
 
 def _is_clearance_wrong(model: EventBasedModel, scene: Scene, seed: int) -> bool:
@@ -108,8 +126,8 @@ def _is_clearance_wrong(model: EventBasedModel, scene: Scene, seed: int) -> bool
     gaps = kinematics.clearance(
         scene.block, side, 0.0, history.channels["x"], history.channels["theta"]
     )
-    extremes = history.extremes
-    reach = extremes.reach_left if side == "left" else extremes.reach_right
+    reached = history.extremes
+    reach = reached.reach_left if side == "left" else reached.reach_right
     # A contact that parts at the settling speed stays closed: what is smaller is not resolved.
     room = float(np.max(np.abs(np.diff(gaps)))) + 2.0 * SETTLE * scene.block.radius
     if reach - max(0.0, -float(gaps[0])) < RESOLVES * room:
@@ -221,6 +239,7 @@ def _mirror(model: EventBasedModel, motion: Motion) -> float:
             replace(a, kind=SWAPPED.get(a.kind, a.kind)) != b
             for a, b in zip(history.event_list, image.event_list, strict=True)
         ),
+        extremes.bits_of_mirror_image(history.extremes, image.extremes),
     ]
     return float(sum(differ) + (image.outcome != SWAPPED.get(history.outcome, history.outcome)))
 

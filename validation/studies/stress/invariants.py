@@ -62,6 +62,24 @@ INVARIANTS = {
             " (pi: another side)",
             1e-6,
         ),
+        ("extremes", "a row beyond the extremes that the model kept, R or rad", 1e-9),
+        (
+            "unseen",
+            "an extreme beyond all dense rows, over the way between two of them",
+            1.0,
+        ),
+        ("rows", "change of an extreme with the distance of the rows, natural units", 1e-9),
+        (
+            "fate",
+            "histories, other rows and mirror images that contradict what is said to become of the"
+            " block",
+            0.0,
+        ),
+        (
+            "ties",
+            "what is not said, or wrongly, of a scene on a knife edge and of scenes beside it",
+            0.0,
+        ),
         # of models that approximate contact
         (
             "depth",

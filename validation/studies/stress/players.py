@@ -17,6 +17,7 @@ from rockcheck.scenes import (
     Scene,
 )
 from rockcheck.validation.execute import models
+from rockcheck.validation.studies.stress import extremes, ties
 from rockcheck.validation.studies.stress.checks import check_run
 from rockcheck.validation.studies.stress.energy import energy_without_source
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
@@ -29,6 +30,7 @@ MOST_STEPS, MOST_EVENTS = 2_000_000, 400_000
 #: One run in this many is audited: sampled so finely that its energy can be integrated. An odd
 #: number: with the energy cap, too, which is on in odd runs.
 AUDIT = 9
+AUDITED = ("energy", "clearance", "decided", "unseen", "rows", "fate")
 #: Penetration of the CM under the block's weight, R; longest run of it and of engines, sqrt(R/g).
 DEPTH, LONGEST = 1e-8, 5.0
 
@@ -37,13 +39,19 @@ DEPTH, LONGEST = 1e-8, 5.0
 class Player:
     """A model under stress: its label, which begins with the model's name, and what it plays.
 
-    `runs` is the number of scenes in a whole run, `quick` in a quick one.
+    `runs` is the number of scenes in a whole run, `quick` in a quick one. `slow`: a run takes much
+    longer than one of an event-based model.
     """
 
     label: str
     runs: int
     quick: int
     words: str
+
+    @property
+    def slow(self) -> bool:
+        """Whether few runs make a task."""
+        return False
 
 
 @dataclass(frozen=True)
@@ -94,8 +102,34 @@ class EventBased(Player):
             scene,
             seed=seed + number,  # each run has another scale, disturbance and wall
             # Of an audited run with all its rows: a coarser one may not show the failure.
-            audit=only in ("energy", "clearance", "decided") or number % AUDIT == 0,
+            audit=only in AUDITED or number % AUDIT == 0,
             only=only,
+        )
+
+
+@dataclass(frozen=True)
+class Tied(EventBased):
+    """The event-based model on scenes at a knife edge of the mechanics, by what is said of them."""
+
+    @property
+    def slow(self) -> bool:
+        """Each scene is played from both sides, by several models."""
+        return True
+
+    def scene(self, seed: int, number: int) -> Scene:
+        """Its scene of that number."""
+        return ties.tie_scene(seed, number)
+
+    def settings(self, scene: Scene, number: int) -> dict[str, Any]:
+        """Those of the model by which ties are told."""
+        return {}
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        """Checks what is said of the scene, of its sides and of scenes a little away."""
+        model = EventBasedModel(pivot="unilateral", most_steps=MOST_STEPS, most_events=MOST_EVENTS)
+        unsaid = ties.unsaid(model, scene, number)
+        return CheckedRun(
+            figures={"ends": 0.0, "ties": float(len(unsaid))}, failure="; ".join(unsaid)
         )
 
 
@@ -108,6 +142,11 @@ class Approximate(Player):
     """
 
     step: float = 2e-3
+
+    @property
+    def slow(self) -> bool:
+        """It takes many steps."""
+        return True
 
     def scene(self, seed: int, number: int) -> Scene:
         """The scene of that number, no longer than affordable, with a row a step.
@@ -151,8 +190,9 @@ class Approximate(Player):
         return played
 
     def _check(self, scene: Scene, number: int) -> CheckedRun:
+        model = models.build(self.label, self.settings(scene, number))
         try:
-            history = models.build(self.label, self.settings(scene, number)).simulate(scene)
+            history = model.simulate(scene)
         except (ModelFailure, InputError) as error:
             return CheckedRun(figures={"ends": 1.0}, failure=str(error))
         figures = {"ends": 0.0, "finite": not_finite(history)}
@@ -173,6 +213,9 @@ class Approximate(Player):
             way = math.sqrt(DEPTH) if self.label == "cm" else self.step
             figures["depth"] = motion.deepest / (2.0 * (speed * way + level * way**2) + 1e-5)
             figures["source"] = energy_without_source(motion)
+            figures["extremes"] = extremes.beyond(motion)
+            if number % AUDIT == 0:
+                figures["rows"] = extremes.change_with_rows(motion, model.simulate)
         return CheckedRun(
             figures=figures, outcome=history.outcome, counts={"events": len(history.event_list)}
         )
@@ -224,6 +267,7 @@ _EVERY: tuple[EventBased | Approximate, ...] = (
     EventBased("ebm no-slip exact", 20_000, 200, ROUNDING, "no-slip", exact=True),
     EventBased("ebm-unilateral exact", 20_000, 200, ROUNDING, "unilateral", exact=True),
     EventBased("ebm-bouc-wen exact", 5000, 50, ROUNDING, "bouc-wen", exact=True),
+    Tied("ebm-unilateral ties", 2000, 20, "scenes on a knife edge: what is said", "unilateral"),
     Approximate("cm", 2000, 40, "continuous model, standing 1e-8 R deep"),
     *(
         Approximate(engine.lower(), 2000, 40, f"{engine}, best settings, steps of 0.002 sqrt(R/g)")

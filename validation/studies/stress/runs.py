@@ -20,13 +20,13 @@ from rockcheck.scenes import (
 )
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
-from rockcheck.validation.studies.stress.players import PLAYERS, EventBased
+from rockcheck.validation.studies.stress.players import PLAYERS
 from rockcheck.validation.studies.stress.shrinking import shrink
 from rockcheck.validation.study import Task
 
-#: Time limit (s) of a run on average, event-based or not, and its ratio to the usual time; then
+#: Time limit (s) of a run on average, and of a slow player's, and its ratio to the usual time; then
 #: the time (s) that a task may take in addition.
-A_RUN, AN_APPROXIMATE_RUN, AMPLE, PATIENCE = 0.2, 2.0, 50.0, 20.0
+A_RUN, A_SLOW_RUN, AMPLE, PATIENCE = 0.2, 2.0, 50.0, 20.0
 #: Failures of a model and an invariant that are written as scenes.
 MOST_FILES = 20
 
@@ -219,7 +219,7 @@ def limits(model: str, runs: int) -> dict[str, Any]:
 
     The limit is far more than they take, and short enough for a hang to be found soon.
     """
-    a_run = A_RUN if isinstance(PLAYERS[model], EventBased) else AN_APPROXIMATE_RUN
+    a_run = A_SLOW_RUN if PLAYERS[model].slow else A_RUN
     return {
         "seconds": PATIENCE + runs * a_run,
         "expected": runs * a_run / AMPLE,

@@ -20,8 +20,8 @@ from rockcheck.validation.studies.stress.tables import map_blocks, run_tables
 from rockcheck.validation.study import Study, Task
 
 What = Literal["all", "runs", "maps"]
-#: Runs in one task: event-based ones, others.
-CHUNK, APPROXIMATE_CHUNK = 250, 20
+#: Runs in one task, and those of slow players.
+CHUNK, SLOW_CHUNK = 250, 20
 #: Trials by which all failures may be shrunk, in a whole run and in a quick one.
 SHRINKING, SHRINKING_QUICK = 8000, 1600
 
@@ -73,10 +73,10 @@ class Stress(Study):
         if self.what == "maps":
             return
         labels = self.models or [label for label in PLAYERS if not not_installed(label.split()[0])]
-        for label in sorted(labels, key=lambda label: isinstance(PLAYERS[label], EventBased)):
+        for label in sorted(labels, key=lambda label: not PLAYERS[label].slow):
             player = PLAYERS[label]
             count = self.runs or (player.quick if self.quick else player.runs)
-            most = CHUNK if isinstance(player, EventBased) else APPROXIMATE_CHUNK
+            most = SLOW_CHUNK if player.slow else CHUNK
             most = max(10, min(most, count // 4)) if self.quick else most
             for first in range(0, count, most):
                 runs = min(most, count - first)
