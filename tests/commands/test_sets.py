@@ -58,7 +58,8 @@ ODD = "README.txt"
 
 
 def names(left_out: list[str]) -> list[str]:
-    return [Path(text.partition(",")[0]).name for text in left_out]
+    """The names of files that are left out, without the reasons."""
+    return [Path(re.split("[,:]", text)[0]).name for text in left_out]
 
 
 @pytest.mark.parametrize(
