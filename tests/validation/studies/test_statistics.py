@@ -16,7 +16,13 @@ from rockcheck.validation.studies.population import (
     statistics,
 )
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.plan import GapRange, Plan, gaps_looked_at
+from rockcheck.validation.studies.population.intensities import measure_of, size_of
+from rockcheck.validation.studies.population.plan import (
+    GapRange,
+    Plan,
+    factors_of,
+    gaps_looked_at,
+)
 from rockcheck.validation.studies.population.study import finding_of
 from rockcheck.validation.uncertainty import numerical
 
@@ -62,14 +68,25 @@ def judged(u_num):
     return numerical.Numerical(method="by hand", quantities=(peak,))
 
 
-def gathered(runs=RUNS, *, given=CERTAIN, recorded=True, draws=0, certainty=None, **played):
+def gathered(
+    runs=RUNS,
+    *,
+    given=CERTAIN,
+    recorded=True,
+    draws=0,
+    certainty=None,
+    measure=None,
+    bounds=(0.0, 0.05, 0.1),
+    **played,
+):
     """The results of runs as they are, and of what else was `played`, by the plan's task groups."""
     plan = Plan(
         own=given,
         cases=dict.fromkeys(runs, given),
         recorded=recorded,
         draws=draws,
-        gaps=[GapRange("left", (0.0, 0.05, 0.1))],
+        measure=measure,
+        gaps=[GapRange("left", bounds)],
         models={"ebm-unilateral": {}, "cm": {}},
     )
     done = {
@@ -90,6 +107,8 @@ def gathered(runs=RUNS, *, given=CERTAIN, recorded=True, draws=0, certainty=None
         done[plan.certainty(done)[case]] = sure
     for case, search in played.get("gaps", {}).items():
         done[plan.gap_tasks(done)["left"][case]] = search
+    for case, search in played.get("factors", {}).items():
+        done[plan.factors[case]] = search
     return Gathered(plan, done)
 
 
@@ -266,6 +285,62 @@ def test_runs_of_all_records_are_counted_at_each_gap():
 
 def test_a_search_that_did_not_end_gives_no_answer():
     assert statistics.gap_answers(gathered(free={"a": FREE["a"]})) == []
+
+
+def test_the_steps_of_a_look_are_told_apart_where_it_changes():
+    far = {"a": ran("at rest", 0.3, reach=2.0)}
+    everything = gathered({"a": RUNS["a"]}, free=far, gaps={"a": search()}, bounds=())
+    (answer,) = statistics.gap_answers(everything)
+    assert answer.looked_every == pytest.approx(1e-3)
+    assert answer.finely_up_to == 0.4
+    assert answer.beyond_every == pytest.approx(0.04)
+
+
+# At which intensity does it fall?
+
+PGA = measure_of("pga")
+SIZE = size_of(PGA, SCENE)
+
+
+def intensities_of(**searches):
+    """The answer for searches over the factor by case, each a list of intervals."""
+    found = {
+        case: results.FactorSearch(intervals=tuple(intervals), undecided=0, runs=9)
+        for case, intervals in searches.items()
+    }
+    runs = dict.fromkeys(searches, RUNS["a"])
+    return statistics.intensity_answer(gathered(runs, measure=PGA, factors=found))
+
+
+def test_the_least_intensity_is_the_least_factor_times_that_of_the_motion():
+    answer = intensities_of(a=[interval(0, 1.5, 40.0, 1.49, None)])
+    assert answer.records[0].as_it_is == SIZE
+    assert answer.records[0].least == pytest.approx(1.5 * SIZE)
+
+
+def test_an_island_of_intensities_is_between_two_factors():
+    answer = intensities_of(
+        a=[interval(0, 1.5, 1.6, 1.49, 1.61), interval(0, 2.0, 40.0, 1.99, None)]
+    )
+    assert answer.records[0].least == pytest.approx(1.5 * SIZE)
+    assert answer.records[0].islands == ((1.5 * SIZE, 1.6 * SIZE),)
+
+
+def test_a_motion_that_overturns_at_no_factor_was_scaled_up_to_the_last():
+    answer = intensities_of(a=[])
+    assert answer.records[0].least is None
+    assert answer.records[0].beyond == pytest.approx(SIZE * factors_of(SCENE)[-1])
+
+
+def test_without_a_scaled_motion_there_is_no_intensity():
+    assert statistics.intensity_answer(gathered(measure=PGA)) is None
+
+
+def test_the_curve_is_of_the_least_intensities_of_all_motions():
+    answer = intensities_of(
+        a=[interval(0, 1.0, 40.0, 0.99, None)], b=[interval(0, 4.0, 40.0, 3.99, None)]
+    )
+    assert answer.fit.median == pytest.approx(2.0 * SIZE)
 
 
 # How sure is that?

@@ -186,7 +186,7 @@ def _gap_answer(gathered: Gathered, side: Side) -> GapAnswer | None:
     )
     first = min(falls, key=lambda case: case.intervals[0].low, default=None)
     counted = [run for drawn in free.values() for run in counted_runs(drawn)]
-    finely = min(task.fine[-1], task.fine[0] + FINE_UP_TO)
+    finely = round(min(task.fine[-1], task.fine[0] + FINE_UP_TO), 12)  # as the grid is
     every, beyond_every = _widest_steps(np.array(task.fine), finely)
     draws_every, draws_beyond_every = _widest_steps(np.array(task.coarse), finely)
     return GapAnswer(
@@ -214,7 +214,7 @@ def _gap_answer(gathered: Gathered, side: Side) -> GapAnswer | None:
 def _widest_steps(grid: np.ndarray, middle: float) -> tuple[float, float]:
     """The widest steps of an increasing grid up to `middle` and beyond it; 0 where it has none."""
     steps = np.diff(grid)
-    is_beyond = grid[:-1] >= middle * (1.0 - 1e-9)
+    is_beyond = grid[:-1] >= middle
     near = np.max(steps[~is_beyond], initial=0.0)
     return float(near), float(np.max(steps[is_beyond], initial=0.0))
 
