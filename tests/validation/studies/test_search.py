@@ -65,3 +65,14 @@ def test_the_resolution_may_grow_with_the_value():
     grid = np.geomspace(0.1, 10.0, 50)
     ((fall,),) = searched([(3.3, 10.0)], grid=grid, resolution=0.01 * grid[:-1])
     assert fall.low == pytest.approx(3.3, rel=0.011)
+
+
+def test_a_run_may_fall_at_the_last_value_alone():
+    ((last,),) = searched([(0.995, 1.0)])
+    assert last.low == pytest.approx(0.995, abs=NARROW)
+    assert last.high == 1.0
+
+
+def test_a_change_as_narrow_as_the_resolution_is_not_halved_again():
+    ((fall,),) = searched([(0.3, 1.0)], grid=np.array([0.0, 1.0]), resolution=0.5)
+    assert (fall.stands_below, fall.low) == (0.0, 0.5)
