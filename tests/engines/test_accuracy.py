@@ -41,6 +41,7 @@ def median_error(model, scenes):
     return np.median([rotation_error(model, scene) for scene in scenes])
 
 
+@pytest.mark.slow_for("dart")
 def test_fixed_steps_are_of_first_order(double_engine):
     coarse, fine = (
         median_error(double_engine(time_step=step), map(free_rocking, TILTS))
@@ -50,6 +51,7 @@ def test_fixed_steps_are_of_first_order(double_engine):
     assert 5.0 < coarse / fine < 30.0
 
 
+@pytest.mark.slow_for("dart")
 def test_adaptive_steps_are_of_third_order(varying_engine):
     scenes = [pulse_scene(*pulse, 1.0, duration=4.0) for pulse in PULSES]
     errors = {
@@ -61,6 +63,7 @@ def test_adaptive_steps_are_of_third_order(varying_engine):
         assert errors[step] < most
 
 
+@pytest.mark.slow_for("dart")
 def test_no_error_is_left_that_no_step_changes(varying_engine):
     """With impacts a hundred times as long, the error grows: neither the corners' size nor the
     table of the base motion shows."""

@@ -126,6 +126,7 @@ def test_drake_goes_on_where_its_solver_stumbles():
     )
 
 
+@pytest.mark.slow_for("dart")
 def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
     """A wall that the block strikes at 5.95 alpha and comes back from: at fixed steps of 1e-4 s it
     is not."""

@@ -90,12 +90,12 @@ def test_disk_full_whatever_is_written(tmp_path, size, words):
     assert out.is_file() or (out / "index.html").is_file()
 
 
-@pytest.mark.needs("POSIX")
 def without_cost(text: str) -> list[str]:
     """The lines of a history's file but for that which says how long the run took."""
     return [line for line in text.splitlines() if not line.startswith("# cost: ")]
 
 
+@pytest.mark.needs("POSIX")
 def test_what_is_no_file_is_written_as_it_is(tmp_path):
     link, words = tmp_path / "link", ["simulate", "fig4a", "--model", "ebm", "--quiet", "-o"]
     link.symlink_to(tmp_path / "out.csv")
