@@ -133,12 +133,26 @@ def test_three_records_are_called_few():
     assert "3 records are too few" in words
 
 
+def test_an_interval_may_reach_up_to_all_runs():
+    everything = gathered({case: RUNS["c"] for case in "abc"})
+    (words, _) = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
+    assert words == "shelf overturns in 3 of 3 records, 100 % (95 %: 29 to 100 %)."
+
+
 def test_the_first_sentence_has_both_answers_of_a_tie():
     tie = ("friction equals B/H", 0.4, ("at rest", "overturned right"))
     sure = {"a": results.Certainty(ties=(tie,))}
     everything = gathered({"a": RUNS["a"]}, certainty=sure)
     (words,) = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
     assert words.startswith("shelf stays, or overturns to the right: it stands on a knife edge")
+
+
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.0, "0 %"), (0.104, "10 %"), (0.9949, "99 %"), (0.999, ">99 %"), (1, "100 %")],
+)
+def test_a_share_in_percent(share, words):
+    assert sentences.percent(share) == words
 
 
 def test_what_is_undecided_is_not_among_those_that_stay():
@@ -232,6 +246,24 @@ def test_the_curve_of_what_overturns_steps_where_the_search_saw_it():
     gaps, shares = statistics.overturned_steps(answer)
     assert gaps == [0.0, 0.0, 0.0, 0.021, 0.021, 0.05, 0.1]
     assert shares == [0.0, 0.5, 1.0, 0.5, 0.0, 0.5, 0.5]
+
+
+def test_of_two_sides_each_sentence_says_which():
+    answer = gap_answer(a=search())
+    (only,) = sentences.gap_sentences([answer])
+    first, second = sentences.gap_sentences([answer, replace(answer, side="right")])
+    assert only.startswith("It stands")
+    assert first.startswith("On the left: It stands")
+    assert second.startswith("On the right: It stands")
+
+
+def test_a_run_that_falls_without_the_wall_is_told_with_its_reach():
+    answer = gap_answer(a=search())
+    assert sentences.reach_words(answer) == "without the wall it reaches 0.1 m"
+    falls = replace(answer, free_overturned=1)
+    assert sentences.reach_words(falls) == "without the wall it reaches 0.1 m and falls"
+    of_many = replace(answer, free_overturned=1, free_runs=4)
+    assert sentences.reach_words(of_many).endswith("0.1 m, and 1 of 4 runs fall")
 
 
 def test_one_that_falls_at_no_gap_leaves_nothing_safe():

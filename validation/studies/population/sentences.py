@@ -51,7 +51,9 @@ def length(metres: float) -> str:
 
 def percent(share: float) -> str:
     """A share in percent: two digits, and no more than it is worth."""
-    return f"{100.0 * share:.2g} %" if share < 0.995 or share == 1.0 else ">99 %"
+    if share == 1.0:
+        return "100 %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else ">99 %"
 
 
 def count_of(number: int, noun: str) -> str:
@@ -76,7 +78,7 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
     of = runs_words(answer, gathered)
     sentences = [
         f"{name} overturns in {share.count} of {of}, {percent(share.probability)}"
-        f" (95 %: {100.0 * share.low:.2g} to {100.0 * share.high:.2g} %)."
+        f" (95 %: {percent(share.low).removesuffix(' %')} to {percent(share.high)})."
     ]
     if answer.few:
         sentences.append(
