@@ -22,7 +22,7 @@ from typing import Any, Literal
 from pydantic import BaseModel
 
 from rockcheck.scenes import progress, writing
-from rockcheck.validation.execute import models, pool, provenance
+from rockcheck.validation.execute import pool, provenance
 from rockcheck.validation.execute.store import RECORDS, Store, adapter_of, name_of
 from rockcheck.validation.finding import Finding, Made
 
@@ -64,13 +64,12 @@ class Task:
     def depends(self) -> Any:
         """All that the result depends on, as JSON.
 
-        By default the fields, the code that its module can reach and that of all models, which are
-        imported by their names, all libraries, and, where a time counts, the machine.
+        By default the fields, the code that its module can call, that of all models included, all
+        libraries, and, where a time counts, the machine.
         """
-        modules = {type(self).__module__, *(kind.module for kind in models.FAMILIES.values())}
         return {
             "task": self.fields(),
-            "code": [provenance.code_digest(one) for one in sorted(modules)],
+            "code": provenance.code_digest(type(self).__module__),
             "versions": provenance.versions(),
             "machine": provenance.hardware() if self.clocked or self.where == "timed" else None,
         }
@@ -229,7 +228,7 @@ def play_tasks(
     on_progress: progress.OnProgress = progress.unheard,
 ) -> PlayedTasks:
     """Play what is not up to date in `folder`, and keep each record as it comes; see `run`."""
-    provenance.code_digest.cache_clear()
+    provenance.read_code_again()
     if scheduler is not None and not pool.local_workers(scheduler):
         with pool.connected(scheduler):  # raises where none answers
             pass

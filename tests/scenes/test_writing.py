@@ -99,11 +99,7 @@ DOORS = {
     | {"reports/show/drawing.py"},
     r"\.open\(|\bopen\(": {"scenes/reading.py", "scenes/writing.py", "validation/suite/across.py"},
     # Results go through `writing.made`; caches of the user's own lie in folders of mode 0700.
-    r"\.mkdir\(": {
-        "scenes/writing.py",
-        "scenes/compiled.py",
-        "validation/execute/provenance.py",
-    },
+    r"\.mkdir\(": {"scenes/writing.py", "scenes/compiled.py"},
     r"(?<!reading)\.read_(text|bytes)\(": {
         "scenes/compiled.py",
         "scenes/experience.py",

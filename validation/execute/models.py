@@ -194,11 +194,6 @@ def check_allowed(name: str, allow_code: Container[str]) -> None:
         )
 
 
-def home(name: str) -> str:
-    """The module that defines the model of that name; for "module:Class" the named module."""
-    return family(name).module if is_own(name) else str(class_of(name).__module__)
-
-
 def class_of(name: str) -> Any:
     """The class of the model of that name, imported. Raises `InputError` where there is none."""
     kind = family(name)

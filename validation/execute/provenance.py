@@ -1,10 +1,11 @@
 """The key of a result, from all that it depends on; versions and hardware of a run.
 
-A result depends on code, libraries, scene and settings.
+In go a scene, a model with its settings, and the module that calculates; out come short hashes.
+Suites and studies call it: a result is read back only under the key that it was kept under.
+
+Code counts by folder, as its files are. A remark that changes is a change.
 """
 
-import ast
-import contextlib
 import hashlib
 import json
 import os
@@ -12,27 +13,31 @@ import platform
 import re
 import sys
 import uuid
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib import metadata, resources
-from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
-from itertools import accumulate, chain
+from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import InputError, Scene
+from rockcheck.scenes import Scene
 from rockcheck.scenes.history_files import events_path
 from rockcheck.validation.execute import models
-from rockcheck.validation.execute.store import Store, name_of
 
-#: The package whose code counts where it can be reached; the package of the model itself always
-#: does.
-OWN_PACKAGE = "rockcheck"
-#: The kind of results that a digest of our code is, in the user's own store.
-CODE = "code"
-#: Names of the folders that installed packages lie in.
-INSTALLED = ("site-packages", "dist-packages")
+#: The package whose code counts by folder.
+PACKAGE = "rockcheck"
+#: By folder of the package, the folders whose code it can call, itself included: imports point one
+#: way. Nothing that is kept depends on `reports` or the commands.
+FOLDERS = {
+    "scenes": ("scenes",),
+    "ebm": ("scenes", "ebm"),
+    "cm": ("scenes", "cm"),
+    "engines": ("scenes", "engines"),
+    "validation": ("scenes", "ebm", "cm", "engines", "validation"),
+}
 #: What is installed, by the names of the packages that it gives.
 _distributions = cache(metadata.packages_distributions)
 
@@ -42,37 +47,25 @@ def cell_key(
 ) -> str:
     """Hash of all that a cell's history depends on.
 
-    That is scene, settings, the files of a measured history, the code that the model can reach, the
-    versions of its libraries and of Python, and the machine type. `search_path` holds folders in
-    which a user-defined model may lie. Its source is read, not run; its libraries are what that
-    code imports.
+    That is scene, settings, the files of a measured history, the code of the folders that the model
+    calls, the versions of its libraries and of Python, and the machine type. `search_path` holds
+    folders in which a user-defined model may lie. Its source is read, not run; its libraries are
+    what that code imports.
     """
-    given = settings["files"].get(scene.name, []) if name == "measured" else []
-    code = reachable(models.home(name), search_path) if models.is_own(name) else {}
-    files = [  # of a measured history, and of its events
-        file
-        for table in map(Path, [given] if isinstance(given, str) else given)
-        for file in (table, events_path(table))
-        if file.is_file()
-    ]
-    imported = [
-        library
-        for module, path in code.items()
-        for one in _imports(path, module, lambda _: False, ())
-        for library in _distributions().get(one.split(".")[0], ())
-    ]
+    family = models.family(name)
+    libraries = [*models.NUMBERS, *family.libraries]
+    if models.is_own(name):
+        libraries += user_code(family.module, search_path).libraries
+    files = _measured_files(settings["files"].get(scene.name, [])) if name == "measured" else []
     return digest(
         json.dumps(
             {
                 "scene": scene.model_dump(mode="json"),
                 "model": name,
                 "settings": dict(settings),
-                "files": [hashlib.sha256(file.read_bytes()).hexdigest() for file in files],
-                "code": code_digest(models.home(name), search_path),
-                "libraries": {
-                    library: version_of(library)
-                    for library in (*models.NUMBERS, *models.family(name).libraries, *imported)
-                },
+                "files": [_hash(file) for file in files],
+                "code": code_digest(family.module, search_path),
+                "libraries": {library: version_of(library) for library in libraries},
                 "python": platform.python_version(),
                 "machine": platform.machine(),
             },
@@ -82,154 +75,126 @@ def cell_key(
     )
 
 
+def _measured_files(tables: str | list[str]) -> list[Path]:
+    """The files of a measured history, with those of its events."""
+    files: list[Path] = []
+    for table in [tables] if isinstance(tables, str) else tables:
+        path = Path(table)
+        files += [file for file in (path, events_path(path)) if file.is_file()]
+    return files
+
+
 def digest(text: str) -> str:
     """A short hash of a text, 16 hex digits."""
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
 @cache
 def code_digest(module: str, search_path: tuple[str, ...] = ()) -> str:
-    """Hash of the code of a module and of all project modules that it imports.
+    """Hash of the code that a module can call.
 
-    Imports count at its top and inside functions. The hash is that of the syntax trees without
-    docstrings: comments, layout and documentation do not count. For rockcheck's own modules it is
-    kept for later processes, under a hash of all our sources. A module without a file, as in a
-    notebook, has another one in each run: nobody can say that its code is still the same. A run
-    clears the cache: files may have changed.
+    Of a module of rockcheck these are the folders in `FOLDERS`. Of a user's module they are all of
+    them, and its files (`user_code`). A module without a file, as in a notebook, has another hash
+    in each run: nobody can say that its code is still the same.
     """
-    with contextlib.suppress(InputError, OSError):  # there may be no folder to keep it in
-        if module.split(".")[0] == OWN_PACKAGE:
-            user = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
-            user.mkdir(mode=0o700, parents=True, exist_ok=True)
-            kept, name = Store(user, (CODE,)), name_of(module, _of_all_sources())
-            kept.prune()
-            return kept.once(CODE, name, str, lambda: _digest_of(module, search_path))
-    return _digest_of(module, search_path)
-
-
-def _digest_of(module: str, search_path: tuple[str, ...]) -> str:
+    package, *inner = module.split(".")
+    if package == PACKAGE:
+        return digest("\n".join(_folder_digest(folder) for folder in FOLDERS[inner[0]]))
+    files = user_code(module, search_path).files
+    hashes = [f"{name} {_hash(file)}" for name, file in sorted(files.items())]
     return digest(
-        "".join(
-            f"{name}\n{_source_of(path, path.stat().st_mtime_ns)[1]}\n"
-            for name, path in sorted(reachable(module, search_path).items())
+        "\n".join(
+            [
+                *(_folder_digest(folder) for folder in FOLDERS),
+                *(hashes or [uuid.uuid4().hex]),
+            ]
         )
-        or uuid.uuid4().hex
     )
 
 
 @cache
-def _of_all_sources() -> str:
-    """Hash of all our sources, and of the Python that reads them."""
-    root = Path(str(resources.files(OWN_PACKAGE)))
-    # a folder below the root may be a link to the folder of the sources
-    sources = sorted((*root.glob("*.py"), *root.glob("*/**/*.py")))
-    texts = (f"{one.name}\n{one.read_text(encoding='utf-8')}" for one in sources)
-    return digest("\n".join([platform.python_version(), *texts]))
+def _folder_digest(folder: str) -> str:
+    """Hash of the Python files in a folder of the package."""
+    root = Path(str(resources.files(PACKAGE))) / folder
+    files = sorted(root.rglob("*.py"))
+    return digest("\n".join(f"{file.relative_to(root)} {_hash(file)}" for file in files))
 
 
-def reachable(module: str, search_path: tuple[str, ...] = ()) -> dict[str, Path]:
-    """Names and files of the project modules that `module` can import, itself included.
-
-    Those of its own package, of rockcheck, and what lies beside a script or package of the user's
-    own. The packages that contain a module count, but not the other modules that they import.
-    """
-    found: dict[str, Path] = {}
-    top, home = module.split(".")[0], _folder(module, search_path)
-    # Beside rockcheck, or an installed package, lie those of others.
-    together = top != OWN_PACKAGE and home is not None and home.name not in INSTALLED
-
-    def ours(name: str) -> bool:
-        return name.split(".")[0] in (OWN_PACKAGE, top) or (
-            together and _folder(name, search_path) == home
-        )
-
-    waiting = [module]
-    while waiting:
-        name = waiting.pop()
-        path = _source(name, search_path) if ours(name) else None
-        if path and name not in found:
-            found[name] = path
-            package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-            waiting += _imports(path, package, ours, search_path)
-    above = {one for name in found for one in accumulate(name.split(".")[:-1], "{}.{}".format)}
-    return {one: path for one in above if (path := _source(one, search_path))} | found
+def read_code_again() -> None:
+    """Forget what was read of the code: a run calls it first, since files may have changed."""
+    code_digest.cache_clear()
+    _folder_digest.cache_clear()
+    user_code.cache_clear()
 
 
-def _folder(name: str, search_path: tuple[str, ...]) -> Path | None:
-    """The folder that a module's topmost package, or the module itself, lies in."""
-    path = _source(name.split(".")[0], search_path)
-    return path.parents[path.name == "__init__.py"] if path else None
+@dataclass(frozen=True)
+class UserCode:
+    """The files of a user's module by module name, and the installed libraries it imports."""
+
+    files: Mapping[str, Path]
+    libraries: tuple[str, ...]
 
 
 @cache
-def _source(name: str, search_path: tuple[str, ...]) -> Path | None:
-    """The file of a module, None where there is none (a name inside a module).
+def user_code(module: str, search_path: tuple[str, ...] = ()) -> UserCode:
+    """A user's module, and what it imports from the folder that it lies in.
 
-    No code of `search_path` is run.
+    Imports count at the top and inside functions. No code is run. Libraries count by their version.
     """
-    top, *inner = name.split(".")
+    top = module.split(".")[0]
+    file = _file_of(top, search_path)
+    if file is None:
+        return UserCode({}, ())
+    folder = file.parents[1] if file.name == "__init__.py" else file.parent
+    finder = _Imports(path=[str(folder)], excludes={PACKAGE, *_distributions()} - {top})
+    try:
+        if top == "__main__":
+            finder.run_script(str(file))
+        else:
+            finder.import_hook(module)
+    except (ImportError, SyntaxError):  # it cannot be played, which its cell will say
+        pass
+    files: dict[str, Path] = {}
+    for name, imported in finder.modules.items():
+        path = Path(getattr(imported, "__file__", None) or "")
+        if path.is_file():
+            files[name] = path
+    libraries = {
+        library
+        for name in (top, *finder.badmodules)
+        for library in _distributions().get(name.split(".")[0], ())
+    }
+    return UserCode(files or {module: file}, tuple(sorted(libraries)))
+
+
+def _file_of(top: str, search_path: tuple[str, ...]) -> Path | None:
+    """The file of a module or package; None where it has none, as in a notebook."""
     try:
         spec = find_spec(top) or PathFinder.find_spec(top, list(search_path))
         origin = spec and spec.origin
     except ValueError:  # it is loaded, as a script is, and has no spec
         origin = getattr(sys.modules.get(top), "__file__", None)
-    path = Path(origin) if origin and os.path.isfile(origin) else None  # not "<stdin>"
-    if path and inner:
-        base = path.parent.joinpath(*inner)
-        return next(
-            (
-                file
-                for ending in ("/__init__.py", ".py", *EXTENSION_SUFFIXES)
-                if (file := Path(f"{base}{ending}")).is_file()
-            ),
-            None,
-        )
-    return path
+    return Path(origin) if origin and os.path.isfile(origin) else None  # not "<stdin>"
 
 
-def _imports(
-    path: Path, package: str, ours: Callable[[str], bool], search_path: tuple[str, ...]
-) -> Iterable[str]:
-    """Names of the modules that a file of `package` imports.
+class _Imports(ModuleFinder):
+    """What a module imports, without running it; what cannot be read counts as not there."""
 
-    `from base import name` gives the submodule `base.name` of a project package if there is one,
-    else `base`.
-    """
-    for node in _source_of(path, path.stat().st_mtime_ns)[0]:
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        else:
-            above = package.split(".")[: 1 - node.level or None] if node.level else []
-            base = ".".join(filter(None, [*above, node.module]))
-            for alias in node.names:
-                inner = f"{base}.{alias.name}"
-                yield (inner if ours(base) and _source(inner, search_path) else base)
+    def find_module(self, name: str, path: Any, parent: Any = None) -> Any:
+        try:
+            return super().find_module(name, path, parent)
+        except (AttributeError, TypeError):  # of a folder without __init__.py, in Python 3.11
+            raise ImportError(name) from None
 
-
-@cache
-def _source_of(path: Path, changed: int) -> tuple[list[ast.Import | ast.ImportFrom], str]:
-    """What a source file imports, and its syntax tree without docstrings, as text.
-
-    When the file was last `changed` counts for the cache only.
-
-    A package that loads its parts as they are used imports what its stub says. Of a file that is no
-    Python, such as a compiled module, a hash of its content.
-    """
-    imports = list[ast.Import | ast.ImportFrom]()
-    try:
-        tree, *stub = (
-            ast.parse(one.read_bytes()) for one in (path, path.with_suffix(".pyi")) if one.is_file()
-        )
-    except (SyntaxError, ValueError):
-        return imports, hashlib.sha256(path.read_bytes()).hexdigest()
-    for node in chain.from_iterable(map(ast.walk, [tree, *stub])):
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            imports.append(node)
-        elif isinstance(
-            node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
-        ) and ast.get_docstring(node, clean=False):
-            node.body = node.body[1:] or [ast.Pass()]
-    return imports, ast.dump(tree)
+    def load_module(self, fqname: str, fp: Any, pathname: str, file_info: Any) -> Any:
+        try:
+            return super().load_module(fqname, fp, pathname, file_info)
+        except (ValueError, RecursionError) as error:  # a NUL, or nested beyond all use
+            raise ImportError(fqname) from error
 
 
 @cache

@@ -596,8 +596,8 @@ def _check_modules(members: Sequence[Suite]) -> None:
         for model in member.models.values():
             if not is_own(model.family):
                 continue
-            modules = provenance.reachable(family(model.family).module, model.search_path)
-            for module, file in modules.items():
+            user_code = provenance.user_code(family(model.family).module, model.search_path)
+            for module, file in user_code.files.items():
                 paths.setdefault(module, set()).add(file)
     for module in sorted(paths):
         if len(paths[module]) > 1:
