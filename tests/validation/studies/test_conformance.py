@@ -13,8 +13,9 @@ import pandas as pd
 import pytest
 from junitparser import JUnitXml
 
-from rockcheck import InputError, ModelFailure, MuJoCo, engines, load_scene
+from rockcheck import EventBasedModel, InputError, ModelFailure, MuJoCo, engines, load_scene
 from rockcheck.commands.cli import main
+from rockcheck.ebm.ties import ties_of
 from rockcheck.scenes import writing
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.conformance import cards
@@ -22,6 +23,7 @@ from rockcheck.validation.studies.conformance.cards import VERDICTS, Conformance
 from rockcheck.validation.studies.conformance.changes import changes
 from rockcheck.validation.studies.conformance.export import STATE
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
+from rockcheck.validation.studies.conformance.phenomenon import Motion
 from rockcheck.validation.studies.conformance.players import (
     Player,
     named,
@@ -177,11 +179,29 @@ def test_the_engines_here_are_those_that_are_installed():
 def test_an_engine_gets_a_card_on_which_what_fails_is_known(name, settings, lacks, failing):
     found = played(named(name, settings, {}))
     wrong, reported = verdicts(found, "fail", "error"), verdicts(found, "reported")
-    assert (wrong, reported, found.exit_code) == (failing, {"RC-18"}, bool(failing))
+    assert (wrong, reported, found.exit_code) == (failing, {"RC-18", "RC-29"}, bool(failing))
     (engine,) = found.table("engines").records()
     assert sum(engine.get(verdict, 0) for verdict in VERDICTS) == engine["total"]
     assert engine["total"] == len(PHENOMENA)
     assert (engine["lacks"], bool(engine["version"])) == (lacks, True)
+
+
+def test_the_strike_of_both_walls_is_a_tie():
+    assert [tie.what for tie in ties_of(SCENES["both-walls"])] == ["both walls are equally far"]
+
+
+@pytest.mark.parametrize("nearer", [0, 1])
+def test_of_two_walls_the_nearer_by_any_little_is_struck_first(nearer):
+    scene = SCENES["both-walls"]
+    walls = list(scene.walls)
+    walls[nearer] = walls[nearer].replace(gap=walls[nearer].gap * (1.0 - 1e-7))
+    histories = [
+        EventBasedModel(pivot="unilateral").simulate(one)
+        for one in (scene, scene.replace(walls=walls))
+    ]
+    both, first = (PHENOMENA["RC-29"].value(Motion(history)) for history in histories)
+    assert both == pytest.approx(0.0, abs=1e-9)
+    assert first < -0.1
 
 
 def test_what_goes_wrong_in_a_scene_costs_what_needs_it(planted, histories):
@@ -202,7 +222,7 @@ def test_what_goes_wrong_in_a_scene_costs_what_needs_it(planted, histories):
     ] == [("RC-01", True), ("RC-02", True), ("RC-04", True), ("RC-05", True)]
     (suite,) = JUnitXml.fromstring(found.files["junit.xml"].encode())
     counts = (suite.tests, suite.failures, suite.errors, suite.skipped)
-    assert (counts, found.exit_code) == ((len(PHENOMENA), 0, 4, 1), 1)
+    assert (counts, found.exit_code) == ((len(PHENOMENA), 0, 4, 2), 1)
 
 
 def test_what_changed_between_versions(planted, histories, written, tmp_path):
@@ -281,7 +301,7 @@ def test_another_program_takes_part_by_files(exported, histories, tmp_path, told
     assert (card["engine"], card["settings"], card["counts"]["pass"], card["counts"]["total"]) == (
         "my engine",
         "as it comes",
-        len(PHENOMENA) - 1,
+        len(PHENOMENA) - 2,
         len(PHENOMENA),
     )
     (exported / "coast.csv").unlink()
@@ -421,7 +441,7 @@ def test_code_of_ones_own_is_played_by_a_worker_and_again_where_it_failed(
     assert (card["version"], card["settings"]) == ("7", settings)
     failed = {row["id"]: row["verdict"] for row in card["phenomena"] if row["verdict"] != "pass"}
     assert (failed, list(found["failures"])) == (
-        {"RC-04": "fail", "RC-05": "error", "RC-18": "reported"},
+        {"RC-04": "fail", "RC-05": "error", "RC-18": "reported", "RC-29": "reported"},
         [f"halfway:Halfway, {settings}: RC-05"],
     )
     scenes = (tmp_path / "played").read_text("utf-8").splitlines()

@@ -66,6 +66,19 @@ TO_AND_FRO = Scene(
     duration=0.6,
     output_step=1e-3,
 )
+#: A block that turns in the air, its centre in the middle: both walls are struck at 0.13 s.
+TURNING = 0.5  # rad/s
+BOTH_WALLS = Scene(
+    name="both-walls",
+    block=SLENDER,
+    floor=Floor(friction=0.6),
+    walls=tuple(Wall(side=side, gap=0.1, restitution=0.0) for side in ("left", "right")),
+    initial_height=0.3,
+    initial_angular_velocity=TURNING,
+    initial_velocity=TURNING * SLENDER.half_height,
+    duration=0.25,
+    output_step=1e-3,
+)
 ALMOST_FLUSH = tuple(
     Scene(
         name=f"almost-flush-{tilt:g}",
@@ -108,6 +121,12 @@ def turning_after_landing(motion: Motion) -> float:
     """Angular velocity after a flush landing, rad/s."""
     before, after = np.interp([LANDS + 0.01, LANDS + 0.03], motion.t, motion.theta)
     return float((after - before) / 0.02)
+
+
+def turning_left(motion: Motion) -> float:
+    """The share of the angular velocity that a strike of both walls leaves."""
+    before, after = np.interp([0.16, 0.2], motion.t, motion.theta)
+    return float((after - before) / 0.04 / TURNING)
 
 
 def tipping(motion: Motion) -> float:
@@ -171,7 +190,7 @@ IMPACTS = (
         0.0,
         None,
         "rad/s",
-        "several answers: not judged",
+        "a tie, several answers: not judged",
         "Not a fault: two corners that land at one instant may share the impulse in several ways.",
         "nothing",
     ),
@@ -201,5 +220,17 @@ IMPACTS = (
         "a solver that solves both corners of a face together; more iterations",
         theme="solver",
         needs="restitution",
+    ),
+    Phenomenon(
+        "RC-29",
+        "both walls at one instant: which law",
+        (BOTH_WALLS,),
+        turning_left,
+        0.0,
+        None,
+        "of the turning",
+        "a tie, several answers: not judged",
+        "Not a fault: a wall that is nearer by any little is struck first.",
+        "nothing",
     ),
 )
