@@ -139,6 +139,13 @@ def test_an_interval_may_reach_up_to_all_runs():
     assert words == "shelf overturns in 3 of 3 records, 100 % (95 %: 29 to 100 %)."
 
 
+def test_a_block_that_moves_on_may_come_to_rest_later():
+    # without friction it slides until a wall stops it: the outcome is certain before
+    everything = gathered({"a": RUNS["b"]})
+    words = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
+    assert words == ["shelf does not fall, and moves on."]
+
+
 def test_the_first_sentence_has_both_answers_of_a_tie():
     tie = ("friction equals B/H", 0.4, ("at rest", "overturned right"))
     sure = {"a": results.Certainty(ties=(tie,))}

@@ -26,7 +26,7 @@ UNITS = {"alpha": "α"}
 #: Fates of a single run.
 FATE_WORDS = {
     "at rest": "stays",
-    "moving": "does not fall, and moves on for ever",
+    "moving": "does not fall, and moves on",
     "overturned left": "overturns to the left",
     "overturned right": "overturns to the right",
     UNDECIDED: "is undecided: nothing decides within the time allowed whether it falls",
