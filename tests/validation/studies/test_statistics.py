@@ -294,6 +294,13 @@ def test_most_gaps_of_draws_are_where_blocks_stand():
     assert of_draws[-1] == 2.0
 
 
+def test_draws_are_looked_at_where_it_is_asked_for():
+    as_it_is, of_draws = gaps_looked_at(2.0, (0.1, 0.02, 0.05))
+    assert of_draws == (0.02, 0.05, 0.1)
+    assert len(as_it_is) == 81
+    assert set(of_draws) <= set(as_it_is)
+
+
 def test_how_finely_was_looked_is_told_on_both_sides_of_where_it_changes():
     answer = replace(
         gap_answer(a=search()),

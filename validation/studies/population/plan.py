@@ -435,21 +435,23 @@ def gaps_looked_at(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """The gaps (m) at which the scene as it is is looked at, and those for its draws.
 
-    From the `least` to the free `reach`, or between the least and the largest of `values`, which
-    are among them.
+    From the `least` to the free `reach`. Where `values` are given, these are the gaps for its
+    draws, and bound the others.
     """
     low, high = (min(values), max(values)) if values else (least, max(reach, least))
     fine_end = min(high, low + FINE_UP_TO)
     fine = low + FINE_GAP * np.arange(math.floor((fine_end - low) / FINE_GAP * (1 + 1e-12)) + 1)
     far = np.linspace(fine_end, high, FAR_GAPS + 1) if high > fine_end else [high]
-    if high > fine_end:
+    coarse = np.array([low])
+    if values:
+        coarse = np.array(values)
+    elif high > fine_end:
         near = np.linspace(low, fine_end, COARSE_NEAR + 1)
         coarse = np.append(near, np.linspace(fine_end, high, COARSE_GAPS - COARSE_NEAR + 1)[1:])
-    else:
-        coarse = np.linspace(low, high, COARSE_GAPS + 1) if high > low else np.array([low])
-    looked = np.unique(np.round(np.concatenate([fine, far, coarse, values]), 12))
-    at_draws = np.unique(np.round(np.concatenate([coarse, values]), 12))
-    return tuple(looked.tolist()), tuple(at_draws.tolist())
+    elif high > low:
+        coarse = np.linspace(low, high, COARSE_GAPS + 1)
+    looked = np.unique(np.round(np.concatenate([fine, far, coarse]), 12))
+    return tuple(looked.tolist()), tuple(np.unique(np.round(coarse, 12)).tolist())
 
 
 def factors_of(scene: Scene) -> tuple[float, ...]:
