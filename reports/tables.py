@@ -30,7 +30,8 @@ from rockcheck.validation.finding import (
 )
 from rockcheck.validation.suite import across, results
 from rockcheck.validation.suite.tables import nearest, used
-from rockcheck.validation.suite.tolerances import apart, known
+from rockcheck.validation.suite.tolerances import known
+from rockcheck.validation.suite.verdicts import apart
 
 #: What a verdict is called and the sign that goes with its colour.
 VERDICTS = {

@@ -35,7 +35,7 @@ from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, files, printable
 from rockcheck.validation.execute import models
 from rockcheck.validation.finding import Finding, Text
-from rockcheck.validation.suite import across, results, runner, suites, tables
+from rockcheck.validation.suite import accepting, across, results, runner, suites, tables
 
 
 @dataclass(frozen=True)
@@ -324,7 +324,7 @@ def accept(
     loaded = _suite(suite, OfScene(), allow_code or ())
     folder = _folder_of(loaded, played.out)
     finished = play(loaded, folder, played)
-    changes, refused = suites.accept(loaded, finished, reason, write=not dry_run)
+    changes, refused = accepting.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
     told(
         Finding(

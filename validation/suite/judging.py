@@ -11,7 +11,7 @@ from rockcheck.validation.discrepancy.figures import Figure, Measure
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import HISTORIES, TABLE
 from rockcheck.validation.study import FAULTS
-from rockcheck.validation.suite import results, suites, tolerances
+from rockcheck.validation.suite import results, suites, tolerances, verdicts
 from rockcheck.validation.suite.comparing import ComparedFigure, ComparisonRecord
 from rockcheck.validation.suite.planning import CellRecord, Planned, PlannedCell
 
@@ -37,7 +37,7 @@ def judged_cell(
     """
     record: CellRecord = played.record
     required = suite.required(planned.scene_name, planned.variant.label)
-    floor = partial(tolerances.floor_of, scene=planned.scene, numerical=record.numerical)
+    floor = partial(verdicts.floor_of, scene=planned.scene, numerical=record.numerical)
     checks = list(checks_of(suite, required, comparison.figures, floor))
     if reference is not None and _is_judged_beside(suite, planned, checks):
         beside = usable_figures(reference)
@@ -171,7 +171,7 @@ def checks_of(
         yardstick = None
         if beside is not None and line is not None and kind == "absolute":
             yardstick = beside.get(key.windowed)
-        yield tolerances.judge(
+        yield verdicts.judge(
             found.figure,
             line,
             kind=kind,

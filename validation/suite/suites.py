@@ -79,7 +79,6 @@ from rockcheck.validation.suite.tolerances import (
     OWN_FIGURES,
     ToleranceKey,
     Tolerances,
-    accepted_in,
     measure_of,
     parse_tolerances,
 )
@@ -404,38 +403,6 @@ def scene_suite(
         for label, variant in suite.models.items()
     }
     return replace(suite, models=variants, judged=False, unnamed=frozenset(unnamed))
-
-
-def accept(
-    suite: Suite, run: results.Run, reason: str | None, *, write: bool = True
-) -> tuple[list[str], list[str]]:
-    """Write the figures of `run` into the tolerance file of `suite`.
-
-    Returns the changes and the refusals, a line each. A change is new, tightened (to a better
-    value), loosened (a wider limit) or moved (another expected value); the last two need a
-    `reason`, which goes into the file. A check without a figure, and a line that would not pass
-    now, is always refused; a figure that is not defined needs no line. Without `write` the file
-    stays as it is.
-    """
-    changes: list[str] = []
-    refused: list[str] = []
-    for member in suite.members:
-        checks = [
-            (cell, check)
-            for cell, check in run.checks()
-            if check.verdict != "not defined"
-            and (cell.scene in member.scenes or cell.scene in member.ensembles)
-        ]
-        member_changes, member_refused = accepted_in(
-            member.tolerances_path,
-            checks,
-            reason,
-            nested=member.tolerances_path == member.path,
-            write=write,
-        )
-        changes += member_changes
-        refused += member_refused
-    return changes, refused
 
 
 def check_source(source: str) -> None:

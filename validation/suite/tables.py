@@ -9,7 +9,7 @@ from typing import Any
 from rockcheck.scenes import printable, writing
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import Block, Column, Finding, Mark, Table, Text, Verdict, text
-from rockcheck.validation.suite import results, tolerances
+from rockcheck.validation.suite import results, tolerances, verdicts
 
 #: The most scenes that tables and pages show one by one.
 MOST_SHOWN = 200
@@ -246,7 +246,7 @@ def used(check: results.Check) -> float:
     if check.ideal is None:  # an "at least" measure: the needed share of the value
         return min(limit / value if value > 0.0 else math.inf, most)
     floor = 0.0 if measure.is_error else check.floor
-    return min(tolerances.apart(value, check.ideal, floor) / limit, most)
+    return min(verdicts.apart(value, check.ideal, floor) / limit, most)
 
 
 def nearest(checks: Iterable[results.Check]) -> results.Check | None:

@@ -11,7 +11,7 @@ from scipy.stats import ttest_1samp
 from rockcheck.reports.figures import EnsembleView
 from rockcheck.validation.discrepancy import ensemble, measures
 from rockcheck.validation.discrepancy.compare import evaluate
-from rockcheck.validation.suite import suites
+from rockcheck.validation.suite import accepting, suites
 from rockcheck.validation.suite.runner import run_suite
 
 OWN = [
@@ -165,7 +165,7 @@ def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
     suite = loaded(SUITE.partition("[tolerances")[0])
     first = run_suite(suite, tmp_path / "out", jobs=0)
     assert first.by_scene["crowd"]["near"].verdict == "fail"
-    changes, refused = suites.accept(suite, first, None)
+    changes, refused = accepting.accept(suite, first, None)
     assert ([change.partition(":")[0] for change in changes], refused) == (
         ["[crowd.near.still] ks_distance", "[crowd.near.still] overturning_accuracy"],
         [],

@@ -9,7 +9,7 @@ import pytest
 
 from rockcheck import Block, Floor, Rest, Scene, compare
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import across, results, tables, tolerances
+from rockcheck.validation.suite import across, results, tables, tolerances, verdicts
 from rockcheck.validation.uncertainty import numerical
 
 SCENE = Scene(
@@ -34,7 +34,7 @@ def check(
     figure = figures.Figure(
         measure=measure, label=measure, unit="1", value=value, against="r", note=note
     )
-    return tolerances.judge(figure, line, kind=kind, measure=tolerances.MEASURES[measure], **more)
+    return verdicts.judge(figure, line, kind=kind, measure=tolerances.MEASURES[measure], **more)
 
 
 def run_of(*checks: results.Check, **more: object) -> results.Run:
@@ -218,9 +218,7 @@ def test_floors_come_from_the_rows_and_from_u_num():
         "floor_impacts": (0.0, 0.0),
     }
     assert {
-        name: tuple(
-            tolerances.floor_of(tolerances.MEASURES[name], SCENE, of) for of in (None, known)
-        )
+        name: tuple(verdicts.floor_of(tolerances.MEASURES[name], SCENE, of) for of in (None, known))
         for name in floors
     } == {name: pytest.approx(values) for name, values in floors.items()}
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import results, suites, tolerances
+from rockcheck.validation.suite import accepting, results, suites, tolerances, verdicts
 
 LINE = tolerances.Tolerance(expected=1.0e-3, limit=2.0e-3, drift=1.0e-4, why="a test")
 
@@ -17,7 +17,7 @@ def check(value, line=LINE, measure="theta_rms", note="", **more):
     figure = figures.Figure(
         measure=measure, label=measure, unit="alpha", value=value, against="r", note=note
     )
-    return tolerances.judge(
+    return verdicts.judge(
         figure, line, kind="numerical", measure=tolerances.MEASURES[measure], **more
     )
 
@@ -95,7 +95,7 @@ def accepted(written):
         member = SimpleNamespace(
             path=Path("mine.toml"), tolerances_path=path, scenes={"s": None}, ensembles={}
         )
-        return *suites.accept(SimpleNamespace(members=[member]), run, reason), kept.read_text(
+        return *accepting.accept(SimpleNamespace(members=[member]), run, reason), kept.read_text(
             "utf-8"
         )
 

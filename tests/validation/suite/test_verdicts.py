@@ -6,7 +6,7 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from rockcheck.validation.discrepancy import figures, impact_laws, measures
-from rockcheck.validation.suite import results, tables, tolerances
+from rockcheck.validation.suite import results, tables, tolerances, verdicts
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 EXACT = tolerances.Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
@@ -22,7 +22,7 @@ def check(
     **more: str,
 ) -> results.Check:
     about = {"label": measure, "unit": "alpha", "against": "r", **more}
-    return tolerances.judge(
+    return verdicts.judge(
         figures.Figure(measure=measure, value=value, **about),
         line,
         kind=kind,
