@@ -36,6 +36,7 @@ from rockcheck.scenes import InputError, files, printable
 from rockcheck.validation.execute import models
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.suite import accepting, across, results, runner, suites, tables
+from rockcheck.validation.suite.cells import Suite
 
 
 @dataclass(frozen=True)
@@ -189,7 +190,7 @@ def _refuse_judging(scene_name: str, options: Mapping[str, object]) -> None:
 
 
 def _show_trend(
-    finished: results.Run, suite: suites.Suite, history: Path, folder: Path, *, published: bool
+    finished: results.Run, suite: Suite, history: Path, folder: Path, *, published: bool
 ) -> None:
     """Add a run to a history of runs, and show the trend; as a page where it is `published`."""
     from rockcheck.reports import document, terminal
@@ -202,7 +203,7 @@ def _show_trend(
         console().print(f"trend: {page}", soft_wrap=True)
 
 
-def _suite(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Suite:
+def _suite(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> Suite:
     for option, value in vars(of_scene).items():
         if value and value != ALL:
             raise InputError("is for a scene: a suite says which models play what", f"--{option}")
@@ -211,7 +212,7 @@ def _suite(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Su
     return suite
 
 
-def _scene(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> suites.Suite:
+def _scene(name: str, of_scene: OfScene, allow_code: Sequence[str]) -> Suite:
     sets = record_sets(of_scene.records or (), of_scene.read or ())
     chosen = chosen_models(of_scene.models, of_scene.set or ())
     configured = {setting.partition(".")[0] for setting in of_scene.set or ()}
@@ -256,7 +257,7 @@ def _playable(
     return playable
 
 
-def _folder_of(suite: suites.Suite, out: Path) -> Path:
+def _folder_of(suite: Suite, out: Path) -> Path:
     """The folder of a run; another suite's run there is replaced, and a line says so."""
     folder = usable_folder(out)
     before: results.Run | None = None
@@ -271,7 +272,7 @@ def _folder_of(suite: suites.Suite, out: Path) -> Path:
     return folder
 
 
-def play(suite: suites.Suite, folder: Path, played: Played, **how: Any) -> results.Run:
+def play(suite: Suite, folder: Path, played: Played, **how: Any) -> results.Run:
     """Run a suite with a progress bar on stderr."""
     models = ((one.family, one.settings) for one in suite.models.values())
     with progress(suite.name, models) as on_progress:

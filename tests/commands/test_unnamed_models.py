@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.validation.execute import models
-from rockcheck.validation.suite import runner, suites, tables
+from rockcheck.validation.suite import cells, runner, suites, tables
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SCENE = """
@@ -82,14 +82,14 @@ def test_a_scene_that_no_model_can_play_says_why(refused, monkeypatch):
 
 @pytest.mark.needs("box2d")
 def test_an_engine_that_nobody_named_is_left_out_when_its_time_is_over(monkeypatch, tmp_path):
-    monkeypatch.setattr(suites, "UNNAMED_SECONDS", 0.05)
+    monkeypatch.setattr(cells, "UNNAMED_SECONDS", 0.05)
     chosen = {"ebm-unilateral": {}, "box2d": {}}
     suite = suites.scene_suite("fig5a", chosen, unnamed=["ebm-unilateral", "box2d"])
     finished = runner.run_suite(suite, tmp_path / "out", jobs=1)
-    cells = finished.by_scene["fig5a"]
-    assert cells["ebm-unilateral"].status == "done"
-    assert cells["box2d"].status == "unavailable"
-    assert cells["box2d"].reason.startswith("did not end within 0.05 s; left out, since nobody")
+    by_model = finished.by_scene["fig5a"]
+    assert by_model["ebm-unilateral"].status == "done"
+    assert by_model["box2d"].status == "unavailable"
+    assert by_model["box2d"].reason.startswith("did not end within 0.05 s; left out, since nobody")
     assert "box2d: did not end within" in "\n".join(tables.verdict_lines(finished))
     assert finished.exit_code == 0
 

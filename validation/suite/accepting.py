@@ -17,7 +17,7 @@ from rockcheck.scenes import InputError, printable, reading, writing
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.suite import results
 from rockcheck.validation.suite.suites import Suite
-from rockcheck.validation.suite.tolerances import MEASURES, OWN_FIGURES, Tolerance, ToleranceKey
+from rockcheck.validation.suite.tolerances import CELL_FIGURES, MEASURES, Tolerance, ToleranceKey
 from rockcheck.validation.suite.verdicts import judge
 
 #: Limit and drift band of a new line: multiples of a difference from the perfect value, and of a
@@ -80,7 +80,7 @@ def _accept_in_file(
     tables: Any = document.setdefault("tolerances", tomlkit.table()) if nested else document
     try:
         for cell, check in checks:
-            against = check.figure.against or OWN_FIGURES
+            against = check.figure.against or CELL_FIGURES
             key = ToleranceKey(cell.scene, cell.model, against, check.figure.windowed)
             old_line = {name: getattr(check, name) for name in Tolerance.model_fields}
             line = _new_line(check, reason)

@@ -39,10 +39,10 @@ class Reference:
 class Request:
     """What a cell's comparison computes.
 
-    `wanted` holds the names of measures by reference (`tolerances.OWN_FIGURES`: the history itself)
-    and by window, `window_ends` the end of each window (s; "", the whole time, has none). `landing`
-    is the scene's first at which the laws of impacts part, None without one. `offset` is that of
-    `Reference`, of the cell's own history.
+    `wanted` holds the names of measures by reference (`tolerances.CELL_FIGURES`: the history
+    itself) and by window, `window_ends` the end of each window (s; "", the whole time, has none).
+    `landing` is the scene's first at which the laws of impacts part, None without one. `offset` is
+    that of `Reference`, of the cell's own history.
     """
 
     scene: Scene

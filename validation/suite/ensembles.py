@@ -15,7 +15,8 @@ from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.discrepancy.ensemble import Sample, Samples
 from rockcheck.validation.execute import models, pool
-from rockcheck.validation.suite import judging, motions, results, suites
+from rockcheck.validation.suite import judging, motions, results
+from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.comparing import ComparedFigure
 from rockcheck.validation.suite.planning import BatchRecord, Planned, PlannedBatch
 
@@ -29,7 +30,7 @@ class JudgedEnsemble:
 
 
 def judged_ensemble(
-    suite: suites.Suite,
+    suite: Suite,
     ensemble: motions.Ensemble,
     batches: Mapping[str, Sequence[PlannedBatch]],
     outcomes: Mapping[Planned, models.Played | pool.Failure],
@@ -95,9 +96,7 @@ def _failure(sample: Sample) -> str:
     return f"{sample.failures} of {len(sample.peaks)} scenes failed; the first: {first}"
 
 
-def _judged(
-    suite: suites.Suite, cell: results.Cell, joined: results.EnsembleRecord
-) -> results.Cell:
+def _judged(suite: Suite, cell: results.Cell, joined: results.EnsembleRecord) -> results.Cell:
     """The cell with its figures against each reference, and their checks."""
     sample = joined.samples[cell.model]
     required = suite.required(cell.scene, cell.model)

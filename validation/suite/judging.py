@@ -11,7 +11,8 @@ from rockcheck.validation.discrepancy.figures import Figure, Measure
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import HISTORIES, TABLE
 from rockcheck.validation.study import FAULTS
-from rockcheck.validation.suite import results, suites, tolerances, verdicts
+from rockcheck.validation.suite import results, tolerances, verdicts
+from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.comparing import ComparedFigure, ComparisonRecord
 from rockcheck.validation.suite.planning import CellRecord, Planned, PlannedCell
 
@@ -24,7 +25,7 @@ OFFSET_HINT = (
 
 
 def judged_cell(
-    suite: suites.Suite,
+    suite: Suite,
     planned: PlannedCell,
     played: models.Played,
     comparison: ComparisonRecord,
@@ -58,9 +59,7 @@ def judged_cell(
     )
 
 
-def _is_judged_beside(
-    suite: suites.Suite, planned: Planned, checks: Sequence[results.Check]
-) -> bool:
+def _is_judged_beside(suite: Suite, planned: Planned, checks: Sequence[results.Check]) -> bool:
     """Whether the reference's figures say if a figure that moved is better.
 
     They do where the reference solves the same equations.
@@ -146,7 +145,7 @@ def _status(family: str, missing: str, reason: str) -> results.Status:
 
 
 def checks_of(
-    suite: suites.Suite,
+    suite: Suite,
     required: Required,
     compared: Sequence[ComparedFigure],
     floor: Callable[[Measure], float],
@@ -160,7 +159,8 @@ def checks_of(
     if not suite.judged:
         return
     by_name = {
-        (one.figure.against or tolerances.OWN_FIGURES, one.figure.windowed): one for one in compared
+        (one.figure.against or tolerances.CELL_FIGURES, one.figure.windowed): one
+        for one in compared
     }
     for key, kind in required.items():
         measure = tolerances.measure_of(key.windowed)
@@ -184,7 +184,7 @@ def checks_of(
 
 def _missing_figure(key: tolerances.ToleranceKey, measure: Measure) -> Figure:
     """A figure without a value, so that its check cannot pass."""
-    of_history = key.against == tolerances.OWN_FIGURES
+    of_history = key.against == tolerances.CELL_FIGURES
     return Figure(
         measure=measure.name,
         label=measure.label,

@@ -15,7 +15,9 @@ from rockcheck.validation.discrepancy.figures import Measure, Stored
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, name_of
 from rockcheck.validation.study import Task
-from rockcheck.validation.suite import motions, results, suites, tolerances
+from rockcheck.validation.suite import motions, results, tolerances
+from rockcheck.validation.suite.cells import Suite
+from rockcheck.validation.suite.suite_file import SuiteFile
 from rockcheck.validation.uncertainty import numerical
 
 
@@ -121,7 +123,7 @@ class Plan:
         return model in by_model
 
 
-def plan(suite: suites.Suite) -> Plan:
+def plan(suite: Suite) -> Plan:
     """All that a suite plays."""
     cells: dict[str, dict[str, PlannedCell]] = {}
     batches: dict[str, dict[str, list[PlannedBatch]]] = {}
@@ -143,7 +145,7 @@ def plan(suite: suites.Suite) -> Plan:
 
 
 def _planned_cell(
-    scene: Scene, variant: models.Work, config: suites.SuiteFile, seconds: float
+    scene: Scene, variant: models.Work, config: SuiteFile, seconds: float
 ) -> PlannedCell:
     settings = dict(variant.settings)
     if config.uncertainty:
@@ -164,7 +166,7 @@ def _planned_cell(
 def _planned_batch(
     scene: Scene,
     variant: models.Work,
-    config: suites.SuiteFile,
+    config: SuiteFile,
     ensemble: motions.Ensemble,
     numbers: range,
 ) -> PlannedBatch:
@@ -220,13 +222,13 @@ def wanted_measures(
 ) -> dict[str, MeasuresByWindow]:
     """The measures of a cell, by the reference that they are taken against.
 
-    `yardsticks` are the references (`tolerances.OWN_FIGURES`: the history itself); only models that
-    have `finished` serve. Over the whole time all measures are wanted that are not on request, else
-    the `required` ones.
+    `yardsticks` are the references (`tolerances.CELL_FIGURES`: the history itself); only models
+    that have `finished` serve. Over the whole time all measures are wanted that are not on request,
+    else the `required` ones.
     """
     wanted: dict[str, MeasuresByWindow] = {}
     for yardstick in yardsticks:
-        if yardstick == tolerances.OWN_FIGURES:
+        if yardstick == tolerances.CELL_FIGURES:
             wanted[yardstick] = _by_window(yardstick, measures.FIGURES, required)
         elif yardstick in finished:
             wanted[yardstick] = _by_window(yardstick, measures.DIFFERENCES, required)

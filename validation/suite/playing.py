@@ -13,7 +13,8 @@ from typing import Any
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store
 from rockcheck.validation.study import TaskSource
-from rockcheck.validation.suite import comparing, planning, scene_results, suites
+from rockcheck.validation.suite import comparing, planning, scene_results
+from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.planning import Planned, PlannedCell
 
 
@@ -26,7 +27,7 @@ class SuiteTasks(TaskSource):
     name = "suite"
     kinds = (HISTORIES, COMPARISONS)
 
-    def __init__(self, suite: suites.Suite, folder: Path) -> None:
+    def __init__(self, suite: Suite, folder: Path) -> None:
         self.suite, self.store = suite, Store(folder)
         self.owners = suite.owners
         self.memory_mb = max(

@@ -19,15 +19,15 @@ from rockcheck.validation.suite import (
     judging,
     results,
     scene_results,
-    suites,
     tolerances,
 )
+from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.playing import SuiteTasks
 from rockcheck.validation.uncertainty import population
 
 
 def run_suite(
-    suite: suites.Suite,
+    suite: Suite,
     folder: str | Path,
     *,
     jobs: int | None = None,

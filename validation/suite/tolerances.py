@@ -35,7 +35,7 @@ MEASURES: Mapping[str, figures.Measure] = ChainMap(
 #: In place of a measure that only another version has: nothing is known of it.
 UNKNOWN = figures.Measure("", "", "", "", float, resolution=0.0)
 #: The third name of a table of a cell's own figures, in place of a reference model.
-OWN_FIGURES = "figures"
+CELL_FIGURES = "figures"
 HORIZON = "horizon"
 #: The first name of a table that holds for every scene.
 EVERY = "*"
@@ -115,8 +115,8 @@ def _tolerance(key: ToleranceKey, line: Mapping[str, Any]) -> Tolerance:
     """A validated line."""
     measure = measure_of(key.windowed)
     tolerance = Tolerance(**line)
-    if (measure.name in measures.FIGURES) != (key.against == OWN_FIGURES):
-        raise InputError(f"figures of a cell itself, and only they, stand under {OWN_FIGURES!r}")
+    if (measure.name in measures.FIGURES) != (key.against == CELL_FIGURES):
+        raise InputError(f"figures of a cell itself, and only they, stand under {CELL_FIGURES!r}")
     if tolerance.expected is None and not measure.is_error:
         raise InputError("is missing", "expected")
     return tolerance

@@ -13,6 +13,7 @@ import pytest
 
 from rockcheck.validation.execute.models import REFERENCE, Work
 from rockcheck.validation.suite import results, suites
+from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.runner import run_suite
 
 #: Shipped models that solve the reference's equations; none of them is played.
@@ -37,7 +38,7 @@ def label(fault: str, place: str) -> str:
     return f"{place} with {fault or 'no fault'}"
 
 
-def with_faults(name: str, faults: Sequence[str], places: Sequence[str]) -> suites.Suite:
+def with_faults(name: str, faults: Sequence[str], places: Sequence[str]) -> Suite:
     """A shipped suite with faulty models in the places of shipped ones, beside the references."""
     shipped = suites.load_suite(name)
     # what is not judged against the paper's model need not be compared with it either
