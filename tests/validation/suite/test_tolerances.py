@@ -256,3 +256,12 @@ def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(accepted):
         line_of(0.0, 1.0, 0.0, "one falls now"),
         tomllib.loads(EVERYWHERE)["*"],
     )
+
+
+def test_a_better_figure_keeps_its_why_though_a_reason_is_given_for_others(accepted):
+    better = check(0.5e-3)
+    changes, refusals, text = accepted("", better, reason="a finer step")
+    assert better.verdict == "better"
+    assert refusals == []
+    assert len(changes) == 1
+    assert 'why = "a test"' in text
