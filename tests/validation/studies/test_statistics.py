@@ -279,6 +279,21 @@ def test_one_that_falls_at_no_gap_leaves_nothing_safe():
     assert sentences.gap_sentences([answer])[0].startswith("It falls already at a gap of 0 mm")
 
 
+def test_no_gap_is_safe_where_one_falls_at_the_least_and_at_the_largest():
+    answer = gap_answer(a=search(interval(0, 0.0, 0.1, None, None)))
+    assert sentences.gap_sentences([answer])[0].startswith(
+        "No gap is safe. It falls already at a gap of 0 mm"
+    )
+
+
+def test_a_gap_between_two_intervals_may_be_safe():
+    answer = gap_answer(
+        a=search(interval(0, 0.0, 0.02, None, 0.021), interval(0, 0.05, 0.1, 0.049, None))
+    )
+    assert answer.has_safe_gap
+    assert "No gap is safe" not in sentences.gap_sentences([answer])[0]
+
+
 def test_what_falls_nowhere_is_told_with_how_finely_was_looked():
     answer = gap_answer(a=search())
     assert answer.safe_up_to == 0.1
@@ -311,8 +326,8 @@ def test_how_finely_was_looked_is_told_on_both_sides_of_where_it_changes():
         draws_beyond_every=0.2,
     )
     assert sentences.looked_words(answer) == (
-        "looked at every 1 mm up to 0.4 m, for draws at every 16.7 mm; beyond, at every 40 mm and"
-        " 0.2 m"
+        "looked at every 1 mm up to 0.4 m, then every 40 mm; for draws every 16.7 mm, then every"
+        " 200 mm"
     )
 
 

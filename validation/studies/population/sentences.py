@@ -144,8 +144,9 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
         sentences.append(f"{where}{none_falls} at gaps of {span} ({looked}); {reach}.")
     elif answer.safe_up_to is None:
         falls = first_falls.capitalize() or f"{answer.first.case} falls"
+        none = "" if answer.has_safe_gap else "No gap is safe. "
         sentences.append(
-            f"{where}{falls} already at a gap of {length(answer.low)} ({looked})"
+            f"{where}{none}{falls} already at a gap of {length(answer.low)} ({looked})"
             f"{again_words(answer)}; {reach}."
         )
     else:
@@ -155,7 +156,7 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
             f" {falls}{again_words(answer)}; {reach}."
         )
     if answer.islands:
-        sentences.append("It stands again in some wider gaps: see the intervals.")
+        sentences.append("It stands again in some wider gaps: see 'At which gaps it falls'.")
     if answer.undecided:
         sentences.append(f"{count_of(answer.undecided, 'run')} of the search undecided.")
     return sentences
@@ -181,16 +182,20 @@ def looked_words(answer: GapAnswer) -> str:
     """How finely was looked."""
     if answer.low == answer.high:
         return "the only gap looked at"
-    words = f"looked at every {length(answer.looked_every)}"
-    if answer.finely_up_to < answer.high:
-        words += f" up to {length(answer.finely_up_to)}"
-    if answer.draws_every is not None:
-        words += f", for draws at every {length(answer.draws_every)}"
+    words = f"looked at every {_millimetres(answer.looked_every)}"
     if answer.beyond_every > 0.0:
-        words += f"; beyond, at every {length(answer.beyond_every)}"
-        if answer.draws_beyond_every is not None:
-            words += f" and {length(answer.draws_beyond_every)}"
+        words += f" up to {length(answer.finely_up_to)}, then every"
+        words += f" {_millimetres(answer.beyond_every)}"
+    if answer.draws_every is None:
+        return words
+    words += f"; for draws every {_millimetres(answer.draws_every)}"
+    if answer.draws_beyond_every:
+        words += f", then every {_millimetres(answer.draws_beyond_every)}"
     return words
+
+
+def _millimetres(metres: float) -> str:
+    return f"{1e3 * metres:.3g} mm"
 
 
 def safe_again_from(answer: GapAnswer) -> float | None:
@@ -303,4 +308,4 @@ def method_sentences(scores: Sequence[MethodScore], events: Sequence[str]) -> li
         ]
         return [f"{'; '.join(words)}."]
     words = [f"{score.method} {score.predicts} of {score.of}" for score in overturning]
-    return [f"They let it overturn in: {', '.join(words)}."]
+    return [f"Without the wall, they say, it overturns in: {', '.join(words)}."]

@@ -161,6 +161,15 @@ class GapAnswer:
     complete: bool
 
     @property
+    def has_safe_gap(self) -> bool:
+        """Whether no run was seen to fall all the way from the least to the largest gap."""
+        return not any(
+            interval.stands_below is None and interval.stands_above is None
+            for case in self.falls
+            for interval in case.intervals
+        )
+
+    @property
     def islands(self) -> int:
         """How many intervals have a gap above them at which the run stands again."""
         return sum(
