@@ -308,4 +308,4 @@ def method_sentences(scores: Sequence[MethodScore], events: Sequence[str]) -> li
         ]
         return [f"{'; '.join(words)}."]
     words = [f"{score.method} {score.predicts} of {score.of}" for score in overturning]
-    return [f"Without the wall, they say, it overturns in: {', '.join(words)}."]
+    return [f"They leave walls out, and let it overturn in: {', '.join(words)}."]
