@@ -100,7 +100,7 @@ def test_quiet_says_nothing_but_errors(mine, typed):
     assert History.load("a.csv").channels["theta"][0] == 0.001
     fails = "faulty:Fails", "--allow-code", "faulty:Fails", "-q"
     said = typed("simulate", "mine.toml", "--model", *fails, code=3)
-    assert said == ("", "rockcheck: more than 10 events\n")
+    assert said == ("", "rockcheck: faulty:Fails: more than 10 events\n")
     assert not Path("mine--faulty_Fails.csv").exists()
 
 

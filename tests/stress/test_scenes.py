@@ -111,5 +111,7 @@ def test_a_fault_that_was_found(slug: str):
     played = check_run(
         model, load_scene(FOLDER / f"{slug}.toml"), seed=entry["seed"], audit=entry["audited"]
     )
-    assert (played.broken, played.unjudged) == ([], ()), (entry["fault"], played)
+    assert played.broken == [], (entry["fault"], played)
+    # A fate cannot be judged by Bouc-Wen friction, nor where a long history takes too many steps.
+    assert set(played.unjudged) <= {"fate"}
     assert ("energy" in played.figures) == entry["audited"]
