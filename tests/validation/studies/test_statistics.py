@@ -286,6 +286,14 @@ def test_no_gap_is_safe_where_one_falls_at_the_least_and_at_the_largest():
     )
 
 
+def test_where_no_gap_is_safe_no_wider_gap_is_offered():
+    island = interval(0, 0.05, 0.06, 0.0499, 0.0601)
+    answer = gap_answer(a=search(interval(0, 0.0, 0.1, None, None)), b=search(island))
+    words = " ".join(sentences.gap_sentences([answer]))
+    assert words.startswith("No gap is safe. a falls already")
+    assert "stands again" not in words
+
+
 def test_a_gap_between_two_intervals_may_be_safe():
     answer = gap_answer(
         a=search(interval(0, 0.0, 0.02, None, 0.021), interval(0, 0.05, 0.1, 0.049, None))

@@ -155,7 +155,7 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
             f"{where}{none_falls} at gaps up to {length(answer.safe_up_to)} ({looked}); just above,"
             f" {falls}{again_words(answer)}; {reach}."
         )
-    if answer.islands:
+    if answer.islands and answer.has_safe_gap:
         sentences.append("It stands again in some wider gaps: see 'At which gaps it falls'.")
     if answer.undecided:
         sentences.append(f"{count_of(answer.undecided, 'run')} of the search undecided.")
