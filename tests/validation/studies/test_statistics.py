@@ -3,11 +3,22 @@
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
+from assessed import (
+    CERTAIN,
+    FREE,
+    RUNS,
+    SCENE,
+    UNCERTAIN,
+    gap_answer,
+    gathered,
+    interval,
+    judged,
+    ran,
+    row,
+    search,
+)
 
-from rockcheck import load_scene
-from rockcheck.scenes import files
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.studies.population import (
     certainty as certainty_answers,
@@ -15,102 +26,9 @@ from rockcheck.validation.studies.population import (
     sentences,
     statistics,
 )
-from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensities import measure_of, size_of
-from rockcheck.validation.studies.population.plan import (
-    GapRange,
-    Plan,
-    factors_of,
-    gaps_looked_at,
-)
+from rockcheck.validation.studies.population.plan import factors_of, gaps_looked_at
 from rockcheck.validation.studies.population.study import finding_of
-from rockcheck.validation.uncertainty import numerical
-
-SCENE = load_scene("fig5a")
-CERTAIN = files.UncertainScene(SCENE, {}, np.eye(0))
-UNCERTAIN = files.UncertainScene(
-    SCENE, {"floor.friction": files.Spread(value=0.4, sd=0.04)}, np.eye(1)
-)
-
-
-def ran(fate, peak=None, slip=None, top=None, speed=None, reach=None):
-    return results.RunResult(
-        fate=fate,
-        peak_rotation=peak,
-        slip=slip,
-        top_displacement=top,
-        wall_speed={} if speed is None else {"left": speed},
-        reach={"left": reach or 0.0, "right": 0.0},
-    )
-
-
-RUNS = {
-    "a": ran("at rest", 0.2, 0.01, 0.3, 0.4),
-    "b": ran("moving", 0.4, 0.03, 0.5),
-    "c": ran("overturned right", 6.0, 1e-7, 2.0, 0.9),
-}
-#: By case, whether the event of each hand method happens, and how far it goes.
-METHODS = {
-    "a": ((True, 0.1), (False, 0.0), (False, 0.5), (True, 0.02), (True, 0.0), (True, None)),
-    "b": ((False, 0.5), (True, 0.05), (True, 1.5), (True, 0.04), (False, 0.01), (False, 0.3)),
-    "c": ((True, 0.3), (True, 0.1), (True, math.inf), (True, 0.1), (True, 0.3), (True, 2.0)),
-}
-
-
-def judged(u_num):
-    peak = numerical.Quantity(
-        name="peak_rotation",
-        unit="alpha",
-        value=0.2,
-        u_num=u_num,
-        verdict="not converged" if u_num is None else "converged",
-    )
-    return numerical.Numerical(method="by hand", quantities=(peak,))
-
-
-def gathered(
-    runs=RUNS,
-    *,
-    given=CERTAIN,
-    recorded=True,
-    draws=0,
-    certainty=None,
-    measure=None,
-    bounds=(0.0, 0.05, 0.1),
-    **played,
-):
-    """The results of runs as they are, and of what else was `played`, by the plan's task groups."""
-    plan = Plan(
-        own=given,
-        cases=dict.fromkeys(runs, given),
-        recorded=recorded,
-        draws=draws,
-        measure=measure,
-        gaps=[GapRange("left", bounds)],
-        models={"ebm-unilateral": {}, "cm": {}},
-    )
-    done = {
-        plan.shown[case]: results.Shown(
-            result=run, methods=METHODS.get(case, ()), history="t,theta\n0,0\n1,0.1\n"
-        )
-        for case, run in runs.items()
-    }
-    for case, run in played.get("cm", {}).items():
-        done[plan.others["cm"][case]] = results.Shown(result=run)
-    for case, run in played.get("law", {}).items():
-        done[plan.by_other_law[case]] = results.Shown(result=run)
-    for case, drawn in played.get("drawn", {}).items():
-        done[plan.drawn[case]] = results.Drawn(results=(runs[case], *drawn))
-    for case, free in played.get("free", {}).items():
-        done[plan.free["left"][case]] = results.Drawn(results=(free,))
-    for case, sure in (certainty or {}).items():
-        done[plan.certainty(done)[case]] = sure
-    for case, search in played.get("gaps", {}).items():
-        done[plan.gap_tasks(done)["left"][case]] = search
-    for case, search in played.get("factors", {}).items():
-        done[plan.factors[case]] = search
-    return Gathered(plan, done)
-
 
 # Does it fall?
 
@@ -190,6 +108,21 @@ def test_draws_under_records_count_in_place_of_the_runs_as_they_are():
     assert "in 4 of 8 runs, 4 draws under each of 2 records, 50 %" in words
 
 
+@pytest.mark.parametrize("records", [2, 6])
+def test_records_are_few_up_to_six(records):
+    everything = gathered({f"R{k}": RUNS["a"] for k in range(records)})
+    assert statistics.fall_answer(everything).few
+
+
+def test_seven_records_are_not():
+    everything = gathered({f"R{k}": RUNS["a"] for k in range(7)})
+    assert not statistics.fall_answer(everything).few
+
+
+def test_a_single_motion_is_not_called_few():
+    assert not statistics.fall_answer(gathered({"a": RUNS["a"]})).few
+
+
 # How far does it move?
 
 
@@ -204,33 +137,6 @@ def test_quantities_are_of_the_runs_that_stand():
 
 
 # Which gap is safe?
-
-FREE = {"a": ran("at rest", 0.3, reach=0.1), "b": ran("at rest", 0.3, reach=0.08)}
-
-
-def interval(draw, low, high, below, above):
-    return results.FallInterval(
-        draw=draw, low=low, high=high, stands_below=below, stands_above=above
-    )
-
-
-def row(gap, overturned, *speeds):
-    return results.GapRow(gap=gap, runs=1, overturned=overturned, undecided=0, speeds=speeds)
-
-
-def search(*intervals, fallen=(0, 0, 0)):
-    rows = [row(gap, n, 0.5) for gap, n in zip((0.0, 0.05, 0.1), fallen, strict=True)]
-    return results.GapSearch(intervals=intervals, rows=tuple(rows), undecided=0, runs=9)
-
-
-def gap_answer(**searches):
-    everything = gathered(
-        {case: RUNS[case] for case in searches},
-        free={case: FREE[case] for case in searches},
-        gaps=searches,
-    )
-    (answer,) = statistics.gap_answers(everything)
-    return answer
 
 
 def test_no_run_falls_up_to_where_the_first_one_was_seen_to_stand():
@@ -253,6 +159,21 @@ def test_the_curve_of_what_overturns_steps_where_the_search_saw_it():
     gaps, shares = statistics.overturned_steps(answer)
     assert gaps == [0.0, 0.0, 0.0, 0.021, 0.021, 0.05, 0.1]
     assert shares == [0.0, 0.5, 1.0, 0.5, 0.0, 0.5, 0.5]
+
+
+def test_the_curve_ends_with_the_share_at_the_largest_gap():
+    island = interval(0, 0.05, 0.06, 0.049, 0.061)
+    gaps, shares = statistics.overturned_steps(gap_answer(a=search(), b=search(island)))
+    assert gaps == [0.0, 0.05, 0.061, 0.1]
+    assert shares == [0.0, 0.5, 0.0, 0.0]
+
+
+def test_the_curve_of_draws_leaves_the_scene_as_it_is_out():
+    as_it_is, of_draw = interval(0, 0.0, 0.1, None, None), interval(3, 0.05, 0.1, 0.049, None)
+    answer = replace(gap_answer(a=search(as_it_is, of_draw)), draws_every=0.01, free_runs=4)
+    gaps, shares = statistics.overturned_steps(answer)
+    assert gaps == [0.0, 0.05, 0.1]
+    assert shares == [0.0, 0.25, 0.25]
 
 
 def test_of_two_sides_each_sentence_says_which():
@@ -365,16 +286,78 @@ def test_the_steps_of_a_look_are_told_apart_where_it_changes():
     assert answer.beyond_every == pytest.approx(0.04)
 
 
+def far_answer(draws=0):
+    """The answer for a block that reaches 2 m, of the scene as it is and so many draws."""
+    everything = gathered(
+        {"a": RUNS["a"]},
+        given=UNCERTAIN if draws else CERTAIN,
+        draws=draws,
+        drawn={"a": [RUNS["a"]] * draws} if draws else {},
+        free={"a": ran("at rest", 0.3, reach=2.0)},
+        gaps={"a": search()},
+        bounds=(),
+    )
+    (answer,) = statistics.gap_answers(everything)
+    return answer
+
+
+def test_without_draws_there_are_no_steps_of_draws():
+    answer = far_answer()
+    assert answer.draws_every is None
+    assert answer.draws_beyond_every is None
+
+
+def test_draws_are_looked_at_at_24_gaps_up_to_400_mm_and_at_8_beyond():
+    answer = far_answer(draws=4)
+    assert answer.draws_every == pytest.approx(0.4 / 24)
+    assert answer.draws_beyond_every == pytest.approx(1.6 / 8)
+
+
+def test_a_search_of_all_cases_is_complete():
+    assert gap_answer(a=search(), b=search()).complete
+
+
+def test_a_search_that_lacks_a_case_is_not_complete():
+    everything = gathered({case: RUNS[case] for case in "ab"}, free=FREE, gaps={"a": search()})
+    (answer,) = statistics.gap_answers(everything)
+    assert not answer.complete
+
+
+def test_runs_without_the_wall_that_fall_are_counted():
+    free = {"a": FREE["a"], "b": ran("overturned left", 6.0, reach=1.0)}
+    everything = gathered(
+        {case: RUNS[case] for case in "ab"}, free=free, gaps={"a": search(), "b": search()}
+    )
+    (answer,) = statistics.gap_answers(everything)
+    assert answer.free_overturned == 1
+    assert answer.free_runs == 2
+    assert answer.clearance == 1.0
+
+
+def test_the_draws_of_a_run_without_the_wall_count_in_its_place():
+    drawn = results.Drawn(results=(RUNS["c"], RUNS["a"], RUNS["b"]))
+    assert statistics.counted_runs(drawn) == (RUNS["a"], RUNS["b"])
+
+
+def test_at_a_gap_where_no_wall_is_struck_there_is_no_speed():
+    rows = statistics.gap_rows(
+        {"a": results.GapSearch(intervals=(), rows=(row(0.1, 1),), undecided=0, runs=1)}
+    )
+    assert rows[0].struck == 0
+    assert rows[0].median_speed is None
+    assert rows[0].largest_speed is None
+
+
 # At which intensity does it fall?
 
 PGA = measure_of("pga")
 SIZE = size_of(PGA, SCENE)
 
 
-def intensities_of(**searches):
+def intensities_of(undecided=0, **searches):
     """The answer for searches over the factor by case, each a list of intervals."""
     found = {
-        case: results.FactorSearch(intervals=tuple(intervals), undecided=0, runs=9)
+        case: results.FactorSearch(intervals=tuple(intervals), undecided=undecided, runs=9)
         for case, intervals in searches.items()
     }
     runs = dict.fromkeys(searches, RUNS["a"])
@@ -399,6 +382,10 @@ def test_a_motion_that_overturns_at_no_factor_was_scaled_up_to_the_last():
     answer = intensities_of(a=[])
     assert answer.records[0].least is None
     assert answer.records[0].beyond == pytest.approx(SIZE * factors_of(SCENE)[-1])
+
+
+def test_runs_of_the_search_that_nothing_decided_are_counted():
+    assert intensities_of(2, a=[], b=[]).undecided == 4
 
 
 def test_without_a_scaled_motion_there_is_no_intensity():

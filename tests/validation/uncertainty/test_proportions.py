@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import beta
 
 from rockcheck.validation.uncertainty.proportions import share_of_runs
 
@@ -30,8 +31,55 @@ def test_draws_under_records_count_no_more_than_the_records():
 
 def test_without_runs_there_is_no_share():
     share = share_of_runs(np.array([0]), np.array([0]))
+    assert share.count == 0
     assert share.of == 0
     assert np.isnan(share.probability)
+
+
+def test_the_share_under_records_is_the_mean_of_their_shares():
+    share = share_of_runs(np.array([1, 0]), np.array([1, 3]))
+    assert share.probability == 0.5
+    assert share.count == 1
+    assert share.of == 4
+
+
+def test_a_record_without_runs_does_not_count():
+    share = share_of_runs(np.array([1, 0, 0]), np.array([4, 4, 0]))
+    assert share.probability == 0.125
+    # of two records, hits of 0.25: beta quantiles
+    assert share.high == pytest.approx(beta.ppf(0.975, 1.25, 1.75))
+
+
+def test_parts_of_a_run_have_an_interval():
+    share = share_of_runs(np.array([30, 6]), np.array([60, 60]))
+    assert share.low == pytest.approx(beta.ppf(0.025, 0.6, 2.4))
+    assert share.high == pytest.approx(beta.ppf(0.975, 1.6, 1.4))
+
+
+def test_parts_of_a_miss_have_an_interval():
+    share = share_of_runs(np.array([54, 36]), np.array([60, 60]))
+    assert share.low == pytest.approx(beta.ppf(0.025, 1.5, 1.5))
+    assert share.high == pytest.approx(beta.ppf(0.975, 2.5, 0.5))
+
+
+@pytest.mark.parametrize(("records", "method"), [(6, "Clopper-Pearson"), (7, "Wilson")])
+def test_the_exact_interval_is_for_few_records(records, method):
+    hits = np.array([1] + [0] * (records - 1))
+    assert share_of_runs(hits, np.ones(records, dtype=int)).method == method
+
+
+def test_several_runs_under_many_records_have_the_exact_interval():
+    share = share_of_runs(np.full(12, 1), np.full(12, 2))
+    assert share.method == "Clopper-Pearson"
+    assert share.low == pytest.approx(beta.ppf(0.025, 6, 7))
+
+
+def test_a_single_run_is_the_least_that_has_a_share():
+    share = share_of_runs(np.array([1]), np.array([1]))
+    assert share.probability == 1.0
+    # Wilson's of 1 of 1: 1 / (1 + z^2)
+    assert share.low == pytest.approx(1.0 / (1.0 + 1.959964**2))
+    assert share.high == 1.0
 
 
 @pytest.mark.parametrize("records", [2, 3, 5, 12])

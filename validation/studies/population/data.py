@@ -124,6 +124,7 @@ def intensity_data(answer: IntensityAnswer | None) -> dict[str, Any]:
             "dispersion": fit.dispersion if fit else None,
             "low": fit.low if fit else None,
             "high": fit.high if fit else None,
+            "undecided": answer.undecided,
             "records": [_record_intensity(record) for record in answer.records],
         }
     }

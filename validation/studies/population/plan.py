@@ -440,15 +440,15 @@ def gaps_looked_at(
     """
     low, high = (min(values), max(values)) if values else (least, max(reach, least))
     fine_end = min(high, low + FINE_UP_TO)
-    fine = low + FINE_GAP * np.arange(math.floor((fine_end - low) / FINE_GAP * (1 + 1e-12)) + 1)
-    far = np.linspace(fine_end, high, FAR_GAPS + 1) if high > fine_end else [high]
-    coarse = np.array([low])
+    fine = np.arange(low, fine_end, FINE_GAP)
+    far = np.linspace(fine_end, high, FAR_GAPS + 1)
     if values:
         coarse = np.array(values)
     elif high > fine_end:
         near = np.linspace(low, fine_end, COARSE_NEAR + 1)
-        coarse = np.append(near, np.linspace(fine_end, high, COARSE_GAPS - COARSE_NEAR + 1)[1:])
-    elif high > low:
+        beyond = np.linspace(fine_end, high, COARSE_GAPS - COARSE_NEAR + 1)
+        coarse = np.append(near, beyond)
+    else:
         coarse = np.linspace(low, high, COARSE_GAPS + 1)
     looked = np.unique(np.round(np.concatenate([fine, far, coarse]), 12))
     return tuple(looked.tolist()), tuple(np.unique(np.round(coarse, 12)).tolist())

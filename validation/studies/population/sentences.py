@@ -75,6 +75,8 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
             ]
         return [f"{name} {FATE_WORDS[run.fate]}."]
     share = answer.overturning
+    if share.of == 0:
+        return [f"In all {answer.runs} runs {name} {FATE_WORDS[UNDECIDED]}."]
     of = runs_words(answer, gathered)
     sentences = [
         f"{name} overturns in {share.count} of {of}, {percent(share.probability)}"
@@ -88,9 +90,8 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
     if answer.fates[UNDECIDED]:
         sentences.append(f"{count_of(answer.fates[UNDECIDED], 'run')} undecided.")
     if gathered.drawn and not gathered.plan.recorded:
-        as_it_is = next(iter(gathered.as_it_is.values()), None)
-        if as_it_is is not None:
-            sentences.append(f"With its own numbers it {FATE_WORDS[as_it_is.fate]}.")
+        as_it_is = next(iter(gathered.as_it_is.values()))
+        sentences.append(f"With its own numbers it {FATE_WORDS[as_it_is.fate]}.")
     return sentences
 
 
@@ -158,8 +159,13 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
     if answer.islands and answer.has_safe_gap:
         sentences.append("It stands again in some wider gaps: see 'At which gaps it falls'.")
     if answer.undecided:
-        sentences.append(f"{count_of(answer.undecided, 'run')} of the search undecided.")
+        sentences.append(_undecided_sentence(answer.undecided))
     return sentences
+
+
+def _undecided_sentence(runs: int) -> str:
+    """What counts as a fall in a search, and may be none."""
+    return f"{count_of(runs, 'run')} of the search undecided."
 
 
 def reach_words(answer: GapAnswer) -> str:
@@ -210,32 +216,39 @@ def intensity_sentences(answer: IntensityAnswer | None) -> list[str]:
     if answer is None:
         return ["It has no motion of the base that could be scaled by a factor."]
     unit = f" {answer.unit}" if answer.unit else ""
-    falling = [record for record in answer.records if record.least is not None]
-    if not falling:
+    if all(record.least is None for record in answer.records):
         beyond = min(record.beyond for record in answer.records)
         return [f"It does not overturn up to {answer.label} {beyond:.3g}{unit}."]
-    islands = sum(bool(record.islands) for record in answer.records)
     if len(answer.records) == 1:
         sentences = [_single_intensity(answer.records[0], answer.label, unit)]
     else:
-        weakest = min(falling, key=lambda record: record.least or 0.0)
-        sentences = []
-        if answer.fit is not None:
-            sentences.append(
-                f"Median {answer.label} at which it overturns: {answer.fit.median:.3g}{unit},"
-                f" dispersion {answer.fit.dispersion:.2f},"
-                f" of {count_of(len(answer.records), 'record')}."
-            )
-        sentences.append(f"The least: {weakest.least:.3g}{unit}, {weakest.case}.")
-        if len(falling) < len(answer.records):
-            sentences.append(
-                f"{len(answer.records) - len(falling)} do not overturn it at any factor tried."
-            )
+        sentences = _several_intensities(answer, unit)
+    islands = sum(bool(record.islands) for record in answer.records)
     if islands:
         sentences.append(
             "It stands again at some larger intensities"
             + (f" of {count_of(islands, 'record')}." if len(answer.records) > 1 else ".")
         )
+    if answer.undecided:
+        sentences.append(_undecided_sentence(answer.undecided))
+    return sentences
+
+
+def _several_intensities(answer: IntensityAnswer, unit: str) -> list[str]:
+    """The median of the records, the least, and how many do not overturn it."""
+    sentences = []
+    if answer.fit is not None:
+        sentences.append(
+            f"Median {answer.label} at which it overturns: {answer.fit.median:.3g}{unit},"
+            f" dispersion {answer.fit.dispersion:.2f},"
+            f" of {count_of(len(answer.records), 'record')}."
+        )
+    least = {record.case: record.least for record in answer.records if record.least is not None}
+    weakest = min(least, key=lambda case: least[case])
+    sentences.append(f"The least: {least[weakest]:.3g}{unit}, {weakest}.")
+    harmless = len(answer.records) - len(least)
+    if harmless:
+        sentences.append(f"{count_of(harmless, 'record')} did not overturn it at any factor tried.")
     return sentences
 
 
@@ -252,8 +265,7 @@ def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[s
     largest = next(iter(answer.contributions), None)
     known = {contribution.source for contribution in answer.contributions}
     if largest and largest.sd > NEGLIGIBLE and "numerical error" in known:
-        number = leading_number(gathered) or "the uncertain numbers"
-        change = CHANGES[largest.source].format(number=number)
+        change = CHANGES[largest.source].format(number=leading_number(gathered))
         sentences.append(f"{change} would change the answer most.")
     return sentences
 

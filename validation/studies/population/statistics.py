@@ -308,13 +308,17 @@ class RecordIntensity:
 
 @dataclass(frozen=True)
 class IntensityAnswer:
-    """The least intensity of each motion, and the lognormal curve of all."""
+    """The least intensity of each motion, and the lognormal curve of all.
+
+    `undecided` counts the runs of the search that nothing decided: they count as falls.
+    """
 
     measure: str
     label: str
     unit: str
     records: tuple[RecordIntensity, ...]
     fit: Lognormal | None
+    undecided: int
 
 
 def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
@@ -344,4 +348,5 @@ def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
         unit=measure.unit,
         records=tuple(records),
         fit=fit_least(least, beyond),
+        undecided=sum(search.undecided for search in gathered.factors.values()),
     )
