@@ -1,7 +1,11 @@
-"""The extremes of a run of the Continuous Model, noted at the middle of each of its steps.
+"""The extremes of a run, noted at the middle of each of its steps.
 
-There position Verlet has the block's place to second order. A contact that closes tells the speed
-with which its corner arrives.
+In: where the block is in a step, how it moves; at the end the strikes of walls.
+Out: EXTREMES, the record of what is noted; the `Extremes` of a history.
+Called by `cm.start` and `cm.integrate` (noting) and `cm.model` (the end).
+
+At the middle of a step position Verlet has the block's place to second order. A contact that closes
+tells the speed with which its corner arrives.
 """
 
 import math
@@ -9,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from rockcheck.cm.geometry import Corners
 from rockcheck.scenes import (
     Extremes,
     Floats,
@@ -21,76 +26,107 @@ from rockcheck.scenes import (
 )
 from rockcheck.scenes.compiled import inner_kernel
 from rockcheck.scenes.extremes import NO_STRIKE
+from rockcheck.scenes.named_record import filled, record
 
-#: Offsets (x, y) of the corners from the mass's centre: bottom left, bottom right, top left, top
-#: right.
-Corners = tuple[float, float, float, float, float, float, float, float]
-#: Indices of what is noted: largest rotation to each side and its time, slip, reach to each side,
-#: displacement of the top, hop; first uplift and slip; whether it stood flat, and stuck, a step
-#: ago; first places of the top corners; half the width of the block.
-NOTED = 16
-LEFT, LEFT_TIME, RIGHT, RIGHT_TIME, SLIP, REACH_LEFT, REACH_RIGHT, TOP, HOP = range(9)
-UPLIFT_TIME, SLIP_TIME, FLAT, STICKS, TOP_LEFT, TOP_RIGHT, HALF_WIDTH = range(9, NOTED)
+#: What is noted of a run; m, rad, s.
+EXTREMES = record(
+    # Largest rotation to each side, and when.
+    rotation_left="f8",
+    rotation_left_time="f8",
+    rotation_right="f8",
+    rotation_right_time="f8",
+    # Largest |slip|; how far a corner gets beyond each side's first place; the largest horizontal
+    # displacement of a top corner; the largest height of the lower corner.
+    slip="f8",
+    reach_left="f8",
+    reach_right="f8",
+    top_displacement="f8",
+    hop="f8",
+    # When it first uplifts, and first slips; NaN before.
+    uplift_time="f8",
+    slip_time="f8",
+    # Whether it stood flat, and stuck, a step ago.
+    stood_flat="?",
+    stuck="?",
+    # First places of the top corners; half the width of the block.
+    top_left="f8",
+    top_right="f8",
+    half_width="f8",
+)
 #: |theta| (rad), its rate (rad/s) and slip rate (m/s) below which a block stands flat, and sticks.
 FLAT_SHARE = interpolation.FLAT
-TURNING, SLIPPING = interpolation.TURNING, interpolation.SLIPPING
+TURNING = interpolation.TURNING
+SLIPPING = interpolation.SLIPPING
 
 
-def noted_at_start(scene: Scene) -> Floats:
+def extremes_at_start(scene: Scene) -> np.record:
     """What is noted before the first step."""
     x, _, tilt, _, _, spin = scene.initial_state
-    b, h = scene.block.half_width, scene.block.half_height
-    noted = np.zeros(NOTED)
-    noted[[UPLIFT_TIME, SLIP_TIME]] = math.nan
-    noted[FLAT] = abs(tilt) < FLAT_SHARE * scene.block.alpha and abs(spin) < TURNING
-    noted[STICKS] = abs(scene.initial_velocity) < SLIPPING
-    noted[TOP_LEFT] = x - b * math.cos(tilt) - h * math.sin(tilt)
-    noted[TOP_RIGHT] = x + b * math.cos(tilt) - h * math.sin(tilt)
-    noted[HALF_WIDTH] = b
-    return noted
+    top_left, top_right = kinematics.top_corners(scene.block, x, tilt).tolist()
+    return filled(
+        EXTREMES,
+        uplift_time=math.nan,
+        slip_time=math.nan,
+        stood_flat=abs(tilt) < FLAT_SHARE * scene.block.alpha and abs(spin) < TURNING,
+        stuck=abs(scene.initial_velocity) < SLIPPING,
+        top_left=top_left,
+        top_right=top_right,
+        half_width=scene.block.half_width,
+    )
 
 
 @inner_kernel
-def note_place(noted: Floats, x: float, y: float, theta: float, t: float, corners: Corners) -> None:
+def note_place(
+    extremes: np.record, x: float, y: float, theta: float, t: float, corners: Corners
+) -> None:
     """Notes where the block is in a step."""
-    if theta > noted[LEFT]:
-        noted[LEFT], noted[LEFT_TIME] = theta, t
-    elif -theta > noted[RIGHT]:
-        noted[RIGHT], noted[RIGHT_TIME] = -theta, t
-    half = noted[HALF_WIDTH]
-    left, right = x + min(corners[0], corners[4]), x + max(corners[2], corners[6])
-    noted[REACH_LEFT] = max(noted[REACH_LEFT], -left - half)
-    noted[REACH_RIGHT] = max(noted[REACH_RIGHT], right - half)
-    moved = max(
-        abs(x + corners[4] - noted[TOP_LEFT]),
-        abs(x + corners[6] - noted[TOP_RIGHT]),
-    )
-    noted[TOP] = max(noted[TOP], moved)
+    if theta > extremes.rotation_left:
+        extremes.rotation_left = theta
+        extremes.rotation_left_time = t
+    elif -theta > extremes.rotation_right:
+        extremes.rotation_right = -theta
+        extremes.rotation_right_time = t
+    half = extremes.half_width
+    left = x + min(corners[0], corners[4])
+    right = x + max(corners[2], corners[6])
+    extremes.reach_left = max(extremes.reach_left, -left - half)
+    extremes.reach_right = max(extremes.reach_right, right - half)
+    moved_left = abs(x + corners[4] - extremes.top_left)
+    moved_right = abs(x + corners[6] - extremes.top_right)
+    extremes.top_displacement = max(extremes.top_displacement, max(moved_left, moved_right))
     if corners[1] < corners[3]:
-        lowest, slip = y + corners[1], x + corners[0] + half
+        lowest = y + corners[1]
+        slip = x + corners[0] + half
     else:
-        lowest, slip = y + corners[3], x + corners[2] - half
-    noted[HOP] = max(noted[HOP], lowest)
-    noted[SLIP] = max(noted[SLIP], abs(slip))
+        lowest = y + corners[3]
+        slip = x + corners[2] - half
+    extremes.hop = max(extremes.hop, lowest)
+    extremes.slip = max(extremes.slip, abs(slip))
 
 
 @inner_kernel
 def note_mode(
-    noted: Floats, theta: float, theta_dot: float, slip_rate: float, t: float, flat_angle: float
+    extremes: np.record,
+    theta: float,
+    theta_dot: float,
+    slip_rate: float,
+    t: float,
+    flat_angle: float,
 ) -> None:
     """Notes when the block first leaves the floor's plane, and first slips."""
     flat = abs(theta) < flat_angle and abs(theta_dot) < TURNING
-    if noted[FLAT] != 0.0 and not flat and math.isnan(noted[UPLIFT_TIME]):
-        noted[UPLIFT_TIME] = t
+    if extremes.stood_flat and not flat and math.isnan(extremes.uplift_time):
+        extremes.uplift_time = t
     sticks = abs(slip_rate) < SLIPPING
-    if noted[STICKS] != 0.0 and not sticks and math.isnan(noted[SLIP_TIME]):
-        noted[SLIP_TIME] = t
-    noted[FLAT], noted[STICKS] = 1.0 if flat else 0.0, 1.0 if sticks else 0.0
+    if extremes.stuck and not sticks and math.isnan(extremes.slip_time):
+        extremes.slip_time = t
+    extremes.stood_flat = flat
+    extremes.stuck = sticks
 
 
 def extremes_of(
     scene: Scene,
-    noted: Floats,
+    noted: np.record,
     last: Floats,
     history: History,
     strikes: Sequence[tuple[Side, float, float, float]],
@@ -109,26 +145,35 @@ def extremes_of(
             speed=max(before.speed, speed),
             impulse=max(before.impulse, impulse),
         )
-    left, left_time, right, right_time, slip, reach_left, reach_right, top, hop = noted[:9].tolist()
-    uplift_time, slip_time = noted[[UPLIFT_TIME, SLIP_TIME]].tolist()
+    rotation_left = float(noted.rotation_left)
+    rotation_right = float(noted.rotation_right)
+    left_time = float(noted.rotation_left_time)
+    right_time = float(noted.rotation_right_time)
     fall = history.overturned_at
-    if history.outcome == "overturned left":
-        left, left_time = 0.5 * math.pi, fall
-    if history.outcome == "overturned right":
-        right, right_time = 0.5 * math.pi, fall
+    if fall is not None and history.outcome == "overturned left":
+        rotation_left = 0.5 * math.pi
+        left_time = fall
+    if fall is not None and history.outcome == "overturned right":
+        rotation_right = 0.5 * math.pi
+        right_time = fall
     return Extremes(
-        rotation_left=left,
+        rotation_left=rotation_left,
         rotation_left_s=left_time,
-        rotation_right=right,
+        rotation_right=rotation_right,
         rotation_right_s=right_time,
-        slip=slip,
+        slip=float(noted.slip),
         last_slip=float(kinematics.slip(scene.block, last[0], last[2])),
-        reach_left=reach_left,
-        reach_right=reach_right,
-        top_displacement=top,
-        hop=hop,
+        reach_left=float(noted.reach_left),
+        reach_right=float(noted.reach_right),
+        top_displacement=float(noted.top_displacement),
+        hop=float(noted.hop),
         walls=walls,
-        first_uplift_s=None if math.isnan(uplift_time) else uplift_time,
-        first_slip_s=None if math.isnan(slip_time) else slip_time,
+        first_uplift_s=_time_or_none(float(noted.uplift_time)),
+        first_slip_s=_time_or_none(float(noted.slip_time)),
         source="model",
     )
+
+
+def _time_or_none(time: float) -> float | None:
+    """None for NaN."""
+    return None if math.isnan(time) else time

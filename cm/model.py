@@ -13,15 +13,10 @@ from rockcheck.cm.grid import GRID
 from rockcheck.scenes import (
     Cost,
     Event,
-    Excitation,
-    Floats,
     Frozen,
     History,
     Positive,
-    Record,
-    Rest,
     Scene,
-    Side,
     errors,
     kinematics,
     observation,
@@ -30,8 +25,6 @@ from rockcheck.scenes import (
 
 #: Most steps of a run: at 0.1 to 0.3 microseconds each, some ten minutes.
 MOST_STEPS = 4_000_000_000
-#: Samples of a period of a pulse; the straight lines between them are off by 2e-8 of its amplitude.
-SAMPLES_A_PERIOD = 16384
 #: Longest stretch of motion (s) in one call of the compiled loop: it bounds the memory for events,
 #: and Ctrl-C is heard between.
 SLAB = 5.0
@@ -60,13 +53,14 @@ class ContinuousModel(Frozen):
         at 30 times 1/sqrt(k/m)). Impacts have shorter steps of their own, whatever it is.
     damping_rule
         "calibrated": a contact that closes is given the damping with which a clamped contact of its
-        effective mass has the scene's restitution (`kernels.damping_ratio`,
-        `kernels.effective_mass`). "paper": (33) with the whole mass, constant.
+        effective mass has the scene's restitution (`contact_law.damping_ratio`,
+        `impacts.effective_mass`). "paper": (33) with the whole mass, constant.
 
     What the calibration leaves out: slip that stops or turns within an impact (then friction, not
     the spring, decides; on floors with restitution up to 0.2 of it at a friction of 0.3, 0.5 at 1),
     another corner that the impact presses down (a wall hit at more than the slenderness angle,
-    0.02). A restitution of zero is reached within `kernels.least_restitution`, 7e-5 for the paper's
+    0.02). A restitution of zero is reached within
+    `contact_law.least_restitution`, 7e-5 for the paper's
     block.
     """
 
@@ -121,7 +115,9 @@ class ContinuousModel(Frozen):
         """
         self.check(scene)
         began = time.perf_counter()
-        from rockcheck.cm import extremes, kernels
+        from rockcheck.cm import extremes, geometry, impacts, integrate, start
+        from rockcheck.cm.base_motion import base_of
+        from rockcheck.cm.state import STRIKE
 
         times = scene.run_times
         stiffness, dt = self.stiffness_in(scene), self.time_step_in(scene)
@@ -130,43 +126,38 @@ class ContinuousModel(Frozen):
                 f"cm: {times[-1] / dt:.3g} steps of {dt:.3g} s are needed; at most"
                 f" {MOST_STEPS:.3g} are allowed"
             )
-        base = tuple(
-            (samples, np.cumsum(samples) - 0.5 * (samples + samples[0]), rate)
-            for samples, rate in (
-                _samples(one, scene.duration) for one in (scene.excitation, scene.vertical)
-            )
-        )
-        state, contacts = kernels.begun(scene, stiffness, dt, self.damping_rule == "calibrated")
+        base = base_of(scene)
+        parameters = start.parameters_of(scene, stiffness, dt, self.damping_rule == "calibrated")
+        state = start.initial_state(scene, parameters)
         output = np.empty((len(times), 6))
         output[0] = kinematics.of_mass(scene.block, scene.initial_state)
         rows_a_slab = max(1, math.ceil(SLAB / scene.output_step))
-        strikes_a_slab = (
-            math.ceil(min(rows_a_slab * scene.output_step, times[-1]) / kernels.STRIKE) + 4
-        )
-        events = np.empty((len(contacts.memory) * strikes_a_slab, 4))
-        noted = extremes.noted_at_start(scene)
+        slab_time = min(rows_a_slab * scene.output_step, times[-1])
+        strikes_a_contact = math.ceil(slab_time / impacts.STRIKE_TIME) + 4
+        strikes = np.empty(state.contacts.size * strikes_a_contact, STRIKE)
         end = float(times[-1])
-        advance = partial(kernels.advance, contacts, base, state, noted, events, end)
+        advance = partial(integrate.advance, parameters, base, state, strikes, end)
         advance(times[:0], output[:0])  # compiles, or reads the compiled loop from its cache
         ready, ready_cpu = time.perf_counter(), time.process_time()
-        strikes: list[Floats] = []
-        row, ending = 1, kernels.DONE
-        while row < len(times) and ending == kernels.DONE:
+        written = []
+        row, ending = 1, integrate.DONE
+        while row < len(times) and ending == integrate.DONE:
             slab = slice(row, row + rows_a_slab)
             play = partial(advance, times[slab], output[slab])
             ending, rows, count = progress.interruptible(play)
             row += rows
-            strikes.append(events[:count].copy())
+            written.append(strikes[:count].copy())
             if state.steps > MOST_STEPS:
                 raise errors.ModelFailure(
                     f"cm: more than {MOST_STEPS:.3g} steps by {state.t:.4g} s"
                 )
-        if ending == kernels.BLOWN_UP:
+        if ending == integrate.BLOWN_UP:
             raise errors.ModelFailure(
                 f"cm: the motion blew up (more energy than work done) before {times[row]:.4g} s,"
                 f" with a step of {dt:.3g} s and a stiffness of {stiffness:.3g} 1/s^2"
             )
-        strikes.append(events[: kernels.gather(contacts.memory, 0.0, state.t, events, 0)[0]])
+        count = impacts.record_strikes(state, 0.0, state.t, strikes, 0)
+        written.append(strikes[:count])
         cost = Cost(
             wall_seconds=time.perf_counter() - ready,
             cpu_seconds=time.process_time() - ready_cpu,
@@ -174,17 +165,18 @@ class ContinuousModel(Frozen):
             steps=int(state.steps),
             evaluations=int(state.sweeps),
         )
-        rows_of_strikes = sorted(np.concatenate(strikes).tolist())
+        in_order = sorted(np.concatenate(written).tolist())
+        floor_contacts = 2 * geometry.FLOOR
         happened = [
             Event(
                 t=t,
-                kind="floor impact" if contact >= 2 * kernels.FLOOR else "wall impact",
+                kind="floor impact" if contact >= floor_contacts else "wall impact",
                 impulse=impulse,
             )
-            for t, contact, impulse, _ in rows_of_strikes
+            for t, contact, impulse, _ in in_order
         ]
-        if ending == kernels.OVERTURNED:
-            side = "left" if state.theta > 0.0 else "right"
+        if ending == integrate.OVERTURNED:
+            side = "left" if state.motion.theta > 0.0 else "right"
             happened.append(Event(t=float(state.t), kind=f"overturned {side}"))
         history = observation.observe(
             scene,
@@ -199,31 +191,12 @@ class ContinuousModel(Frozen):
                 "damping_rule": self.damping_rule,
             },
         )
-        walls: dict[int, Side] = {kernels.LEFT_WALL: "left", kernels.RIGHT_WALL: "right"}
+        sides = {number: side for side, number in start.WALLS.items()}
         at_walls = [
-            (walls[contact // 2], t, impulse, speed)
-            for t, contact, impulse, speed in rows_of_strikes
-            if contact < 2 * kernels.FLOOR
+            (sides[contact // 2], t, impulse, speed)
+            for t, contact, impulse, speed in in_order
+            if contact < floor_contacts
         ]
-        last = np.array([state[name] for name in ("x", "y", "theta", "vx", "vy", "w")])
-        found = extremes.extremes_of(
-            scene, noted, kinematics.of_box(scene.block, last), history, at_walls
-        )
+        last = kinematics.of_box(scene.block, np.array(state.motion.item()))
+        found = extremes.extremes_of(scene, state.extremes, last, history, at_walls)
         return replace(history, model_extremes=found)
-
-
-def _samples(excitation: Excitation, duration: float) -> tuple[Floats, float]:
-    """Samples (m/s^2) of the excitation, linear in between, and their number a second.
-
-    A record keeps its samples, and no line leads beyond the last one.
-    """
-    if isinstance(excitation, Record):
-        return excitation.samples, 1.0 / excitation.time_step
-    if isinstance(excitation, Rest):
-        return np.zeros(1), 1.0
-    step = excitation.period / SAMPLES_A_PERIOD
-    until = min(excitation.quiet_after, duration)
-    if until in excitation.jumps:
-        times = np.linspace(0.0, until, round(until / step) + 1)
-        return excitation.acceleration(times), (len(times) - 1) / until
-    return excitation.acceleration(step * np.arange(math.ceil(until / step) + 2)), 1.0 / step

@@ -23,7 +23,7 @@ from rockcheck.validation.execute import models
 # What tests of several folders share beside fixtures, and what is a program of its own, too.
 sys.path[:0] = [
     str(Path(__file__).parent / folder)
-    for folder in ("ebm", "stress", "validation/made_up", "../docs/site_tools")
+    for folder in ("ebm", "cm", "stress", "validation/made_up", "../docs/site_tools")
 ]
 
 if TYPE_CHECKING:

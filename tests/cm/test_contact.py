@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from rockcheck.cm.kernels import (
+from rockcheck.cm.contact_law import (
     damping_ratio,
     damping_ratio_of_paper,
-    effective_mass,
     felt_share,
-    friction_force,
     least_restitution,
     normal_forces,
     restitution_of,
 )
+from rockcheck.cm.friction import friction_force
+from rockcheck.cm.impacts import effective_mass
 
 
 def integrated_restitution(xi: float) -> float:

@@ -13,7 +13,7 @@ from rockcheck import (
     Scene,
     Wall,
 )
-from rockcheck.cm.kernels import damping_ratio_of_paper, restitution_of
+from rockcheck.cm.contact_law import damping_ratio_of_paper, restitution_of
 from rockcheck.engines.contacts import arm_of, contacts_of, gap_of, rate_of
 from rockcheck.scenes import PAPER_BLOCK
 

@@ -149,7 +149,7 @@ CHANGES = [
         r"\g<1>largest_step = 4.9e-4\n",
         24,
     ),
-    ("the continuous model's", "cm/kernels.py", r"\Z", "\nUNUSED = 1\n", 24),
+    ("the continuous model's", "cm/integrate.py", r"\Z", "\nUNUSED = 1\n", 24),
     ("a measure", "validation/discrepancy/measures.py", r"\Z", "\nUNUSED = 1\n", 30),
     ("a page", "reports/site.py", r"\Z", "\nUNUSED = 1\n", 30),
 ]
