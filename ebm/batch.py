@@ -4,20 +4,23 @@ A batch gives outcomes and peaks, and the motion on request. Threads take chunks
 of a row depends neither on the other rows nor on the number of threads.
 """
 
+import math
+import os
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm.core.names import FAILURES, Ending
+from rockcheck.ebm.core.names import FAILURES, Ending, Keep
 from rockcheck.ebm.core.state import EXTREMES, FOUND, Records, Rows, workspace
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.natural import loop_of, pack, pack_pulses, state_for
 from rockcheck.scenes import Floats, InputError, ModelFailure, progress
 
 __all__ = ["Outcomes", "pack", "pack_pulses", "run_batch", "run_decided"]
-#: Runs of a batch that a thread takes at once.
-_CHUNK = 256
+#: Runs of a batch that a thread takes at once, at the most; and into how many chunks a thread's
+#: share is parted, since runs last differently.
+_CHUNK, _PARTS = 256, 4
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,12 +56,12 @@ class Outcomes:
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
-    """What a batch is asked for: see `run_batch`; and whether the extremes are kept."""
+    """What a batch is asked for: see `run_batch`; and what of each run is kept."""
 
     until_decided: bool = True
     rows: int = 0
     columns: slice | int = field(default_factory=lambda: slice(None))
-    extremes: bool = False
+    keeps: Keep = Keep.NOTHING
 
 
 def run_batch(
@@ -99,20 +102,22 @@ def play_batch(
 ) -> Outcomes:
     """Runs every row, whether it fails or not.
 
-    With `asked.extremes` a run until it is decided goes on until none of them can change.
+    A run until it is decided goes on until nothing that `asked.keeps` can change.
     """
     if not model.decides:
         raise InputError("a batch has Coulomb's friction or none", "friction")
     count, rows = len(packed.given), asked.rows
     found = np.empty(count, FOUND)
-    extremes = np.zeros(count if asked.extremes else 0, EXTREMES)
+    extremes = np.zeros(count if asked.keeps else 0, EXTREMES)
     most_steps = min(model.most_steps, 2_000_000)
+    parts = _PARTS * (jobs or os.cpu_count() or 1)
+    at_once = min(_CHUNK, max(1, math.ceil(count / parts)))
 
     def chunk(first: int) -> Floats:
-        some, kept = found[first : first + _CHUNK], extremes[first : first + _CHUNK]
+        some, kept = found[first : first + at_once], extremes[first : first + at_once]
         size = len(some)
         out, modes = np.zeros((size, rows, 6)), np.zeros((size, rows), dtype=np.int8)
-        states = state_for(model, most_steps, asked.until_decided, asked.extremes)
+        states = state_for(model, most_steps, asked.until_decided, asked.keeps)
         records = Records(out, modes, np.empty((size, 0, 5)), kept)
         part = packed._replace(given=packed.given[first : first + size])
         work = part, states, workspace(), records, some
@@ -121,9 +126,9 @@ def play_batch(
 
     outs = [np.empty((0, rows, 6))[:, :, asked.columns]]
     with progress.threads(jobs) as pool:
-        for n, out in enumerate(pool.map(chunk, range(0, count, _CHUNK)), 1):
+        for n, out in enumerate(pool.map(chunk, range(0, count, at_once)), 1):
             outs.append(out)
-            on_progress(min(_CHUNK * n, count), count)
+            on_progress(min(at_once * n, count), count)
     return Outcomes(runs=found, out=np.concatenate(outs), extremes=extremes)
 
 
@@ -131,21 +136,21 @@ def run_decided(
     packed: Rows,
     model: EventBasedModel,
     *,
-    extremes: bool = False,
+    keeps: Keep = Keep.NOTHING,
     jobs: int | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Outcomes:
     """Runs every row until all is decided; one that fails is made once more by `model.finer()`.
 
-    With `extremes` until none of these can change.
+    A run that keeps more goes on until none of it can change.
     """
-    asked = Asked(extremes=extremes)
+    asked = Asked(keeps=keeps)
     found = play_batch(packed, model, asked, jobs=jobs, on_progress=on_progress)
     again = found.failed
     if again.any():
         failed = packed._replace(given=packed.given[again])
         finer = play_batch(failed, model.finer(), asked, jobs=jobs)
         found.runs[again] = finer.runs
-        if extremes:
+        if keeps:
             found.extremes[again] = finer.extremes
     return found

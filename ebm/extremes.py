@@ -30,14 +30,13 @@ def columns_of(
         columns[f"rotation_{side}_s"] = kept["turned_at"][:, i] * time
         columns[f"reach_{side}"] = _length(farthest - setting[side]["arm"], length)
         displacement = np.maximum.reduce([displacement, outward - start, inward + start])
-        columns |= _wall_columns(kept, i, np.isfinite(setting[side]["gap"]), length, time)
     columns["top_displacement"] = _length(displacement, length)
     columns["slip"] = _length(kept["slip"], length)
     last = kept["last_slip"]
     columns["last_slip"] = np.sign(last) * _length(np.abs(last), length)
     columns["hop"] = _length(kept["hop"], length)
     columns["first_uplift_s"], columns["first_slip_s"] = kept["uplift"] * time, kept["slips"] * time
-    return columns
+    return columns | strikes_of(kept, setting, length, time)
 
 
 def _length(value: Floats, length: Floats) -> Floats:
@@ -48,18 +47,23 @@ def _length(value: Floats, length: Floats) -> Floats:
     return np.where(value > NOISE[Kind.POSITION], value, 0.0) * length
 
 
-def _wall_columns(
-    kept: NDArray[np.void], i: int, there: NDArray[np.bool_], length: Floats, time: Floats
+def strikes_of(
+    kept: NDArray[np.void], setting: NDArray[np.void], length: Floats, time: Floats
 ) -> dict[str, Floats]:
-    """The columns of the wall on one side; NaN where there is none."""
-    speed, side = length / time, SIDES[i]
-    values = {
-        "strikes": kept["strikes"][:, i].astype(float),
-        "first_s": kept["first"][:, i] * time,
-        "speed": kept["speed"][:, i] * speed,
-        "impulse": kept["impulse"][:, i] * speed,
-    }
-    return {f"wall_{side}_{name}": np.where(there, one, np.nan) for name, one in values.items()}
+    """Of `columns_of` those of the walls, NaN where there is none."""
+    speed_unit = length / time
+    columns: dict[str, Floats] = {}
+    for i, side in enumerate(SIDES):
+        values = {
+            "strikes": kept["strikes"][:, i].astype(float),
+            "first_s": np.where(kept["strikes"][:, i] > 0, kept["first"][:, i] * time, np.nan),
+            "speed": kept["speed"][:, i] * speed_unit,
+            "impulse": kept["impulse"][:, i] * speed_unit,
+        }
+        there = np.isfinite(setting[side]["gap"])
+        for name, column in values.items():
+            columns[f"wall_{side}_{name}"] = np.where(there, column, np.nan)
+    return columns
 
 
 def extremes_of(scene: Scene, kept: NDArray[np.void], setting: NDArray[np.void]) -> Extremes:

@@ -13,11 +13,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rockcheck.ebm.core.names import Keep
 from rockcheck.ebm.model import EventBasedModel
 from rockcheck.ebm.table import RunTable
 from rockcheck.scenes import Floats, progress
 
-__all__ = ["Fates", "RunTable", "play_fates"]
+__all__ = ["Fates", "Keep", "RunTable", "play_fates"]
 #: The codes of `Fates.outcome`; the first four in the order of `scenes.history.OUTCOMES`.
 AT_REST, MOVING, OVERTURNED_LEFT, OVERTURNED_RIGHT, UNDECIDED, FAILED = range(6)
 _STARTS_INSIDE = "the block would start inside a wall"
@@ -29,9 +30,9 @@ class Fates:
 
     `outcome` is one of the codes above. `time_s` (s) is when that was certain. `peak` (rad) is the
     largest |theta| of the whole motion, pi/2 where the block overturned; both are NaN where a row
-    is FAILED, and `reasons` says why, by its number. `extremes`, if asked for, has the names of
+    is FAILED, and `reasons` says why, by its number. `extremes`, if kept, has the names of
     `scenes.extremes.Extremes`, SI units, and for each wall names such as `wall_left_speed`; NaN
-    where there is none.
+    where there is none. Of strikes it has the walls alone.
     """
 
     outcome: NDArray[np.int8]
@@ -50,27 +51,27 @@ def play_fates(
     table: RunTable,
     model: EventBasedModel,
     *,
-    extremes: bool = False,
+    keeps: Keep = Keep.NOTHING,
     jobs: int | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> Fates:
     """What becomes of each row of a table.
 
-    With `extremes` a run goes on until none of them can change; otherwise until its outcome and its
-    peak are certain. `time_s` is then. A run that fails is made once more by `model.finer()`. The
-    result of a row depends neither on the other rows nor on `jobs` (threads; default: all cores).
-    Raises `InputError` where the model cannot play a scene, and for Bouc-Wen friction, whose runs
-    do not know when they are decided.
+    A run goes on until its outcome and its peak are certain; where it `keeps` strikes or extremes,
+    until none of these can change. `time_s` is then. A run that fails is made once more by
+    `model.finer()`. The result of a row depends neither on the other rows nor on `jobs` (threads;
+    default: all cores). Raises `InputError` where the model cannot play a scene, and for Bouc-Wen
+    friction, whose runs do not know when they are decided.
     """
     from rockcheck.ebm import batch, packing
     from rockcheck.ebm.core.names import FAILURES
     from rockcheck.ebm.core.state import FOUND
-    from rockcheck.ebm.extremes import columns_of
+    from rockcheck.ebm.extremes import columns_of, strikes_of
 
     draws, inside = packing.draws_of(table, model), packing.inside_a_wall(table)
     played, count = np.flatnonzero(~inside), len(inside)
     packed = packing.rows_of(table, draws, packing.motions_of(table), played)
-    found = batch.run_decided(packed, model, extremes=extremes, jobs=jobs, on_progress=on_progress)
+    found = batch.run_decided(packed, model, keeps=keeps, jobs=jobs, on_progress=on_progress)
     runs = np.zeros(count, FOUND)
     runs["fate"], runs["t"], runs["peak"] = FAILED, np.nan, np.nan
     runs[played] = found.runs
@@ -81,9 +82,10 @@ def play_fates(
     runs["t"][failed] = runs["peak"][failed] = np.nan
     length, time = draws.length[table.scene], draws.time[table.scene]
     columns: dict[str, Floats] | None = None
-    if extremes:
+    if keeps != Keep.NOTHING:
         setting = packed.given["setting"]
-        known = columns_of(found.extremes, setting, length[played], time[played])
+        read = columns_of if keeps == Keep.EXTREMES else strikes_of
+        known = read(found.extremes, setting, length[played], time[played])
         columns = {name: np.full(count, np.nan) for name in known}
         for name, column in known.items():
             columns[name][played] = np.where(found.failed, np.nan, column)

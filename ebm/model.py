@@ -125,7 +125,7 @@ class EventBasedModel(Frozen):
             log=np.empty((1, self.most_events, 5)),
             extremes=np.zeros(1, state.EXTREMES),
         )
-        states, work = natural.state_for(self, 0, extremes=True), state.workspace()
+        states, work = natural.state_for(self, 0, keeps=names.Keep.EXTREMES), state.workspace()
         kept = np.empty(1, state.FOUND)
         ending, ready, seconds, cpu = self._played(given, states, work, records, kept)
         end = kept[0]

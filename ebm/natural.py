@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from rockcheck.ebm.core import march
 from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
 from rockcheck.ebm.core.ground import ground_of
-from rockcheck.ebm.core.names import LAWS, Shape
+from rockcheck.ebm.core.names import LAWS, Keep, Shape
 from rockcheck.ebm.core.state import GIVEN, STATE, Base, Rows
 from rockcheck.scenes import Excitation, Floats, Record, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
@@ -210,14 +210,14 @@ def pack_pulses(scene: Scene, model: Any, amplitudes: Floats, periods: Floats) -
 
 
 def state_for(
-    model: Any, most_steps: int, until_decided: bool = False, extremes: bool = False
+    model: Any, most_steps: int, until_decided: bool = False, keeps: Keep = Keep.NOTHING
 ) -> NDArray[np.void]:
     """An array of one state, with what the model's settings ask of a run."""
     states = np.zeros(1, STATE)
     control = states["control"]
     control["tolerance"], control["most_steps"] = model.tolerance, most_steps
     control["most_events"] = model.most_events
-    control["until_decided"], control["extremes"] = until_decided, extremes
+    control["until_decided"], control["keeps"] = until_decided, keeps
     return states
 
 

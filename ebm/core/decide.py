@@ -4,9 +4,9 @@ import math
 
 from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
 from rockcheck.ebm.core.contacts import SLOW
-from rockcheck.ebm.core.extremes import has_met
+from rockcheck.ebm.core.extremes import has_met, reaches_wall
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
-from rockcheck.ebm.core.names import Ending, Family, Fate, Kind, Pivot, Shape
+from rockcheck.ebm.core.names import Ending, Family, Fate, Keep, Kind, Pivot, Shape
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.ebm.core.state import on_wall, rocks, stands_still
 from rockcheck.scenes.compiled import inner_kernel
@@ -56,6 +56,19 @@ def fate_of(block, state):
     goes_on = state.t >= state.t_end or not state.control.until_decided
     moves = state.repeats or slides_on or goes_on
     return Fate.MOVING if moves and not stands_still(state.mode) else Fate.AT_REST
+
+
+@inner_kernel
+def slides_for_good(block, state):
+    """Whether an upright block on a quiet base slides on for ever.
+
+    Nothing brakes it, nothing turns it, and no wall is ahead. How far it gets has no end.
+    """
+    mode, speed = state.mode, state.motion.vx
+    if mode.family != Family.FLAT or mode.pivot != Pivot.SLIPPING or block.mu_k > 0.0:
+        return False
+    ahead = block.left if speed < 0.0 else block.right
+    return ahead.gap == math.inf
 
 
 @inner_kernel
@@ -115,7 +128,7 @@ def _by_energy(block, state, ahead):
 
 @inner_kernel
 def all_is_met(block, state):
-    """Whether none of the extremes of a run can change any more.
+    """Whether nothing that a run keeps can change any more.
 
     So it is where a block on a quiet base only rocks, and sticks as it lands, with too little
     energy to overturn. It conserves that up to each impact, and loses some there. Every corner's
@@ -134,12 +147,19 @@ def all_is_met(block, state):
     left, right = _highest(block, block.left, energy), _highest(block, block.right, energy)
     at_left = upright - block.left.arm + block.left.radius * math.sin(block.left.alpha - left)
     at_right = upright + block.right.arm - block.right.radius * math.sin(block.right.alpha - right)
-    met = state.extremes
     return (
-        has_met(block, met, upright, 0.0)
-        and has_met(block, met, at_left, left)
-        and has_met(block, met, at_right, -right)
+        _changes_nothing(block, state, upright, 0.0)
+        and _changes_nothing(block, state, at_left, left)
+        and _changes_nothing(block, state, at_right, -right)
     )
+
+
+@inner_kernel
+def _changes_nothing(block, state, x, theta):
+    """Whether nothing kept changes where an upright or rocking block gets to this place."""
+    if reaches_wall(block, x, theta):
+        return False
+    return state.control.keeps != Keep.EXTREMES or has_met(block, state.extremes, x, theta)
 
 
 @inner_kernel

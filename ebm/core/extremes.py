@@ -1,4 +1,4 @@
-"""The extremes of a run, kept while it is played where its control asks for them.
+"""The extremes of a run, or its strikes alone, kept while it is played where its control asks.
 
 A corner's place, the slip and the height of a hop are linear in the series of a step, as a guard
 is. Within a step they are largest at its ends or where their rate turns; a bound comes first, a
@@ -219,13 +219,9 @@ def struck(state):
 
 @inner_kernel
 def has_met(block, extremes, x, theta):
-    """Whether the record would not change by an upright or rocking block that gets there.
-
-    It must not touch a wall either.
-    """
+    """Whether the record would not change by an upright or rocking block that gets there."""
     sine, cosine = math.sin(theta), math.cos(theta)
     for i in range(2):
-        side = side_of(block, _sign(i))
         top, bottom = _outward(block, i, x, sine, cosine)
         known = (
             top <= extremes.tops[i, 0] + _ROUNDING
@@ -233,6 +229,18 @@ def has_met(block, extremes, x, theta):
             and bottom <= extremes.bottoms[i] + _ROUNDING
             and _sign(i) * theta <= extremes.turned[i]
         )
-        if not known or max(top, bottom) > side.arm + side.gap - CLOSED:
+        if not known:
             return False
     return True
+
+
+@inner_kernel
+def reaches_wall(block, x, theta):
+    """Whether a block that gets there touches a wall."""
+    sine, cosine = math.sin(theta), math.cos(theta)
+    for i in range(2):
+        side = side_of(block, _sign(i))
+        top, bottom = _outward(block, i, x, sine, cosine)
+        if max(top, bottom) > side.arm + side.gap - CLOSED:
+            return True
+    return False

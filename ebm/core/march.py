@@ -13,7 +13,7 @@ from rockcheck.ebm.core import bouc_wen, coulomb, extremes, ground, modes, serie
 from rockcheck.ebm.core.contacts import closed_floor, lean
 from rockcheck.ebm.core.decide import fate_of, given_up_at, quiet_from
 from rockcheck.ebm.core.guards import KIND
-from rockcheck.ebm.core.names import Ending, Event, Guard, Row
+from rockcheck.ebm.core.names import Ending, Event, Guard, Keep, Row
 from rockcheck.ebm.core.state import NEW_STATE, Base, Records, Run, mode_code, rests
 from rockcheck.ebm.core.strike import strike
 from rockcheck.scenes.compiled import inner_kernel, kernel
@@ -78,7 +78,7 @@ def play_rows(friction, rows, states, begins, work, records, found):
         kept.motion, kept.t, kept.peak = state.motion, state.t, state.peak
         kept.ending, kept.steps, kept.rows = state.ending, state.steps, state.rows
         kept.fate = fate_of(given.setting, state)
-        if state.control.extremes:
+        if state.control.keeps != Keep.NOTHING:
             records.extremes[i] = state.extremes
         kept.at_rest = rests(state.mode)
 
@@ -99,7 +99,7 @@ def begin(block, base, run):
         state.t_end = given_up_at(block, state.quiet_from)
     run.a[Row.G, :] = 0.0  # the series of 1 + vertical acceleration: of a still base it stays so
     run.a[Row.G, 0] = 1.0
-    if control.extremes:
+    if control.keeps == Keep.EXTREMES:
         extremes.begin(block, state)
     stands = lean(motion) == 0.0 and motion.vx == 0.0 and motion.vy == 0.0
     if stands and closed_floor(block, motion):
@@ -129,7 +129,7 @@ def end(block, run):
         state.ending = Ending.NOT_FINITE
     if state.ending == Ending.DONE and not run.state.control.until_decided:
         steps.sample_rest(run, np.inf)
-    if state.control.extremes:
+    if state.control.keeps == Keep.EXTREMES:
         extremes.meet(block, state, state.motion, state.t)
 
 
@@ -140,7 +140,7 @@ def play(rows, states, work, records, found):
     `states` is an array of one STATE with its control, `work` a `workspace()`; `found[i]`, a FOUND,
     is what is kept of row i. Of row i `records.out[i]` (n x 6) has the motion at k * output_step,
     `out_mode[i]` its modes; `log[i]` (m x 5) takes one row an event: time, kind, mode before, mode
-    after, impulse. `records.extremes[i]` are its extremes, where the control asks for them.
+    after, impulse. `records.extremes[i]` are its extremes, where the control asks for any.
     """
     play_rows(coulomb, rows, states, NEW_STATE.copy(), work, records, found)
 

@@ -13,6 +13,9 @@ Pivot = IntEnum("Pivot", "OFF STICK SLIPPING", start=0)
 #: What a component of the base motion is made of (see `ebm.core.ground`).
 Shape = IntEnum("Shape", "STILL GAUSSIAN SINE SAMPLED WAVELET", start=0)
 
+#: What a run keeps beside its motion: nothing, how it strikes the walls, or all its extremes.
+Keep = IntEnum("Keep", "NOTHING STRIKES EXTREMES", start=0)
+
 #: What a series is made of: its noise, and how far ahead it is judged, differ.
 Kind = IntEnum("Kind", "POSITION RATE FORCE", start=0)
 

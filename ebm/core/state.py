@@ -52,8 +52,8 @@ CONTROL = record(
     until_decided="?",
     # Spacing of the rows of the history; with no rows nothing is sampled.
     output_step="f8",
-    # Keep the extremes; a run until it is decided then goes on until none can change.
-    extremes="?",
+    # What is kept, a Keep; a run until it is decided then goes on until none of it can change.
+    keeps="i8",
 )
 #: The extremes of a run, in pairs of the left and the right side (see ebm.core.extremes).
 EXTREMES = record(

@@ -9,11 +9,29 @@ import numpy as np
 
 from rockcheck.ebm.core import extremes
 from rockcheck.ebm.core.contacts import CLOSED
-from rockcheck.ebm.core.decide import all_is_met, decided, energy_of, swing_error, swings_again
+from rockcheck.ebm.core.decide import (
+    all_is_met,
+    decided,
+    energy_of,
+    slides_for_good,
+    swing_error,
+    swings_again,
+)
 from rockcheck.ebm.core.ground import next_exceedance
 from rockcheck.ebm.core.modes import leave
 from rockcheck.ebm.core.motion import motion_at
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, Kind, Pivot, Row, Rule, Shape
+from rockcheck.ebm.core.names import (
+    Ending,
+    Event,
+    Family,
+    Guard,
+    Keep,
+    Kind,
+    Pivot,
+    Row,
+    Rule,
+    Shape,
+)
 from rockcheck.ebm.core.series import AHEAD, INSTANT, NOISE, highest, may_top, slope, value
 from rockcheck.ebm.core.state import mode_code, note, on_wall, rests, stands_still
 from rockcheck.scenes.compiled import inner_kernel
@@ -44,15 +62,16 @@ def may_go_on(block, base, run):
 
 @inner_kernel
 def _decide(block, base, state):
-    """Ends a run whose outcome and peak are certain, or its extremes where these are kept.
+    """Ends a run whose outcome and peak are certain, or that of which nothing kept can change.
 
     One that nothing decides is given up in time.
     """
-    watches, late = state.control.extremes, state.t >= state.t_end
+    watches, late = state.control.keeps != Keep.NOTHING, state.t >= state.t_end
     # What the base has held against a wall until now may be released.
     held = INSTANT if on_wall(state.mode) else 0.0
-    still = state.t >= state.quiet_from + held and stands_still(state.mode)
-    if state.repeats or still or (watches and all_is_met(block, state)):
+    quiet = state.t >= state.quiet_from + held
+    settled = quiet and (stands_still(state.mode) or slides_for_good(block, state))
+    if state.repeats or settled or (watches and all_is_met(block, state)):
         state.ending = Ending.DONE
         return
     verdict = decided(block, base, state) if late or not watches else -1.0
@@ -95,7 +114,7 @@ def advance(block, base, run):
     state.swing = max(state.swing, abs(motion.w))
     state.stride = max(tau, INSTANT, _FADES * min(state.stride, state.length))
     state.t = state.smooth_until if state.whole else t + tau
-    if state.control.extremes:
+    if state.control.keeps == Keep.EXTREMES:
         extremes.follow(block, run, t)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from rockcheck.ebm.core import contacts, extremes, impacts, modes
 from rockcheck.ebm.core.block import side_of, wall_corner
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
-from rockcheck.ebm.core.names import CONTACTS, Contact, Event, Family, Guard, Pivot, Rule
+from rockcheck.ebm.core.names import CONTACTS, Contact, Event, Family, Guard, Keep, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, rock_on
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
@@ -39,7 +39,7 @@ def strike(block, base, run, resting):
         contacts.land_upright(block, motion, float(mode.sense), floor)
     state.event = _EVENTS[which]
     state.wall_impulse[:] = 0.0
-    if state.control.extremes:
+    if state.control.keeps != Keep.NOTHING:
         extremes.approach(block, state)
     if block.unilateral:
         _strike_all(block, base, run, resting)
@@ -47,7 +47,7 @@ def strike(block, base, run, resting):
         _wall_impact(block, state, which == Guard.TIP_GAP, resting)
     else:
         _floor_impact(block, state, resting)
-    if state.control.extremes:
+    if state.control.keeps != Keep.NOTHING:
         extremes.struck(state)
     if not state.known and not block.unilateral:
         contacts.stand_if_slow(block, motion)

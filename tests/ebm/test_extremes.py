@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.ebm.fates import play_fates
+from rockcheck.ebm.fates import Keep, play_fates
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Floor,
@@ -249,7 +249,7 @@ def test_extremes_of_fates_are_those_of_long_histories(name):
     model, scenes = MODELS[name], [*pulses_beside_walls(25, 31)]
     rng = np.random.default_rng(8)
     scenes += [random_scene(rng) for _ in range(25)]
-    fates = play_fates(table_of(scenes), model, extremes=True)
+    fates = play_fates(table_of(scenes), model, keeps=Keep.EXTREMES)
     plain = play_fates(table_of(scenes), model)
     assert fates.extremes is not None
     np.testing.assert_array_equal(fates.overturned, plain.overturned)
@@ -270,10 +270,24 @@ def test_extremes_of_fates_are_those_of_long_histories(name):
                 assert figure == pytest.approx(getattr(wall, key), abs=1e-9)
 
 
+@pytest.mark.parametrize("name", ["bilateral", "unilateral", "no-slip"])
+def test_strikes_kept_alone_are_those_among_the_extremes(name):
+    model, scenes = MODELS[name], [*pulses_beside_walls(60, 37)]
+    table = table_of(scenes)
+    whole = play_fates(table, model, keeps=Keep.EXTREMES).extremes
+    alone = play_fates(table, model, keeps=Keep.STRIKES).extremes
+    assert whole is not None
+    assert alone is not None
+    assert set(alone) == {name for name in whole if name.startswith("wall_")}
+    assert np.nansum(whole["wall_left_strikes"]) > 20
+    for column, values in alone.items():
+        np.testing.assert_array_equal(values, whole[column], err_msg=column)
+
+
 def test_where_no_wall_is_in_reach_a_run_ends_before_the_block_rests():
     """What is left of its energy cannot take it to the wall, nor as far as it has been."""
     scene = free_rocking(0.7, walls=(Wall(side="left", gap=1.0),), duration=60.0)
-    fates = play_fates(table_of([scene]), MODELS["unilateral"], extremes=True)
+    fates = play_fates(table_of([scene]), MODELS["unilateral"], keeps=Keep.EXTREMES)
     settled = MODELS["unilateral"].simulate(scene).event_list[-1].t
     assert fates.time_s[0] < 0.3 * settled
 
@@ -281,7 +295,7 @@ def test_where_no_wall_is_in_reach_a_run_ends_before_the_block_rests():
 def test_blocks_of_the_paper_have_a_table_of_extremes_in_si_units():
     """Columns of a table are those of histories, whatever the units of a row."""
     scenes = [pulse_scene(1.3, 2.0, 0.4, block=PAPER_BLOCK.scaled(size)) for size in (0.5, 3.0)]
-    fates = play_fates(table_of(scenes), MODELS["unilateral"], extremes=True)
+    fates = play_fates(table_of(scenes), MODELS["unilateral"], keeps=Keep.EXTREMES)
     assert fates.extremes is not None
     for row, scene in enumerate(scenes):
         whole = MODELS["unilateral"].simulate(scene.replace(duration=60.0)).extremes

@@ -15,6 +15,7 @@ from rockcheck.ebm.fates import (
     OVERTURNED_LEFT,
     UNDECIDED,
     Fates,
+    Keep,
     RunTable,
     play_fates,
 )
@@ -202,6 +203,19 @@ def test_what_slides_without_friction_between_elastic_walls_is_undecided():
     found = fates_of(scene)
     assert found.outcome.tolist() == [UNDECIDED]
     assert found.time_s[0] == pytest.approx(PATIENCE / PAPER_BLOCK.frequency_parameter)
+
+
+@pytest.mark.parametrize("model", [MODEL, EventBasedModel()], ids=["unilateral", "bilateral"])
+@pytest.mark.parametrize("keeps", list(Keep))
+@pytest.mark.parametrize("velocity", [2.0, -2.0])
+def test_what_slides_away_without_friction_moves_for_good(velocity, keeps, model):
+    """So fast that energy excludes nothing; a wall behind it is out of reach."""
+    behind = "left" if velocity > 0.0 else "right"
+    for walls in ([], [Wall(side=behind, gap=0.01)]):
+        scene = resting(walls=walls, initial_velocity=velocity, floor=Floor(friction=0.0))
+        found = play_fates(table_of([scene]), model, keeps=keeps)
+        assert found.outcome.tolist() == [MOVING]
+        assert found.time_s[0] < 1.0
 
 
 def test_the_duration_of_a_scene_does_not_count():

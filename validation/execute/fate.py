@@ -81,7 +81,7 @@ def fate_of(model: Any, scene: Scene) -> Fate:
 
 def _event_based(model: EventBasedModel, scene: Scene) -> Fate:
     """The fate by the event-based model's own decision; its history lasts as long as the scene."""
-    played = fates.play_fates(table_of(scene), model, extremes=True, jobs=1)
+    played = fates.play_fates(table_of(scene), model, keeps=fates.Keep.EXTREMES, jobs=1)
     outcome = int(played.outcome[0])
     if outcome == fates.FAILED:
         raise ModelFailure(f"{model.name}: {played.reasons[0]}")

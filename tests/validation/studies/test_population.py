@@ -225,7 +225,7 @@ def test_a_task_does_not_depend_on_what_is_made_of_its_peaks():
     assert lines_at(MOTIONS, capacities=[0.3]).tasks[0].key == lines_at(MOTIONS).tasks[0].key
 
 
-@pytest.mark.parametrize(("levels", "where"), [(6, "here"), (3000, "worker")])
+@pytest.mark.parametrize(("levels", "where"), [(6, "here"), (61_000, "worker")])
 def test_what_takes_long_is_played_in_processes(levels, where):
     task = lines_at(MOTIONS, levels=np.linspace(0.1, 1.0, levels)).tasks[0]
     assert task.where == where

@@ -51,6 +51,25 @@ def test_one_decided_run_of_two_is_a_share():
     assert first.startswith("shelf overturns in 1 of 1 record, 100 %")
 
 
+def test_falls_to_both_sides_are_told_by_side():
+    runs = {"a": ran("overturned left", 6.0), "b": RUNS["c"], "c": RUNS["c"], "d": RUNS["a"]}
+    assert falls(gathered(runs))[1] == "To the left 1, to the right 2."
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (0.0, 0.26, "0 to 26 %"),
+        (0.0054, 0.41, "0.54 % to 41 %"),
+        (0.0099, 0.41, "0.99 % to 41 %"),
+        (0.01, 0.41, "1 to 41 %"),
+        (0.29, 1.0, "29 to 100 %"),
+    ],
+)
+def test_a_range_whose_low_end_is_below_a_percent_has_the_unit_twice(low, high, words):
+    assert sentences.percent_range(low, high) == words
+
+
 def test_of_enough_records_there_is_but_the_share():
     (words,) = falls(gathered({f"R{k}": RUNS["a"] for k in range(12)}))
     assert words.startswith("shelf overturns in 0 of 12 records, 0 % (95 %: 0 to ")

@@ -47,13 +47,13 @@ def test_three_records_are_called_few():
     answer = statistics.fall_answer(everything)
     assert answer.few
     words = " ".join(sentences.fall_sentences("shelf", answer, everything))
-    assert words.startswith("shelf overturns in 1 of 3 records, 33 % (95 %: 0.84 to 91 %).")
+    assert words.startswith("shelf overturns in 1 of 3 records, 33 % (95 %: 0.84 % to 91 %).")
     assert "3 records are too few" in words
 
 
 def test_an_interval_may_reach_up_to_all_runs():
     everything = gathered(dict.fromkeys("abc", RUNS["c"]))
-    (words, _) = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
+    words, *_ = sentences.fall_sentences("shelf", statistics.fall_answer(everything), everything)
     assert words == "shelf overturns in 3 of 3 records, 100 % (95 %: 29 to 100 %)."
 
 
@@ -95,7 +95,7 @@ def test_draws_of_one_motion_are_counted_in_the_first_sentence():
     answer = statistics.fall_answer(everything)
     first, *more = sentences.fall_sentences("shelf", answer, everything)
     assert first == "shelf overturns in 2 of 8 draws, 25 % (95 %: 7.1 to 59 %)."
-    assert more == ["With its own numbers it stays."]
+    assert more == ["All fall to the left.", "With its own numbers it stays."]
 
 
 def test_draws_under_records_count_in_place_of_the_runs_as_they_are():

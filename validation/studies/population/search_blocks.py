@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from rockcheck.scenes import Scene
 from rockcheck.validation.finding import (
     Axis,
     Block,
@@ -28,18 +29,26 @@ from rockcheck.validation.studies.population.statistics import (
 )
 
 
-def gap_blocks(answer: GapAnswer) -> list[Block]:
-    """Which gaps on one side are safe: a plot, the intervals, and the runs at some gaps."""
-    return [_gap_plot(answer), *_interval_tables(answer), _gap_table(answer)]
+def gap_blocks(answer: GapAnswer, scene: Scene) -> list[Block]:
+    """Which gaps on one side are safe: a plot, the intervals, and the runs at some gaps.
+
+    The scene's own gap is marked.
+    """
+    return [_gap_plot(answer, scene), *_interval_tables(answer), _gap_table(answer)]
 
 
-def _gap_plot(answer: GapAnswer) -> Plot:
+def _gap_plot(answer: GapAnswer, scene: Scene) -> Plot:
     gaps = [row.gap for row in answer.rows]
+    scene_gaps = [wall.gap for wall in scene.walls if wall.side == answer.side]
+    marks = [
+        Series("gap of the scene", [gap, gap], [0.0, 1.0], style="dotted") for gap in scene_gaps
+    ]
     shares = Panel(
         "share of the runs",
         [
             Series("struck", gaps, [row.struck / row.runs for row in answer.rows]),
             Series("overturned", *overturned_steps(answer), style="step"),
+            *marks,
         ],
     )
     speeds = Panel(

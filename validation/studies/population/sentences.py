@@ -56,6 +56,12 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else ">99 %"
 
 
+def percent_range(low: float, high: float) -> str:
+    """Two shares in percent; below 1 % the unit stands at both, lest 0.54 be read as a share."""
+    first = percent(low) if 0.0 < low < 0.01 else percent(low).removesuffix(" %")
+    return f"{first} to {percent(high)}"
+
+
 def count_of(number: int, noun: str) -> str:
     """A number with its noun: 1 record, 2 records."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
@@ -80,7 +86,8 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
     of = runs_words(answer, gathered)
     sentences = [
         f"{name} overturns in {share.count} of {of}, {percent(share.probability)}"
-        f" (95 %: {percent(share.low).removesuffix(' %')} to {percent(share.high)})."
+        f" (95 %: {percent_range(share.low, share.high)}).",
+        *_direction_sentences(answer),
     ]
     if answer.few:
         sentences.append(
@@ -93,6 +100,17 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
         as_it_is = next(iter(gathered.as_it_is.values()))
         sentences.append(f"With its own numbers it {FATE_WORDS[as_it_is.fate]}.")
     return sentences
+
+
+def _direction_sentences(answer: FallAnswer) -> list[str]:
+    """To which side it falls."""
+    left, right = answer.fates["overturned left"], answer.fates["overturned right"]
+    if left and right:
+        return [f"To the left {left}, to the right {right}."]
+    side = "left" if left else "right"
+    if left + right > 1:
+        return [f"All fall to the {side}."]
+    return [f"It falls to the {side}."] if left + right == 1 else []
 
 
 def _fates_of_ties(gathered: Gathered, case: str, fate: str) -> list[str]:

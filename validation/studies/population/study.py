@@ -82,7 +82,7 @@ def finding_of(gathered: Gathered) -> Finding:
         blocks.outcome_table(falls),
         blocks.quantity_table(quantities, several=falls.runs > 1),
         *blocks.strip_plot(quantities),
-        *(block for answer in gaps for block in search_blocks.gap_blocks(answer)),
+        *(block for answer in gaps for block in search_blocks.gap_blocks(answer, scene)),
         *search_blocks.intensity_blocks(intensity),
     ]
     if plan.levels:

@@ -19,7 +19,7 @@ from rockcheck.ebm import EventBasedModel, fates, ties
 from rockcheck.scenes import Floats, History, Scene, Side, files, writing
 from rockcheck.validation.criteria import CRITERIA, base_of
 from rockcheck.validation.discrepancy import impact_laws
-from rockcheck.validation.execute import models
+from rockcheck.validation.execute import models, pool
 from rockcheck.validation.execute.fate import fate_of
 from rockcheck.validation.studies.population import results, search
 from rockcheck.validation.studies.population.rows import table_of
@@ -30,8 +30,8 @@ from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 Numbers = tuple[tuple[str, float], ...]
 Settings = tuple[tuple[str, Any], ...]
 #: Usual time of a run, s, of compiled models and of others; total time of all tasks up to which
-#: separate processes are not worth while.
-COMPILED_RUN, OTHER_RUN, SHORT_STUDY = 5e-4, 1.0, 4.0
+#: processes, which start in seconds, are not worth while beside the threads of a batch.
+COMPILED_RUN, OTHER_RUN, SHORT_STUDY = 5e-4, 1.0, 60.0
 #: Rows of a history that is kept, at the most.
 MOST_ROWS = 2000
 #: A gap (m) and a factor are known to this much: 0.1 mm, and a quarter of a percent.
@@ -62,14 +62,16 @@ def effort(
 ) -> dict[str, Any]:
     """For a `Task` of so many `runs`: its usual time (s), and the code that it may have to compile.
 
-    It is played in this process where all runs of the study take less time than a worker needs to
-    start.
+    Compiled models are played in this process where all runs of the study take less than
+    `SHORT_STUDY`: their batches use all cores. Others may crash, and are always played by a worker.
     """
-    seconds = COMPILED_RUN if models.family(model).compiled else OTHER_RUN
+    is_compiled = bool(models.family(model).compiled)
+    seconds = COMPILED_RUN if is_compiled else OTHER_RUN
+    is_short = is_compiled and study_runs * seconds < SHORT_STUDY
     return {
         "expected": runs * seconds,
         "compiles": models.compiles(model, settings),
-        "where": "here" if study_runs * seconds < SHORT_STUDY else "worker",
+        "where": "here" if is_short else "worker",
     }
 
 
@@ -129,7 +131,7 @@ class DrawTask(CaseTask):
         *,
         factor: Floats | float = 1.0,
         vertical_factor: Floats | float = 1.0,
-        extremes: bool = False,
+        keeps: fates.Keep = fates.Keep.NOTHING,
     ) -> fates.Fates:
         """The fates of rows of `scenes`; see `rows.table_of`."""
         model: EventBasedModel = self.built()
@@ -141,7 +143,7 @@ class DrawTask(CaseTask):
             factor=factor,
             vertical_factor=vertical_factor,
         )
-        return fates.play_fates(table, model, extremes=extremes, jobs=1)
+        return fates.play_fates(table, model, keeps=keeps, jobs=pool.cores())
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ class Draws(DrawTask):
     def play(self) -> results.Drawn:
         """All runs at once."""
         gaps = None if self.without is None else (self.without, np.inf)
-        played = self.batch(np.arange(len(self.scenes)), gaps, extremes=True)
+        played = self.batch(np.arange(len(self.scenes)), gaps, keeps=fates.Keep.EXTREMES)
         alphas = [scene.block.alpha for scene in self.scenes]
         return results.Drawn(results=tuple(results.results_of(played, alphas)))
 
@@ -220,7 +222,8 @@ class GapTask(DrawTask):
         near = np.flatnonzero(gaps <= np.array(self.reach)[which])
         if not near.size:
             return at_gaps
-        played = self.batch(which[near], (self.side, gaps[near]), self.restitution, extremes=speeds)
+        keeps = fates.Keep.STRIKES if speeds else fates.Keep.NOTHING
+        played = self.batch(which[near], (self.side, gaps[near]), self.restitution, keeps=keeps)
         at_gaps.stands[near] = counter.standing(played)
         at_gaps.overturned[near] = np.isin(played.outcome, OVERTURNED)
         at_gaps.undecided[near] = played.outcome >= fates.UNDECIDED
