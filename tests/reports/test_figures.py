@@ -30,13 +30,9 @@ from rockcheck.validation.paper import KEPT, Panel as Case, paper_panels
 from rockcheck.validation.paper.findings import findings_of
 from rockcheck.validation.paper.spectra import Paper
 from rockcheck.validation.paper.tables import finding_blocks
-from rockcheck.validation.studies.spectrum.study import (
-    CANDIDATES,
-    PLAYED_SHARE,
-    Spectra,
-    agreement_blocks,
-    mapped,
-)
+from rockcheck.validation.studies.spectrum.agreement import CANDIDATES, PLAYED_SHARE, mapped
+from rockcheck.validation.studies.spectrum.agreement_blocks import agreement_blocks
+from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 
 SIZE = 12
@@ -117,7 +113,7 @@ def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
 def test_the_documentation_shows_the_kept_study():
     found = reading.read_json(KEPT / "agreement.json")
     panels = mapped(paper_panels())
-    _, table, by_spectrum, plot = agreement_blocks(found, panels, came=True)
+    _, table, by_spectrum, plot = agreement_blocks(found, panels, came_with_package=True)
     assert [list(map(plain, row)) for row in table.rows] == [
         list(map(plain, row)) for row in whole_runs.load("spectrum").table("agreement").rows
     ]

@@ -9,7 +9,8 @@ import pytest
 
 from rockcheck import Floor, Record, Spectrum
 from rockcheck.validation.paper import paper_panels
-from rockcheck.validation.studies.spectrum import study as agreement
+from rockcheck.validation.studies.spectrum import agreement
+from rockcheck.validation.studies.spectrum.agreement_blocks import agreement_blocks
 from rockcheck.validation.studies.spectrum.tiles import Book, Played, Request
 
 
@@ -96,7 +97,7 @@ def test_agreement_counts_equal_outcomes(agree):
         ("cm", True): (19, 20, 0),
         ("cm", False): (19, 20, 1),
     }
-    _, table, by_spectrum, plot = agreement.agreement_blocks(found, [panel], came=False)
+    _, table, by_spectrum, plot = agreement_blocks(found, [panel], came_with_package=False)
     assert table.rows[:2] == [
         ["ebm-unilateral", 1.0, 0.95, None, None, 40, 1],
         ["cm", 0.95, 0.95, 0.95, 0.9, 40, 1],
@@ -104,9 +105,11 @@ def test_agreement_counts_equal_outcomes(agree):
     assert by_spectrum.rows[1] == [panel.name, *table.rows[1]]
     assert json.loads(json.dumps(found)) == found
     assert [  # whether the axes are a record's
-        list(agreement.agreement_blocks(found, [dataclasses.replace(panel, scene=one)], False))[
-            -1
-        ].data["record"]
+        list(
+            agreement_blocks(
+                found, [dataclasses.replace(panel, scene=one)], came_with_package=False
+            )
+        )[-1].data["record"]
         for one in (
             panel.scene,
             panel.scene.replace(excitation=Record.from_samples([0.0, 1.0], 0.1)),
@@ -137,7 +140,7 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):
     assert set(played[flat, "dart"]) == set(played[flat, "drake"]) < set(played[flat, "cm"])
     assert (bouncing, "drake") not in played
     assert {one["model"] for one in found["maps"]} == {"ebm", "ebm-unilateral", "cm"}
-    _, table, *_ = agreement.agreement_blocks(found, list(spectra), came=False)
+    _, table, *_ = agreement_blocks(found, list(spectra), came_with_package=False)
     assert [row["nodes"] for row in table.records()] == [80, 80, 16, 8]
 
 

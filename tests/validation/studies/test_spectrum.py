@@ -25,7 +25,8 @@ from rockcheck import (
 from rockcheck.ebm.spectrum import node_scene
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.paper import Panel, paper_panels
-from rockcheck.validation.studies.spectrum.study import KEPT_AN_AXIS, Spectra
+from rockcheck.validation.studies.spectrum.spectrum_blocks import KEPT_AN_AXIS
+from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import (
     COARSE,
     PARTS,
