@@ -16,7 +16,10 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from rockcheck.reports import document, drawers, figures, manifest, style, tables
+from rockcheck.reports import document, drawers, manifest, style, tables
+from rockcheck.reports.ensemble_page import EnsembleView
+from rockcheck.reports.histories_figure import histories_figure, thumbnail as thumbnail_of
+from rockcheck.reports.payload import payload_of, summary_of
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
 from rockcheck.scenes import (
@@ -120,13 +123,13 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
     reference. Raises `InputError` for what the run does not have.
     """
     view = _Pages(folder, (name,)).views[name]
-    if not (view.curves if isinstance(view, figures.EnsembleView) else view.histories):
+    if not (view.curves if isinstance(view, EnsembleView) else view.histories):
         raise errors.InputError(
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
-    if isinstance(view, figures.EnsembleView):
+    if isinstance(view, EnsembleView):
         return style.save_as(drawers.figure_of(view.distributions()), path)
-    return style.save_as(figures.histories_figure(view), path)
+    return style.save_as(histories_figure(view), path)
 
 
 def write_site(
@@ -177,10 +180,10 @@ class _Pages:
             raise errors.unknown_name("scene of the run", unknown[0], slugs)
         self.scenes = scene_views(self.run, folder, {*shown(self.run), *wanted})
         self.ensembles = [
-            figures.EnsembleView(self.run, record.name, slugs[record.name], record)
+            EnsembleView(self.run, record.name, slugs[record.name], record)
             for record in self.run.ensembles
         ]
-        views: list[SceneView | figures.EnsembleView] = [*self.scenes, *self.ensembles]
+        views: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in views}
         self.links = {view.name: f"{document.PAGES}/{view.slug}.html" for view in views}
         #: What every page shows, and calls.
@@ -212,7 +215,7 @@ class _Pages:
         match view:
             case SceneView():
                 template, (context, paths) = "scene.html", self._write_scene(view)
-            case figures.EnsembleView():
+            case EnsembleView():
                 template, (context, paths) = "finding.html", self._write_ensemble(view)
             case None:
                 template, (context, paths) = "index.html", self._write_index()
@@ -232,13 +235,13 @@ class _Pages:
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
         thumbnail = drawn / f"{view.slug}~small.svg"
-        paths = [style.save_as(figures.thumbnail(curves), thumbnail, named=False)]
+        paths = [style.save_as(thumbnail_of(curves), thumbnail, named=False)]
         stems = self._stems(view)
         for against, stem in stems.items():
-            figure = figures.histories_figure(view, against)
+            figure = histories_figure(view, against)
             paths += style.save(figure, drawn / stem, self.formats)
         data = writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js"
-        payload = writing.script_text("window.rockcheck", figures.payload(view))
+        payload = writing.script_text("window.rockcheck", payload_of(view))
         paths.append(writing.write_whole(data, payload))
         scene_folder = writing.made(self.folder, document.PAGES, "scene-files")
         scene_files = write_scene_file(view.scene, scene_folder, view.slug)
@@ -251,7 +254,7 @@ class _Pages:
             "following": neighbours[number + 1],
             "facts": scene_facts(view.scene),
             "beyond": experience.outside(view.scene),
-            "summary": figures.summary(view),
+            "summary": summary_of(view),
             "stems": stems,
         }
         return context, paths
@@ -267,7 +270,7 @@ class _Pages:
             for number, against in enumerate(references)
         }
 
-    def _write_ensemble(self, view: figures.EnsembleView) -> tuple[dict[str, Any], list[Path]]:
+    def _write_ensemble(self, view: EnsembleView) -> tuple[dict[str, Any], list[Path]]:
         """Write an ensemble's figures and tables; returns what its page shows, and them."""
         page, drawn = view.page(), writing.made(self.folder, document.PAGES, document.FIGURES)
         curves = [
@@ -276,7 +279,7 @@ class _Pages:
             if model in view.curves
         ]
         thumbnail = drawn / f"{view.slug}~small.svg"
-        paths = [style.save_as(figures.thumbnail(curves, step=True), thumbnail, named=False)]
+        paths = [style.save_as(thumbnail_of(curves, step=True), thumbnail, named=False)]
         for plot in page.plots():
             paths += style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
         for table in page.tables():

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
-from rockcheck.reports.figures import histories_figure
+from rockcheck.reports.histories_figure import histories_figure
 from rockcheck.reports.show.words import duration, number, ratio, readable, window
 from rockcheck.reports.site import write_scene_file
 from rockcheck.reports.style import LOOKS, SPARE, looks, save

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import ttest_1samp
 
-from rockcheck.reports.figures import EnsembleView
+from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.validation.discrepancy import ensemble, measures
 from rockcheck.validation.discrepancy.compare import evaluate
 from rockcheck.validation.suite import accepting, suites
