@@ -135,7 +135,10 @@ def decided(scene: Scene, state: Floats, peak: float) -> Verdict:
 
 
 def _highest(scene: Scene, side: Side, energy: float) -> float:
-    """The rotation (rad) about a corner to which an energy (J/kg) can lift the block."""
+    """The rotation (rad) about a corner to which an energy (J/kg) can lift the block.
+
+    The energy is too little to stand on that corner.
+    """
     pivot = scene.block.pivot(side)
     height = pivot.height + max(energy, 0.0) / scene.gravity
-    return pivot.alpha - math.acos(min(height / pivot.radius, 1.0))
+    return pivot.alpha - math.acos(height / pivot.radius)

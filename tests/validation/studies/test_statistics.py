@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from assessed import (
     CERTAIN,
@@ -19,6 +20,7 @@ from assessed import (
     search,
 )
 
+from rockcheck.scenes import files
 from rockcheck.validation.criteria import CRITERIA
 from rockcheck.validation.studies.population import (
     certainty as certainty_answers,
@@ -26,6 +28,7 @@ from rockcheck.validation.studies.population import (
     sentences,
     statistics,
 )
+from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensities import measure_of, size_of
 from rockcheck.validation.studies.population.plan import factors_of, gaps_looked_at
 from rockcheck.validation.studies.population.study import finding_of
@@ -442,6 +445,102 @@ def test_another_model_that_falls_makes_the_outcome_uncertain():
     assert sd["model form"] == 1.0
 
 
+def test_another_model_that_nothing_decided_leaves_the_outcome():
+    answer, _ = contributions(gathered({"a": RUNS["a"]}, cm={"a": ran("undecided", 0.9)}))
+    assert answer.of == "peak rotation"
+
+
+def test_a_run_of_another_model_that_failed_says_nothing_of_the_model():
+    _, sd = contributions(gathered({"a": RUNS["a"]}, cm={"a": ran("failed")}))
+    assert "model form" not in sd
+
+
+def test_where_all_fall_a_converged_fall_has_no_error():
+    certainty = {"c": results.Certainty(numerical=judged(0.3))}
+    answer, sd = contributions(gathered({"c": RUNS["c"]}, certainty=certainty))
+    assert answer.of == "peak rotation"
+    assert sd["numerical error"] == 0.0
+
+
+def test_a_fall_that_is_not_converged_has_an_unknown_error():
+    certainty = {"c": results.Certainty(numerical=judged(None))}
+    answer, _ = contributions(gathered({"c": RUNS["c"]}, certainty=certainty))
+    assert "numerical error" in answer.unknown
+
+
+def test_a_run_without_a_peak_counts_as_one_that_never_turned():
+    _, sd = contributions(gathered({"a": RUNS["a"], "b": ran("at rest")}))
+    assert sd["records"] == pytest.approx(0.2 / math.sqrt(2.0))
+
+
+def test_shares_of_the_variance_sum_to_one_the_largest_first():
+    cm = {"a": ran("at rest", 0.3), "b": ran("at rest", 0.4)}
+    answer, _ = contributions(gathered({"a": RUNS["a"], "b": RUNS["b"]}, cm=cm))
+    assert [part.source for part in answer.contributions] == ["records", "model form"]
+    # variances 0.02, and the mean of 0.01 and 0
+    assert [part.share for part in answer.contributions] == pytest.approx([0.8, 0.2])
+
+
+def test_without_any_variance_no_source_has_a_share():
+    answer, _ = contributions(gathered({"a": RUNS["a"], "b": RUNS["a"]}))
+    assert [part.share for part in answer.contributions] == [0.0]
+
+
+TWO_NUMBERS = files.UncertainScene(
+    SCENE,
+    {
+        "floor.friction": files.Spread(value=0.4, sd=0.04),
+        "block.half_width": files.Spread(value=0.397, sd=0.001),
+    },
+    np.eye(2),
+)
+
+
+def leading(peak_of, cases="a"):
+    """The leading number of draws whose peaks are a function of both, as standard deviations."""
+    plan = gathered(dict.fromkeys(cases, RUNS["a"]), given=TWO_NUMBERS, draws=16).plan
+    drawn = {}
+    for case in cases:
+        values = np.array([[value for _, value in draw] for draw in plan.numbers[case]])
+        deviations = (values - values.mean(axis=0)) / values.std(axis=0)
+        drawn[case] = [ran(*peak_of(case, *each)) for each in deviations.tolist()]
+    everything = gathered(dict.fromkeys(cases, RUNS["a"]), given=TWO_NUMBERS, draws=16, drawn=drawn)
+    return certainty_answers.leading_number(everything)
+
+
+def test_the_number_that_moves_the_peak_leads():
+    name = leading(lambda _, friction, width: ("at rest", 0.3 + 0.01 * friction - 0.03 * width))
+    assert name == "block.half_width"
+
+
+def test_a_number_of_a_small_scatter_may_lead():
+    name = leading(lambda _, friction, width: ("at rest", 0.3 + 0.03 * friction - 0.01 * width))
+    assert name == "floor.friction"
+
+
+def test_a_fall_counts_as_a_peak_of_one():
+    """A single fall at the lowest width leaves what moves all others in front."""
+
+    def peak_of(case, friction, width):
+        falls = width < -1.6
+        return ("overturned left", 6.0) if falls else ("at rest", 0.5 + 0.2 * friction)
+
+    assert leading(peak_of) == "floor.friction"
+
+
+def test_what_works_against_itself_under_two_records_does_not_lead():
+    """The width raises the peak under one record, and lowers it under the other."""
+
+    def peak_of(case, friction, width):
+        return "at rest", 0.5 + 0.01 * friction + (0.1 if case == "a" else -0.1) * width
+
+    assert leading(peak_of, "ab") == "floor.friction"
+
+
+def test_without_draws_no_number_leads():
+    assert certainty_answers.leading_number(gathered()) is None
+
+
 def test_draws_scatter_within_a_record():
     drawn = {"a": [ran("at rest", peak) for peak in (0.15, 0.25, 0.25, 0.15)]}
     _, sd = contributions(
@@ -503,6 +602,56 @@ def test_of_one_run_a_method_says_what_happens_not_how_often():
         certainty_answers.method_scores(everything, methods), [event for _, event in methods]
     )
     assert words == ["step of velocity: stays; reserve rocking: overturns."]
+
+
+def scored(event, run, predicts, estimate):
+    """The score of a method of one run."""
+    everything = gathered({"x": run})
+    shown = everything.shown["x"].model_copy(update={"methods": ((predicts, estimate),)})
+    done = {everything.plan.shown["x"]: shown}
+    (score,) = certainty_answers.method_scores(Gathered(everything.plan, done), [("m", event)])
+    return score
+
+
+def test_what_nothing_decided_is_held_against_no_method():
+    assert scored("uplifts", ran("undecided", 0.9), True, 0.5).of == 0
+
+
+@pytest.mark.parametrize(("slip", "simulated"), [(0.9e-6, 0), (2e-6, 1)])
+def test_a_slip_above_a_thousandth_of_a_millimetre_is_one(slip, simulated):
+    assert scored("slides", ran("at rest", 0.1, slip), True, None).simulated == simulated
+
+
+def test_a_block_that_falls_need_not_have_slid():
+    assert scored("slides", ran("overturned left", 6.0, 0.0), True, None).simulated == 0
+
+
+def test_a_run_without_a_figure_did_not_move():
+    score = scored("slides", ran("at rest"), False, 0.1)
+    assert score.simulated == 0
+    assert score.motion == 0.0
+
+
+@pytest.mark.parametrize(
+    ("estimate", "motion", "unsafe"),
+    [(10.0, 10.00001, 0), (10.0, 10.00002, 1), (0.5, 0.5000005, 0), (0.0, 2e-6, 1)],
+)
+def test_an_estimate_is_unsafe_where_the_block_goes_farther_by_a_millionth(
+    estimate, motion, unsafe
+):
+    assert scored("uplifts", ran("at rest", motion), True, estimate).unsafe == unsafe
+
+
+def test_a_fall_goes_farther_than_any_rotation():
+    score = scored("uplifts", ran("overturned left", 1.0), True, 5.0)
+    assert score.motion is None
+    assert score.unsafe == 1
+
+
+def test_a_method_without_an_estimate_is_neither_safe_nor_unsafe():
+    score = scored("uplifts", RUNS["a"], True, None)
+    assert score.estimate is None
+    assert score.unsafe is None
 
 
 # The finding
