@@ -17,6 +17,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
 from rockcheck.reports import drawers, manifest, style
+from rockcheck.reports.live import live_data, write_scripts
 from rockcheck.reports.show.words import (
     duration,
     moment,
@@ -25,6 +26,7 @@ from rockcheck.reports.show.words import (
     unit,
     window,
 )
+from rockcheck.reports.workers import side_by_side
 from rockcheck.scenes import InputError, errors, printable, reading, writing
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.finding import Column, Finding, Mark, Plot, Table, Text, plain
@@ -206,9 +208,9 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
         path, stamp = (folder / name).with_suffix(".svg"), style.stamp_of(drawn)
         if style.stamp_in(path) != stamp:
             calls.append(Call(_draw, (folder / name, path, stamp)))
-    list(drawers.side_by_side(calls))
+    list(side_by_side(calls))
     write_assets(folder)
-    if live := [drawers.live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
+    if live := [live_data(plot) for plot in plots if plot.live and plot.kind == "lines"]:
         writing.write_whole(
             folder / "curves.js",
             writing.script_text("window.rockcheckCurves", writing.finite(live)),
@@ -230,7 +232,7 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
             script
             for plot in plots
             if plot.live and plot.kind == "spectra"
-            for script in drawers.write_scripts(plot, figures)
+            for script in write_scripts(plot, figures)
         ),
         looks=style.looks(style.LOOKS),
         row_cells=row_cells,

@@ -22,6 +22,7 @@ from rockcheck.reports.histories_figure import histories_figure, thumbnail as th
 from rockcheck.reports.payload import payload_of, summary_of
 from rockcheck.reports.show.words import scene_facts
 from rockcheck.reports.view import CHANNELS, SceneView, scene_views, slugs_of
+from rockcheck.reports.workers import side_by_side
 from rockcheck.scenes import (
     Record,
     Scene,
@@ -324,7 +325,7 @@ def _write_pages(pages: _Pages, jobs: int, on_progress: progress.OnProgress) -> 
         arguments = pages.folder, pages.wanted, pages.all_figures
         calls = [pool.Call(_write_page, (*arguments, name)) for name in pages.views]
     paths = []
-    for done, of_page in enumerate(drawers.side_by_side(calls, jobs, least=2), 1):
+    for done, of_page in enumerate(side_by_side(calls, jobs, least=2), 1):
         paths += of_page
         on_progress(done, len(calls) + 1)
     paths += pages.write("")

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from rockcheck.cm import ContinuousModel
 from rockcheck.ebm import EventBasedModel, overturning_spectrum
 from rockcheck.engines import MuJoCo, PyBullet
-from rockcheck.reports.drawers import draw_spectrum
 from rockcheck.reports.show.drawing import draw_block
+from rockcheck.reports.spectrum_plots import draw_spectrum
 from rockcheck.reports.style import PAGE, STYLE, looks, save_as
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Ricker, Scene, Wall, load_scene
 from rockcheck.scenes.kinematics import pivot_height

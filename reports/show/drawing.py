@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rockcheck.ebm import Spectrum
-from rockcheck.reports.drawers import INK, SHADE, draw_block, draw_spectrum
+from rockcheck.reports.block_plot import INK, SHADE, draw_block
+from rockcheck.reports.spectrum_plots import draw_spectrum
 from rockcheck.reports.style import SPARE, looks
 from rockcheck.scenes import History, Scene
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Recording, intensity

@@ -211,7 +211,7 @@ def warm(jobs: JobsOption = None) -> None:
     rockcheck; what is compiled already is only looked up. Afterwards no command waits for a
     compiler.
     """
-    from rockcheck.reports.drawers import side_by_side
+    from rockcheck.reports.workers import side_by_side
 
     console().print(f"compiling {len(PARTS)} parts, what is compiled already is only looked up")
     taken: dict[str, float] = {}

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 
 from rockcheck import Sine, Spectrum, load_scene
 from rockcheck.reports.document import FIGURES, publish
-from rockcheck.reports.drawers import LAW_MARK, OUTCOMES, draw_spectrum, figure_of, own_label
+from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.manifest import hash_of
+from rockcheck.reports.spectrum_plots import LAW_MARK, OUTCOMES, draw_spectrum, own_label
 from rockcheck.scenes import reading
 from rockcheck.validation.finding import (
     Axis,

@@ -10,8 +10,8 @@ import pytest
 
 from rockcheck.commands import OUT, assess, studies
 from rockcheck.reports.document import PAGES, folder_argument
-from rockcheck.reports.drawers import GREY, colours
 from rockcheck.reports.ensemble_page import EnsembleView
+from rockcheck.reports.line_plots import GREY, colours
 from rockcheck.reports.manifest import MANIFEST
 from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site

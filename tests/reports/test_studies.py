@@ -9,7 +9,7 @@ import pytest
 from playwright import sync_api as playwright
 
 from rockcheck.reports.document import publish
-from rockcheck.reports.drawers import OUTCOMES
+from rockcheck.reports.spectrum_plots import OUTCOMES
 from rockcheck.validation.execute import pool
 from rockcheck.validation.finding import (
     Axis,
