@@ -39,8 +39,8 @@ from rockcheck.validation.studies.spectrum import scene_node
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
+from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
-from rockcheck.validation.studies.work_precision.timings import Saving
 from rockcheck.validation.uncertainty import population
 
 pytestmark = pytest.mark.browser

@@ -105,7 +105,7 @@ DOORS = {
         "scenes/experience.py",
         "validation/execute/provenance.py",
     }
-    | {"commands/simulate.py", "validation/studies/work_precision/timings.py"}
+    | {"commands/simulate.py", "validation/studies/work_precision/savings.py"}
     | {"reports/style.py", "reports/document.py", "validation/paper/sentences.py"}
     | {"validation/studies/conformance/export.py"},
 }

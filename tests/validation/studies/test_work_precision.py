@@ -35,16 +35,14 @@ from rockcheck.validation.studies.work_precision.runs import (
     prepared,
     slope,
 )
+from rockcheck.validation.studies.work_precision.savings import KINDS, Saving, measured
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
 from rockcheck.validation.studies.work_precision.timings import (
     CASES,
-    KINDS,
     LEVEL,
-    Saving,
     at_level,
     batch_size,
     batch_times,
-    measured,
 )
 
 SOME = (1, 4, 7)

@@ -25,7 +25,7 @@ from rockcheck.validation.finding import (
     Text,
     text,
 )
-from rockcheck.validation.studies.work_precision import runs, timings
+from rockcheck.validation.studies.work_precision import runs, savings, timings
 from rockcheck.validation.study import Study, Task
 
 What = Literal["all", "ebm", "models", "skipping", "convergence"]
@@ -65,9 +65,9 @@ TIMED: Mapping[str, Callable[[str, int], Iterable[Any]]] = {
     "batch": timings.batch_times,
     "size": lambda name, size: [timings.batch_size(size, int(name))],
     "cold start": lambda name, size: [timings.cold_start(cached=name == "filled", times=size)],
-    "saving": timings.measured,
+    "saving": savings.measured,
 }
-Row = runs.BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart | timings.Saving
+Row = runs.BenchmarkRun | timings.BatchTime | timings.BatchSize | timings.ColdStart | savings.Saving
 
 
 @dataclass(frozen=True)
@@ -81,12 +81,12 @@ class WorkPrecision(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """All at once; what is timed first."""
-        rounds = timings.QUICK_ROUNDS if self.quick else timings.SAVING_ROUNDS
+        rounds = savings.QUICK_ROUNDS if self.quick else savings.SAVING_ROUNDS
         parts: dict[What, Iterable[Task]] = {
             "ebm": self._batches(),
             "skipping": (
                 Measure("saving", name, rounds, where="timed", expected=0.6 * rounds)
-                for name in timings.KINDS
+                for name in savings.KINDS
                 if not name.startswith("batches") or name.endswith("quick") == self.quick
             ),
             "models": self._models(),
@@ -490,7 +490,7 @@ def _batches(times: Sequence[timings.BatchTime]) -> Iterator[Block]:
 def _timings(
     starts: Sequence[timings.ColdStart],
     sizes: Sequence[timings.BatchSize],
-    saved: Sequence[timings.Saving],
+    saved: Sequence[savings.Saving],
 ) -> Iterator[Table]:
     yield Table(
         "cold-starts",
@@ -544,6 +544,6 @@ def _timings(
             for one in saved
         ],
         "What a scene does not need",
-        f"Not measured: {'; '.join(timings.NOT_MEASURED)}.",
+        f"Not measured: {'; '.join(savings.NOT_MEASURED)}.",
         folded=True,
     )
