@@ -18,44 +18,46 @@ from numpy.typing import ArrayLike
 
 from rockcheck.reports.histories_figure import fineness
 from rockcheck.reports.show.words import number
-from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, SceneView
+from rockcheck.reports.view import CHANNELS, PAPER_CHANNELS, Band, Channel, SceneView
 from rockcheck.scenes import excitations
 from rockcheck.validation.discrepancy import figures, impacts
 
 
-def packed_lines(lines: Sequence[ArrayLike]) -> str:
-    """Lines of values as base64 of a deflated stream.
+class Lines:
+    """Lines of values that a page draws; each place of its data holds the number of its line."""
 
-    The stream holds of each little-endian float32 the first byte, then of each the second, and so
-    on.
+    def __init__(self) -> None:
+        self._lines: list[ArrayLike] = []
 
-    A line shorter than others ends with NaN. Neighbours share their sign and exponent, so bytes of
-    one place compress well: a page takes half of what plain values take.
-    """
-    values = np.full((len(lines), max(map(np.size, lines))), np.nan, "<f4")
-    for place, line in zip(values, lines, strict=True):
-        place[: np.size(line)] = line
-    return base64.b64encode(zlib.compress(values.reshape(-1, 1).view(np.uint8).T.tobytes())).decode(
-        "ascii"
-    )
+    def add(self, values: ArrayLike) -> int:
+        """Take a line; returns its number."""
+        self._lines.append(values)
+        return len(self._lines) - 1
+
+    def packed(self) -> str:
+        """All lines as base64 of a deflated stream.
+
+        The stream holds of each little-endian float32 the first byte, then of each the second, and
+        so on. A line shorter than others ends with NaN. Neighbours share their sign and exponent,
+        so bytes of one place compress well: a page takes half of what plain values take.
+        """
+        longest = max(map(np.size, self._lines))
+        values = np.full((len(self._lines), longest), np.nan, "<f4")
+        for row, line in zip(values, self._lines, strict=True):
+            row[: np.size(line)] = line
+        by_byte = values.reshape(-1, 1).view(np.uint8).T
+        return base64.b64encode(zlib.compress(by_byte.tobytes())).decode("ascii")
 
 
 def payload_of(view: SceneView) -> dict[str, Any]:
     """All that is drawn and animated of a scene on its page; see the module."""
-    scene = view.scene
-    bands = view.bands()
-    lines: list[ArrayLike] = []
-
-    def line(values: ArrayLike) -> int:
-        lines.append(values)
-        return len(lines) - 1
-
-    return {
+    scene, bands, lines = view.scene, view.bands(), Lines()
+    content = {
         "scene": view.name,
         "duration": float(view.t[-1]),
         "step": scene.output_step * view.stride,
         "rows": len(view.t),
-        "ground": line(view.ground / excitations.GRAVITY_OF_RECORDS),
+        "ground": lines.add(view.ground / excitations.GRAVITY_OF_RECORDS),
         "alpha": scene.block.alpha,
         "frequencyParameter": scene.frequency_parameter,
         "block": [scene.block.half_width, scene.block.half_height],
@@ -63,41 +65,49 @@ def payload_of(view: SceneView) -> dict[str, Any]:
         "extent": [float(f"{edge:.4g}") for edge in view.extent],
         "references": view.references,
         "horizon": view.horizon,
-        "channels": [
-            {
-                "name": c.name,
-                "label": c.label,
-                "unit": "" if c.unit == "1" else c.unit,
-                "fine": fineness(view, c, bands),
-                "folded": c not in PAPER_CHANNELS,
-            }
-            for c in CHANNELS
-        ],
+        "channels": [_channel(view, channel, bands) for channel in CHANNELS],
         "window": view.active,
-        "bands": [
-            vars(band) | ({"running": line(view.running_rms(band))} if band.kind == "rms" else {})
-            for band in bands
-        ],
-        "models": [
-            {
-                "name": model,
-                "label": look.label,
-                "look": look.key,
-                "dash": look.dash,
-                "values": {name: line(values) for name, values in view.values[model].items()},
-                "events": [
-                    [float(f"{e.t:.6f}"), e.kind, float(f"{e.impulse:.3g}")]
-                    for e in view.histories[model].event_list
-                ],
-                "modes": [[float(f"{t:.4f}"), mode] for t, _, mode in view.spells(model)],
-                "agreement": view.agreement.get(model),
-                "fell": view.falls.get(model),
-                "samples": view.measured.get(model),
-            }
-            for model, look in view.looks.items()
-            if model in view.histories
-        ],
-        "lines": packed_lines(lines),  # the last, when all are known
+        "bands": [_band(view, band, lines) for band in bands],
+        "models": [_model(view, model, lines) for model in view.looks if model in view.histories],
+    }
+    return content | {"lines": lines.packed()}  # the last, when all are known
+
+
+def _channel(view: SceneView, channel: Channel, bands: Sequence[Band]) -> dict[str, Any]:
+    return {
+        "name": channel.name,
+        "label": channel.label,
+        "unit": "" if channel.unit == "1" else channel.unit,
+        "fine": fineness(view, channel, bands),
+        "folded": channel not in PAPER_CHANNELS,
+    }
+
+
+def _band(view: SceneView, band: Band, lines: Lines) -> dict[str, Any]:
+    """A tolerance; of an RMS also the figure as it runs."""
+    if band.kind != "rms":
+        return {**vars(band)}
+    return vars(band) | {"running": lines.add(view.running_rms(band))}
+
+
+def _model(view: SceneView, model: str, lines: Lines) -> dict[str, Any]:
+    """What a model's history has on the page."""
+    look, history = view.looks[model], view.histories[model]
+    events = [
+        [float(f"{event.t:.6f}"), event.kind, float(f"{event.impulse:.3g}")]
+        for event in history.event_list
+    ]
+    return {
+        "name": model,
+        "label": look.label,
+        "look": look.key,
+        "dash": look.dash,
+        "values": {name: lines.add(values) for name, values in view.values[model].items()},
+        "events": events,
+        "modes": [[float(f"{start:.4f}"), mode] for start, _, mode in view.spells(model)],
+        "agreement": view.agreement.get(model),
+        "fell": view.falls.get(model),
+        "samples": view.measured.get(model),
     }
 
 
