@@ -321,6 +321,20 @@ def test_another_model_plays_on_both_sides_of_what_the_batch_found():
     assert [threshold.task.scene.wall("left").gap for threshold in found] == [0.0299, 0.03]
 
 
+def test_thresholds_wait_for_the_search():
+    plan = planned(models={"cm": {}}, gaps=[GapRange("left", (0.0, 0.1))])
+    done = done_of(plan.tasks({}), results.Shown(result=ran("at rest", 0.3)))
+    done[plan.free["left"]["R0"]] = results.Drawn(results=(ran("at rest", 0.3, reach=0.1),))
+    second = plan.tasks(done)
+    done |= done_of([task for task in second if task not in done], results.Certainty())
+    gap_task = plan.gap_tasks(done)["left"]["R0"]
+    without_search = {task: result for task, result in done.items() if task != gap_task}
+    assert plan.tasks(without_search) == second
+    done[gap_task] = search(FALL)
+    last = [task.about[0] for task in plan.tasks(done) if task not in second]
+    assert last == ["gap 29.9 mm", "gap 30 mm"]
+
+
 def test_where_it_falls_at_the_least_gap_there_is_one_side():
     (found,) = thresholds([interval(0, 0.0, 0.1, None, None)])
     assert found.what == "gap 0 mm"
