@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, Event, Floor, History, Scene, Wall
-from rockcheck.cm.extremes import extremes_at_start, extremes_of, note_mode, note_place
+from rockcheck.cm.extremes import (
+    FLAT_SHARE,
+    extremes_at_start,
+    extremes_of,
+    note_mode,
+    note_place,
+)
 from rockcheck.scenes import PAPER_BLOCK
 
 B, H = PAPER_BLOCK.half_width, PAPER_BLOCK.half_height
@@ -139,6 +145,12 @@ def test_a_block_that_starts_tilted_uplifts_after_it_has_stood():
     tilted = (0.1, 0.0, 0.0)
     uplift, _ = noted_modes([tilted, STILL, tilted], initial_rotation=0.1)
     assert uplift == 2.0
+
+
+@pytest.mark.parametrize(("share", "stands"), [(0.9, True), (1.1, False)])
+def test_a_block_stands_flat_within_a_share_of_its_slenderness(share, stands):
+    tilt = share * FLAT_SHARE * PAPER_BLOCK.alpha
+    assert extremes_at_start(scene(initial_rotation=tilt)).stood_flat == stands
 
 
 def test_a_block_that_starts_turning_uplifts_after_it_has_stood():

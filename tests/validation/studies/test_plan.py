@@ -38,8 +38,10 @@ def given(scene=SCENE, spreads=None, correlation=None):
 
 
 def planned(scene=SCENE, *, cases=1, spreads=None, **more):
+    """A plan of so many cases, of which the first has uncertain numbers."""
     own = given(scene, spreads)
-    return Plan(own=own, cases={f"R{k}": own for k in range(cases)}, **more)
+    others = {f"R{k}": given(scene) for k in range(1, cases)}
+    return Plan(own=own, cases={"R0": own, **others}, **more)
 
 
 # Which models
