@@ -353,6 +353,10 @@ def test_a_wall_that_the_scene_has_not_is_put_beside_the_other():
     assert found.task.scene.wall("left") == SCENE.walls[0]
 
 
+def test_a_wall_that_is_tried_is_plastic_unless_it_is_told_otherwise():
+    assert GapRange("right").restitution == 0.0
+
+
 def test_a_draw_that_falls_is_no_threshold():
     assert thresholds([interval(1, 0.03, 0.1, 0.0299, None)]) == []
 
