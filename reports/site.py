@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from rockcheck.reports import document, drawers, manifest, style, tables
+from rockcheck.reports import document, drawers, manifest, overview, style, tables
 from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.reports.histories_figure import histories_figure, thumbnail as thumbnail_of
 from rockcheck.reports.payload import payload_of, summary_of
@@ -204,6 +204,7 @@ class _Pages:
             "SEVERITY": results.SEVERITY,
             "VERDICTS": tables.VERDICTS,
             "tables": tables,
+            "overview": overview,
             "row_cells": document.row_cells,
         }
 
@@ -292,7 +293,7 @@ class _Pages:
     def _write_index(self) -> tuple[dict[str, Any], list[Path]]:
         """Write the figures of the index; returns what it shows, and them."""
         drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
-        blocks, matrix = tables.accuracy(self.run), tables.matrix(self.run)
+        blocks, matrix = overview.accuracy(self.run), overview.matrix(self.run)
         paths = []
         for block in blocks:
             if isinstance(block, Plot):
@@ -309,7 +310,7 @@ class _Pages:
             },
             "matrix": {scene: row for scene, row in matrix.items() if scene in self.views},
             "accuracy": blocks,
-            "glance": tables.glance(self.run, matrix),
+            "glance": overview.glance(self.run, matrix),
         }
         return context, paths
 

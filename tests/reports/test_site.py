@@ -13,9 +13,10 @@ from rockcheck.reports.document import PAGES, folder_argument
 from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.reports.line_plots import GREY, colours
 from rockcheck.reports.manifest import MANIFEST
+from rockcheck.reports.overview import PEAKS, glance, matrix
 from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site
-from rockcheck.reports.tables import PEAKS, glance, matrix, worst_first
+from rockcheck.reports.tables import worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
 from rockcheck.validation.suite import results, tables
@@ -81,29 +82,28 @@ def test_index_says_how_far_each_model_is(run, index):
     rows = matrix(run)
     assert set(rows) == set(run.scenes)
     late, falling = rows["beside a wall"]["mine:Model"], rows["Free"]["ebm"]
-    assert (late["rms"].window, late["rms"].value, late["used"]) == (
-        "8s",
-        pytest.approx(0.006),
-        pytest.approx(3.0),
-    )
+    assert late.rms.window == "8s"
+    assert late.rms.value == pytest.approx(0.006)
+    assert late.used == pytest.approx(3.0)
     assert "mine:Model" not in rows["free"]
     outcomes = {run.by_scene["Free"][model].outcome for model in ("ebm", "ebm-unilateral")}
-    assert (falling["why_apart"], falling["apart"]) == ("", len(outcomes) > 1)
+    assert falling.why_apart == ""
+    assert falling.apart == (len(outcomes) > 1)
     used = re.findall(r'<td data-model="mujoco" data-used="(.*?)"', index)
     assert used == ["0.15", "0.3", "1e+09"]  # of the last one it has no history
 
 
 def test_index_answers_three_questions_first(run, index):
     found = glance(run, matrix(run))
-    farthest = found["farthest"]["cell"]
+    farthest = found.farthest.cell
     assert (farthest.scene, farthest.model) == ("beside a wall", "mine:Model")
-    assert [scene for scene, _ in found["apart"]] == [
-        scene for scene, row in matrix(run).items() if any(one["apart"] for one in row.values())
+    assert [scene for scene, _ in found.apart] == [
+        scene for scene, row in matrix(run).items() if any(entry.apart for entry in row.values())
     ]
     verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
-    shares = [tables.used(check) for _, check in found["changed"]]
+    shares = [tables.used(check) for _, check in found.changed]
     assert shares == sorted(shares, reverse=True)
-    assert (found["judged"], len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
+    assert (found.judged, len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
     at_a_glance, after = re.search('<dl class="glance"(.*?)</dl>(.*)', index, re.DOTALL).groups()
     said = (
         "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at",

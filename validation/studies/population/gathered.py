@@ -1,6 +1,7 @@
 """The results of an assessment by what they are of.
 
-In: the plan and the results of its tasks. Out: named groups of results. Called by the statistics.
+In: the plan and the results of its tasks. Out: named groups of results. Made by the study; read by
+all that computes, words, tabulates or draws.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,8 @@
 """How strong a motion is, and populations of runs over given intensities (`--levels`).
 
 In: a scene with motions, and intensities. Out: tasks, and curves: an incremental dynamic analysis
-(Vamvatsikos and Cornell 2002) of records, or the fragility under pulses. Called by the plan of an
-assessment.
+(Vamvatsikos and Cornell 2002) of records, or the fragility under pulses. Called by the command, the
+plan, and whatever needs the size of a motion.
 
 An intensity is in proportion to the size of its motion, so the factor of a motion is the wanted
 intensity over the motion's own.

@@ -305,33 +305,44 @@ class Plan:
         Empty before all runs without the wall have ended, and of those that failed.
         """
         searches: dict[Side, dict[str, GapTask]] = {}
-        for asked in self.gaps:
-            free = self._without_wall(asked.side, done)
-            reach = clearance_of(free, asked.side)
+        for wanted in self.gaps:
+            free = self._without_wall(wanted.side, done)
+            reach = clearance_of(free, wanted.side)
             if reach is None:
                 continue
-            fine, coarse = gaps_looked_at(
-                reach, asked.values, least_gap(self.own.scene, asked.side)
-            )
-            searches[asked.side] = {
-                case: GapTask(
-                    (f"gaps on the {asked.side}", case),
-                    self.cases[case].scene,
-                    self.batch_model,
-                    self.batch_settings,
-                    self.numbers[case],
-                    asked.side,
-                    asked.restitution,
-                    fine,
-                    coarse,
-                    asked.values or coarse,
-                    tuple(_reach_of(run, asked.side) for run in runs.results),
-                    tuple(run.stands for run in runs.results),
-                    **self._batch_effort(len(fine) + len(coarse) * len(runs.results)),
-                )
+            smallest = least_gap(self.own.scene, wanted.side)
+            fine, coarse = gaps_looked_at(reach, wanted.values, smallest)
+            searches[wanted.side] = {
+                case: self._gap_task(case, wanted, runs, fine, coarse)
                 for case, runs in free.items()
             }
         return searches
+
+    def _gap_task(
+        self,
+        case: str,
+        wanted: GapRange,
+        without_wall: results.Drawn,
+        fine: tuple[float, ...],
+        coarse: tuple[float, ...],
+    ) -> GapTask:
+        """The search over the gap of one case, looked at where `GapTask` says."""
+        free_runs = without_wall.results
+        return GapTask(
+            about=(f"gaps on the {wanted.side}", case),
+            scene=self.cases[case].scene,
+            model=self.batch_model,
+            settings=self.batch_settings,
+            draws=self.numbers[case],
+            side=wanted.side,
+            restitution=wanted.restitution,
+            fine=fine,
+            coarse=coarse,
+            tabulated=wanted.values or coarse,
+            reach=tuple(_reach_of(run, wanted.side) for run in free_runs),
+            free_stands=tuple(run.stands for run in free_runs),
+            **self._batch_effort(len(fine) + len(coarse) * len(free_runs)),
+        )
 
     def _without_wall(self, side: Side, done: Mapping[Any, Any]) -> dict[str, results.Drawn]:
         """By case, the runs without the wall on a side that have ended and did not fail."""
