@@ -1,6 +1,7 @@
 """The tables and plots of an assessment's page.
 
-In: typed answers (`statistics`), or the results themselves (`gathered`). Out: blocks of a finding, a function a block. Called by the study.
+In: typed answers (`statistics`), or the results themselves (`gathered`). Out: blocks of a finding,
+a function a block. Called by the study.
 """
 
 import io
