@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from rockcheck.scenes import PAPER_BLOCK, Floor, Scene, Wall
 from rockcheck.validation.studies.population.search import falls_within
+from rockcheck.validation.studies.population.tasks import GapTask
 
 GRID = np.linspace(0.0, 1.0, 101)
 NARROW = 1e-4
@@ -76,3 +78,31 @@ def test_a_run_may_fall_at_the_last_value_alone():
 def test_a_change_as_narrow_as_the_resolution_is_not_halved_again():
     ((fall,),) = searched([(0.3, 1.0)], grid=np.array([0.0, 1.0]), resolution=0.5)
     assert (fall.stands_below, fall.low) == (0.0, 0.5)
+
+
+def test_runs_of_a_search_that_nothing_decides_are_counted_and_do_not_stand():
+    """Without friction, between walls that take nothing, it slides to and fro for ever."""
+    elastic = Wall(side="right", gap=0.5, restitution=1.0)
+    scene = Scene(
+        name="to and fro",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.0),
+        walls=[elastic],
+        initial_velocity=2.0,
+        duration=1.0,
+    )
+    found = GapTask(
+        about=("to and fro",),
+        scene=scene,
+        model="ebm-unilateral",
+        side="left",
+        restitution=1.0,
+        fine=(0.3, 0.4, 0.5),
+        tabulated=(0.3, 0.5),
+        reach=(np.inf,),
+        free_stands=(False,),
+    ).play()
+    assert found.runs == 5  # three looked at, two tabulated
+    assert found.undecided == 5
+    assert [row.undecided for row in found.rows] == [1, 1]
+    assert [(fall.low, fall.high) for fall in found.intervals] == [(0.3, 0.5)]
