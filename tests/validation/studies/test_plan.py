@@ -218,7 +218,6 @@ def test_certainty_and_gaps_wait_for_the_runs():
     second = [task.about for task in plan.tasks(done) if task not in first]
     assert second == [
         ("certainty", "R0"),
-        ("certainty", SCENE.name),
         ("gaps on the left", "R0"),
     ]
 
@@ -294,8 +293,8 @@ def test_before_a_run_has_ended_its_scene_lasts_as_it_does():
 def test_the_scene_s_own_motion_is_the_first_case_unless_there_are_records():
     own, shaken = given(), given(SCENE.replace(excitation=Ricker(amplitude=3.0, period=0.7)))
     plan = Plan(own=own, cases={"R0": shaken}, recorded=True)
-    assert plan.certainty({})[""].scene == SCENE
-    assert Plan(own=own, cases={"R0": shaken}).certainty({})[""].scene == shaken.scene
+    assert plan.own_certainty({}).scene == SCENE
+    assert Plan(own=own, cases={"R0": shaken}).own_certainty({}).scene == shaken.scene
 
 
 # Thresholds of another model

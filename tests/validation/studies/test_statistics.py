@@ -552,7 +552,7 @@ def test_draws_scatter_within_a_record():
 def test_a_tie_is_never_converged():
     tie = ("friction equals B/H", 0.3, ("at rest", "overturned left"))
     sure = results.Certainty(numerical=judged(1e-9), ties=(tie,))
-    everything = gathered({"a": RUNS["a"]}, recorded=False, certainty={"a": sure, "": sure})
+    everything = gathered({"a": RUNS["a"]}, recorded=False, certainty={"a": sure})
     words = sentences.certainty_sentences(
         everything, certainty_answers.uncertainty_answer(everything)
     )

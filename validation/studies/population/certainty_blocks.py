@@ -58,8 +58,8 @@ def contribution_table(answer: UncertaintyAnswer) -> Table:
 
 def numerical_blocks(gathered: Gathered) -> list[Block]:
     """The numerical uncertainty of a single run."""
-    own = gathered.own
-    if gathered.plan.recorded or own.numerical is None:
+    own = gathered.own_certainty
+    if gathered.plan.recorded or own is None or own.numerical is None:
         return []
     columns = [
         text("name", "quantity"),

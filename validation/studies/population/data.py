@@ -142,7 +142,7 @@ def _record_intensity(record: RecordIntensity) -> dict[str, Any]:
 
 def certainty_data(gathered: Gathered, answer: UncertaintyAnswer) -> dict[str, Any]:
     """How sure that is: of the scene's own excitation, and of all runs."""
-    own = gathered.own
+    own = gathered.own_certainty or results.Certainty()
     quantities = [] if own.numerical is None else own.numerical.quantities
     numerical = {
         "converged": is_converged(own),
@@ -153,7 +153,6 @@ def certainty_data(gathered: Gathered, answer: UncertaintyAnswer) -> dict[str, A
     ties = [
         {"what": what, "from_s": when, "fates": list(fates), "record": case}
         for case, sure in gathered.certainty.items()
-        if case
         for what, when, fates in sure.ties
     ]
     unit = "alpha" if answer.of == "peak rotation" else "1"

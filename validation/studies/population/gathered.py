@@ -108,13 +108,14 @@ class Gathered:
 
     @cached_property
     def certainty(self) -> dict[str, results.Certainty]:
-        """By case, how sure it is; by "", the scene under its own motion."""
+        """By case, how sure it is."""
         return self._ended(self.plan.certainty(self.done), results.Certainty)
 
     @property
-    def own(self) -> results.Certainty:
-        """How sure the scene under its own motion is."""
-        return self.certainty.get("", results.Certainty())
+    def own_certainty(self) -> results.Certainty | None:
+        """How sure the scene under its own motion is; None where that run has no result."""
+        result = self.done.get(self.plan.own_certainty(self.done))
+        return result if isinstance(result, results.Certainty) else None
 
     @cached_property
     def judged(self) -> dict[str, Numerical]:
@@ -122,7 +123,7 @@ class Gathered:
         return {
             case: result.numerical
             for case, result in self.certainty.items()
-            if case and result.numerical is not None
+            if result.numerical is not None
         }
 
     @cached_property

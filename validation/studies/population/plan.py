@@ -274,30 +274,36 @@ class Plan:
         if any(task not in done for task in tasks):
             return tasks
         tasks += self.certainty(done).values()
+        if self.recorded:  # else it is that of the first case
+            tasks.append(self.own_certainty(done))
         tasks += [task for runs in self.gap_tasks(done).values() for task in runs.values()]
         if any(task not in done for task in tasks):
             return tasks
         return [*tasks, *(threshold.task for threshold in self.thresholds(done))]
 
     def certainty(self, done: Mapping[Any, Any]) -> dict[str, CertaintyTask]:
-        """By case how sure it is, up to where its fate is known; by "", the scene's own motion."""
+        """By case how sure it is, up to where its fate is known."""
+        tasks = {}
+        for case, given in self.cases.items():
+            until = getattr(done.get(self.shown[case]), "until_s", 0.0)
+            tasks[case] = self._certainty_task(case, lasting(given.scene, until))
+        return tasks
+
+    def own_certainty(self, done: Mapping[Any, Any]) -> CertaintyTask:
+        """How sure the scene under its own motion is, which is no case where there are records."""
+        if self.recorded:
+            return self._certainty_task(self.own.scene.name, self.own.scene)
+        return next(iter(self.certainty(done).values()))
+
+    def _certainty_task(self, name: str, scene: Scene) -> CertaintyTask:
         settings = self.models[self.model]
-        scenes = {
-            case: lasting(given.scene, getattr(done.get(self.shown[case]), "until_s", 0.0))
-            for case, given in self.cases.items()
-        }
-        own = self.own.scene
-        scenes[""] = own if self.recorded else scenes[next(iter(scenes))]
-        return {
-            case: CertaintyTask(
-                ("certainty", case or own.name),
-                scene,
-                self.model,
-                tuple(settings.items()),
-                **effort(self.model, settings, 4, self._all_runs),
-            )
-            for case, scene in scenes.items()
-        }
+        return CertaintyTask(
+            about=("certainty", name),
+            scene=scene,
+            model=self.model,
+            settings=tuple(settings.items()),
+            **effort(self.model, settings, 4, self._all_runs),
+        )
 
     def gap_tasks(self, done: Mapping[Any, Any]) -> dict[Side, dict[str, GapTask]]:
         """By side and case, the search over the gap, from how far the block reaches without it.

@@ -278,7 +278,7 @@ def _single_intensity(record: RecordIntensity, label: str, unit: str) -> str:
 
 def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[str]:
     """How sure that is: of the step, of ties, and what would change the answer."""
-    cases = {case: sure for case, sure in gathered.certainty.items() if case}
+    cases = gathered.certainty
     sentences = [_convergence_sentence(cases), *_tie_sentences(cases), *_law_sentences(cases)]
     largest = next(iter(answer.contributions), None)
     known = {contribution.source for contribution in answer.contributions}

@@ -130,6 +130,6 @@ def exit_code_of(gathered: Gathered, failures: Mapping[str, str]) -> int:
     """3 where a run failed, 1 where a single run is not converged, else 0."""
     if gathered.failed or failures:
         return 3
-    if gathered.plan.recorded or gathered.plan.levels or "" not in gathered.certainty:
+    if gathered.plan.recorded or gathered.plan.levels or gathered.own_certainty is None:
         return 0
-    return 0 if sentences.is_converged(gathered.own) else 1
+    return 0 if sentences.is_converged(gathered.own_certainty) else 1
