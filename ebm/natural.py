@@ -15,12 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core import march
-from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE, filled
+from rockcheck.ebm.core.block import LEAST_FRICTION, SETTING, SIDE
 from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import LAWS, Keep, Shape
 from rockcheck.ebm.core.state import GIVEN, STATE, Base, Rows
 from rockcheck.scenes import Excitation, Floats, Record, Scene, Side, kinematics, progress
 from rockcheck.scenes.compiled import for_types_of, interpreted, is_ready
+from rockcheck.scenes.named_record import filled
 
 #: The event loops that are compiled, by a model's friction.
 _READY: dict[str, Callable[..., None]] = {}

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from rockcheck.ebm.core.block import SETTING
 from rockcheck.ebm.core.ground import FORM
 from rockcheck.ebm.core.names import Shape
-from rockcheck.ebm.core.state import GIVEN, MOTION, Rows
+from rockcheck.ebm.core.state import GIVEN, Rows
 from rockcheck.ebm.natural import SampleStore, setting_of, state_of, time_unit
 from rockcheck.ebm.table import RunTable
 from rockcheck.scenes import Floats, Side, kinematics
+from rockcheck.scenes.named_record import MOTION
 
 #: Penetration that is put down to rounding, relative to half the box's diagonal.
 _TOUCHES = 1e-12

@@ -1,42 +1,34 @@
-"""The compiled step of `engines.steps`: plans the engine's next step and applies its result.
+"""The compiled step of adaptive steps: plans the engine's next one and applies its result.
 
-Lengths are in R. A contact is a row of `corners`, first the floor's two, then the walls': the
-corner (2), the surface's normal (2) and its distance, see `engines.contacts`. A base motion is its
-pieces, their interval and the last velocity.
+In: the run's state, a named record, and its course; the velocity that the engine gave.
+Out: the request for the next step; the state at the end of this one, and its row.
+Called by `engines.steps`, once a step.
+
+Lengths are in R, times in s.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.engines import base_motion, contacts
-from rockcheck.scenes import Floats, Scene, kinematics
+from rockcheck.engines.adaptive_march import Course, March
+from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
 
-Base = tuple[Floats, float, float]
 Velocity = tuple[float, float, float]  # along x, y and theta
 
-# Lengths in units of the block's radius R, times in units of 1/p.
-CLOSED = 5e-9  # a corner nearer than this touches
-# Per longest step: how far a resting corner may drift from its surface in one step; it sets the
-# contact distance where it exceeds CLOSED.
-DRIFT = 3e-6
-EMBEDDED = 5e-10  # how deep the engine sees a corner that touches
-PROBE_STEP = 6e-5  # the longest step where the acceleration is not known, that is, after an event
-# an impact takes one: its time is wrong by so much, its place by what the block moves in it
-SHORTEST_STEP = 2e-8
-LONG_APPROACH = 6e-4  # from farther away the prediction of an event is only trusted to 95 %
-RESTING = (
-    0.001  # of g times the longest step: slower approaches and departures are not told from rest
-)
-# Largest ratio of the speeds of corners that strike at the same time: the slenderness of a slender
-# block.
+# Lengths in R.
+#: How deep the engine sees a corner that touches.
+EMBEDDED = 5e-10
+#: Largest ratio of the speeds of corners that strike at the same time: the slenderness of a slender
+#: block.
 TOGETHER = 20.0
 SETTLING_GAP = 2e-6
-# A corner that leaves and is back within twice this share of a step is taken to stay: of the
-# longest step, after an event of a probe.
+#: A corner that leaves and is back within twice this share of a step is taken to stay: of the
+#: longest step, after an event of a probe.
 SETTLING_TIME = 0.2
 
 #: Contacts with the floor, the first rows of `corners`; all others are with walls.
@@ -45,103 +37,31 @@ FLOOR = 2
 OVER, GOES_ON, LOST = 0, 1, 2
 #: Columns of a row of the march: time, state (6), felt acceleration (2).
 COLUMNS = 9
-# The state: pose, velocity; mean acceleration and length of the step before, and whether they are
-# known; time, velocity of the base then; whether the step ends where slip stops, the velocity at
-# which a contact is carried along its arc, and whether the acceleration goes on: it is known, and
-# the closed contacts are those of the step before.
-X, Y, THETA, VX, VY, W, AX, AY, SPIN, PAST_DT, KNOWN, T = range(12)
-BASE_X, BASE_Y, STOPS, CARRY_X, CARRY_Y, SMOOTH = range(12, 18)
-# The request to the engine: mean pose, velocity, length of the step, felt acceleration, and whether
-# the step is an impact.
-DT, FELT, IMPACT = 6, 7, 9
 
-
-class Course(NamedTuple):
-    """The input of a run: what it meets, and how long and slow is long and slow; in R, s and R/s.
-
-    Contacts, times at which the base may set a resting block in motion, the base motion to the
-    right and up, the end of the run, and gravity; thresholds for near, short, long and slow.
-    `standing` is the height of the centre of mass at rest.
-    """
-
-    corners: Floats
-    starts: Floats
-    across: Base
-    up: Base
-    end: float
-    gravity: float
-    standing: float
-    longest: float
-    closed: float
-    probe: float
-    shortest: float
-    long_approach: float
-    resting: float
-
-
-class March(NamedTuple):
-    """The state of a run between steps.
-
-    It holds the contacts closed in this step (`closed`) and in the step before (`before`), and the
-    request to the engine (`asked`).
-    """
-
-    state: Floats
-    closed: NDArray[np.bool_]
-    before: NDArray[np.bool_]
-    asked: Floats
-
-
-def begun(scene: Scene, longest: float, short: float) -> tuple[Course, March]:
-    """A run at its start: steps of at most `longest` s, and near events `short` times the usual."""
-    base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
-    moment = short / scene.frequency_parameter
-    across, up = (
-        (np.array(one.pieces or np.empty((0, 1))), one.interval, one.last) for one in base
-    )
-    course = Course(
-        corners=np.array(
-            [(*one.corner, *one.normal, one.distance) for one in contacts.contacts_of(scene)]
-        ),
-        starts=np.array([*base_motion.starts_of_motion(scene, *base), math.inf]),
-        across=across,
-        up=up,
-        end=float(scene.run_times[-1]),
-        gravity=scene.gravity,
-        standing=scene.block.weaker_pivot.height,
-        longest=longest,
-        closed=max(CLOSED, DRIFT * longest * scene.frequency_parameter),
-        probe=min(PROBE_STEP * moment, longest),
-        shortest=min(SHORTEST_STEP * moment, longest),
-        long_approach=LONG_APPROACH * moment,
-        resting=RESTING * longest * scene.gravity,
-    )
-    state = np.zeros(SMOOTH + 1)
-    state[:6] = kinematics.of_mass(scene.block, scene.initial_state)
-    closed, before = np.zeros((2, len(course.corners)), dtype=bool)
-    return course, March(state, closed, before, np.zeros(IMPACT + 1))
-
-
-_velocity_at, _rate_of = inner_kernel(base_motion.velocity_at), inner_kernel(contacts.rate_of)
-_arm_of, _gap_of = inner_kernel(contacts.arm_of), inner_kernel(contacts.gap_of)
+_velocity_at = inner_kernel(base_motion.velocity_at)
+_rate_of = inner_kernel(contacts.rate_of)
+_arm_of = inner_kernel(contacts.arm_of)
+_gap_of = inner_kernel(contacts.gap_of)
 
 
 @inner_kernel
-def seen(corner: Floats, z: Floats, cos: float, sin: float) -> tuple[Any, float, float]:
+def contact_state(
+    corner: np.record, motion: np.record, cos: float, sin: float
+) -> tuple[Any, float, float]:
     """Arm, gap and rate of a contact."""
-    bx, bz, nx, nz, distance = corner
-    arm = _arm_of(bx, bz, cos, sin)
-    gap = _gap_of(nx, nz, distance, z[X], z[Y], arm)
-    return arm, gap, _rate_of(nx, nz, z[VX], z[VY], z[W], arm)
+    arm = _arm_of(corner.bx, corner.bz, cos, sin)
+    gap = _gap_of(corner.nx, corner.nz, corner.distance, motion.x, motion.y, arm)
+    rate = _rate_of(corner.nx, corner.nz, motion.vx, motion.vy, motion.w, arm)
+    return arm, gap, rate
 
 
 @inner_kernel
-def pulled(corner: Floats, z: Floats, arm: Any) -> float:
+def gap_acceleration(corner: np.record, state: np.record, arm: Any) -> float:
     """The acceleration of a contact's gap."""
-    turning = z[W] * z[W]
-    return corner[2] * (z[AX] - z[SPIN] * arm[1] - turning * arm[0]) + corner[3] * (
-        z[AY] + z[SPIN] * arm[0] - turning * arm[1]
-    )
+    turning = state.motion.w * state.motion.w
+    across = state.ax - state.spin * arm[1] - turning * arm[0]
+    up = state.ay + state.spin * arm[0] - turning * arm[1]
+    return corner.nx * across + corner.nz * up
 
 
 @inner_kernel
@@ -151,12 +71,12 @@ def trusted(predicted: float, course: Course) -> float:
 
 
 @inner_kernel
-def time_to_close(corner: Floats, z: Floats, arm: Any, gap: float, rate: float) -> float:
+def time_to_close(corner: np.record, state: np.record, arm: Any, gap: float, rate: float) -> float:
     """When the gap of a contact is zero, s, by its acceleration if known; infinity if never.
 
     A gap that opens closes on its way back.
     """
-    curvature = pulled(corner, z, arm) if z[KNOWN] != 0.0 else 0.0
+    curvature = gap_acceleration(corner, state, arm) if state.known else 0.0
     discriminant = rate * rate - 2.0 * curvature * gap
     if discriminant < 0.0:
         return math.inf
@@ -166,12 +86,13 @@ def time_to_close(corner: Floats, z: Floats, arm: Any, gap: float, rate: float) 
 
 
 @inner_kernel
-def stopping_time(z: Floats, arm: Any, dt: float, course: Course) -> float:
+def stopping_time(state: np.record, arm: Any, dt: float, course: Course) -> float:
     """When the slip of a corner on the floor stops within `dt`, s; infinity if never or unknown."""
-    slip = z[VX] - z[W] * arm[1]
-    slowing = z[AX] - z[SPIN] * arm[1] - z[W] * z[W] * arm[0]
+    motion = state.motion
+    slip = motion.vx - motion.w * arm[1]
+    slowing = state.ax - state.spin * arm[1] - motion.w * motion.w * arm[0]
     if (
-        z[KNOWN] != 0.0
+        state.known
         and slip * slowing < 0.0
         and 0.2 * course.resting < abs(slip) < abs(slowing) * dt
     ):
@@ -180,33 +101,35 @@ def stopping_time(z: Floats, arm: Any, dt: float, course: Course) -> float:
 
 
 @inner_kernel
-def length(run: March, course: Course, dt: float) -> tuple[float, bool]:
+def step_length(run: March, course: Course, dt: float) -> tuple[float, bool]:
     """The next step, at most `dt` s long, and whether it is an impact.
 
     It ends before a gap closes or a slip stops that the present acceleration brings.
     """
-    z, known, resting = run.state, run.state[KNOWN] != 0.0, course.resting
+    state = run.states[0]
+    motion = state.motion
+    resting = course.resting
     corners = course.corners
-    dt = min(dt, course.longest if known else course.probe)
+    dt = min(dt, course.longest if state.known else course.probe)
     staying = SETTLING_TIME * course.probe * course.gravity
-    leaving = resting if known else max(resting, staying)
+    leaving = resting if state.known else max(resting, staying)
     stops, slowest = False, math.inf
-    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    cos, sin = math.cos(motion.theta), math.sin(motion.theta)
     for i in range(len(corners)):
-        arm, gap, rate = seen(corners[i], z, cos, sin)
+        arm, gap, rate = contact_state(corners[i], motion, cos, sin)
         run.closed[i] = not (gap > course.closed or rate > leaving)
         if not run.closed[i]:
-            closing = time_to_close(corners[i], z, arm, gap, rate)
+            closing = time_to_close(corners[i], state, arm, gap, rate)
             if closing < dt:
                 dt, stops = max(trusted(closing, course), course.shortest), False
         elif rate < -resting:
             slowest = min(slowest, -rate)
         elif i < FLOOR:
-            stopping = stopping_time(z, arm, dt, course)
+            stopping = stopping_time(state, arm, dt, course)
             if stopping < math.inf:
                 dt = trusted(stopping, course)
                 stops = dt == stopping
-    z[STOPS] = stops
+    state.stops = stops
     if slowest == math.inf:
         return dt, False
     join(run, course, slowest)
@@ -220,71 +143,87 @@ def join(run: March, course: Course, speed: float) -> None:
     The corner that strikes touches from `closed` away, at `speed`, so the impact is early by the
     time in which it would arrive. What comes down k times as fast is then still k times as far.
     """
-    z, corners = run.state, course.corners
-    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    motion = run.states[0].motion
+    corners = course.corners
+    cos, sin = math.cos(motion.theta), math.sin(motion.theta)
     for i in range(len(corners)):
-        _, gap, rate = seen(corners[i], z, cos, sin)
+        _, gap, rate = contact_state(corners[i], motion, cos, sin)
         run.closed[i] = run.closed[i] or (
             rate < -speed and gap < course.closed * min(-rate / speed, TOGETHER)
         )
 
 
 @inner_kernel
-def drift(run: March, corners: Floats, dt: float) -> None:
-    """The mean pose of the step and the velocity that the engine sees, into `asked`.
+def ask_for_pose(run: March, corners: NDArray[np.void], dt: float) -> None:
+    """The mean pose of the step and the velocity that the engine sees, into the request.
 
     The engine sees the block in its mean pose, with the corners that touch just below the surface.
     What rests on a surface at the step's end still moves along its arc in the mean pose; the state
     remembers that velocity. The engine's contacts know nothing of arcs, but in a frame that moves
     with it they are right.
     """
-    z = run.state
-    ax, ay, spin = (z[AX], z[AY], z[SPIN]) if z[SMOOTH] != 0.0 else (0.0, 0.0, 0.0)
-    half, sixth, later = 0.5 * dt, dt * dt / 6.0, z[W] + dt * spin
-    px, py, mean = (
-        z[X] + half * z[VX] + sixth * ax,
-        z[Y] + half * z[VY] + sixth * ay,
-        z[THETA] + half * z[W] + sixth * spin,
-    )
-    z[CARRY_X] = z[CARRY_Y] = 0.0
+    state = run.states[0]
+    motion = state.motion
+    request = run.requests[0]
+    ax, ay, spin = (state.ax, state.ay, state.spin) if state.smooth else (0.0, 0.0, 0.0)
+    half = 0.5 * dt
+    sixth = dt * dt / 6.0
+    later = motion.w + dt * spin
+    px = motion.x + half * motion.vx + sixth * ax
+    py = motion.y + half * motion.vy + sixth * ay
+    mean = motion.theta + half * motion.w + sixth * spin
+    state.carry_x = state.carry_y = 0.0
     cos, sin = math.cos(mean), math.sin(mean)
     for first, end in ((0, FLOOR), (FLOOR, len(corners))):
         highest, last = -math.inf, -1
         for i in range(first, end):
             if run.closed[i]:
-                bx, bz, nx, nz, distance = corners[i]
-                gap = _gap_of(nx, nz, distance, px, py, _arm_of(bx, bz, cos, sin))
+                corner = corners[i]
+                arm = _arm_of(corner.bx, corner.bz, cos, sin)
+                gap = _gap_of(corner.nx, corner.nz, corner.distance, px, py, arm)
                 highest, last = max(highest, gap), i
         if last >= 0:
-            bx, bz, nx, nz, _ = corners[last]
-            px, py = px - nx * (highest + EMBEDDED), py - nz * (highest + EMBEDDED)
-            final = z[THETA] + half * (z[W] + later)
-            arm, ends = _arm_of(bx, bz, cos, sin), _arm_of(bx, bz, math.cos(final), math.sin(final))
-            z[CARRY_X] = -later * (ends[1] - arm[1])
-            if nz != 0.0:
-                z[CARRY_Y] = later * (ends[0] - arm[0])
-    run.asked[:DT] = px, py, mean, z[VX] + z[CARRY_X], z[VY] + z[CARRY_Y], z[W]
+            corner = corners[last]
+            px = px - corner.nx * (highest + EMBEDDED)
+            py = py - corner.nz * (highest + EMBEDDED)
+            final = motion.theta + half * (motion.w + later)
+            arm = _arm_of(corner.bx, corner.bz, cos, sin)
+            ends = _arm_of(corner.bx, corner.bz, math.cos(final), math.sin(final))
+            state.carry_x = -later * (ends[1] - arm[1])
+            if corner.nz != 0.0:
+                state.carry_y = later * (ends[0] - arm[0])
+    request.x = px
+    request.y = py
+    request.theta = mean
+    request.vx = motion.vx + state.carry_x
+    request.vy = motion.vy + state.carry_y
+    request.w = motion.w
 
 
 @kernel
 def plan(run: March, course: Course) -> int:
     """Asks for the next step; returns OVER at the end or where the block lies, else GOES_ON."""
-    z, starts = run.state, course.starts
-    if not (z[T] < course.end - 1e-12 and abs(z[THETA]) < math.pi / 2):
+    state = run.states[0]
+    request = run.requests[0]
+    starts = course.starts
+    if not (state.t < course.end - 1e-12 and abs(state.motion.theta) < math.pi / 2):
         return OVER
-    start = starts[np.searchsorted(starts, z[T] + 1e-9, side="right")]
-    dt, impact = length(run, course, min(course.end - z[T], start - z[T]))
-    going_on = z[KNOWN] != 0.0
+    next_start = starts[np.searchsorted(starts, state.t + 1e-9, side="right")]
+    dt, impact = step_length(run, course, min(course.end - state.t, next_start - state.t))
+    smooth = state.known
     for i in range(len(run.closed)):
-        going_on = going_on and run.closed[i] == run.before[i]
-    z[SMOOTH] = going_on
-    z[T] += dt
-    base_x = _velocity_at(z[T], *course.across)
-    base_y = _velocity_at(z[T], *course.up)
-    felt = (z[BASE_X] - base_x) / dt, (z[BASE_Y] - base_y) / dt - course.gravity
-    run.asked[DT:] = dt, felt[0], felt[1], 1.0 if impact else 0.0
-    z[BASE_X], z[BASE_Y] = base_x, base_y
-    drift(run, course.corners, dt)
+        smooth = smooth and run.closed[i] == run.before[i]
+    state.smooth = smooth
+    state.t += dt
+    base_x = _velocity_at(state.t, *course.across)
+    base_y = _velocity_at(state.t, *course.up)
+    request.dt = dt
+    request.felt_x = (state.base_x - base_x) / dt
+    request.felt_y = (state.base_y - base_y) / dt - course.gravity
+    request.impact = 1.0 if impact else 0.0
+    state.base_x = base_x
+    state.base_y = base_y
+    ask_for_pose(run, course.corners, dt)
     return GOES_ON
 
 
@@ -294,62 +233,78 @@ def step(run: March, course: Course, kicked: Velocity, row: Floats) -> int:
 
     Returns LOST where the motion has blown up.
     """
-    z, dt = run.state, run.asked[DT]
-    known = z[KNOWN] != 0.0
-    move(run, kicked[0] - z[CARRY_X], kicked[1] - z[CARRY_Y], kicked[2], dt)
+    state = run.states[0]
+    motion = state.motion
+    request = run.requests[0]
+    was_known = state.known
+    move(state, kicked[0] - state.carry_x, kicked[1] - state.carry_y, kicked[2], request.dt)
     put_back(run, course)
-    if not known and (run.closed[0] or run.closed[1]) and settles(z, course):
-        z[Y], z[THETA], z[VY], z[W] = course.standing, 0.0, 0.0, 0.0
-        z[AY] = z[SPIN] = 0.0  # what stopped it in this step does not go on in the next
-    z[KNOWN] = run.asked[IMPACT] == 0.0 and z[STOPS] == 0.0
-    z[PAST_DT] = dt
+    if not was_known and (run.closed[0] or run.closed[1]) and settles(state, course):
+        motion.y, motion.theta, motion.vy, motion.w = course.standing, 0.0, 0.0, 0.0
+        # What stopped it in this step does not go on in the next.
+        state.ay = state.spin = 0.0
+    state.known = request.impact == 0.0 and not state.stops
+    state.past_dt = request.dt
     run.before[:] = run.closed
-    row[0], row[1:7], row[7:] = z[T], z[:6], run.asked[FELT:IMPACT]
-    if not math.sqrt(z[VX] * z[VX] + z[VY] * z[VY] + z[W] * z[W]) < 1e6:  # nan, too
+    row[0] = state.t
+    row[1], row[2], row[3] = motion.x, motion.y, motion.theta
+    row[4], row[5], row[6] = motion.vx, motion.vy, motion.w
+    row[7], row[8] = request.felt_x, request.felt_y
+    speed = math.sqrt(motion.vx * motion.vx + motion.vy * motion.vy + motion.w * motion.w)
+    if not speed < 1e6:  # nan, too
         return LOST
     return plan(run, course)
 
 
 @inner_kernel
-def move(run: March, vx: float, vy: float, w: float, dt: float) -> None:
+def move(state: np.record, vx: float, vy: float, w: float, dt: float) -> None:
     """Update pose, velocity and mean acceleration to the step's end, with velocity (vx, vy, w).
 
     Where the same contacts were closed in the step before, the acceleration is taken to be linear
     over both steps. The drift is then dt/2 (v + v_new) - dt^2/12 (change of the acceleration over
     the step); for the mean pose the last acceleration suffices.
     """
-    z, half = run.state, 0.5 * dt
-    bend = dt**3 / (6.0 * (dt + z[PAST_DT])) if z[SMOOTH] != 0.0 else 0.0
-    new_ax, new_ay, new_spin = (vx - z[VX]) / dt, (vy - z[VY]) / dt, (w - z[W]) / dt
-    z[X] = z[X] + half * (z[VX] + vx) - bend * (new_ax - z[AX])
-    z[Y] = z[Y] + half * (z[VY] + vy) - bend * (new_ay - z[AY])
-    z[THETA] = z[THETA] + half * (z[W] + w) - bend * (new_spin - z[SPIN])
-    z[VX], z[VY], z[W], z[AX], z[AY], z[SPIN] = vx, vy, w, new_ax, new_ay, new_spin
+    motion = state.motion
+    half = 0.5 * dt
+    bend = dt**3 / (6.0 * (dt + state.past_dt)) if state.smooth else 0.0
+    ax = (vx - motion.vx) / dt
+    ay = (vy - motion.vy) / dt
+    spin = (w - motion.w) / dt
+    motion.x = motion.x + half * (motion.vx + vx) - bend * (ax - state.ax)
+    motion.y = motion.y + half * (motion.vy + vy) - bend * (ay - state.ay)
+    motion.theta = motion.theta + half * (motion.w + w) - bend * (spin - state.spin)
+    motion.vx, motion.vy, motion.w = vx, vy, w
+    state.ax, state.ay, state.spin = ax, ay, spin
 
 
 @inner_kernel
 def put_back(run: March, course: Course) -> None:
     """The pose with the one corner that stays on a surface put back onto it."""
-    z, corners = run.state, course.corners
-    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    motion = run.states[0].motion
+    corners = course.corners
+    cos, sin = math.cos(motion.theta), math.sin(motion.theta)
     for first, end in ((0, FLOOR), (FLOOR, len(corners))):
         count, last = 0, -1
         for i in range(first, end):
             if run.closed[i]:
                 count, last = count + 1, i
         if count == 1:
-            _, gap, rate = seen(corners[last], z, cos, sin)
+            corner = corners[last]
+            _, gap, rate = contact_state(corner, motion, cos, sin)
             if abs(rate) < course.resting:
-                z[X], z[Y] = z[X] - corners[last, 2] * gap, z[Y] - corners[last, 3] * gap
+                motion.x = motion.x - corner.nx * gap
+                motion.y = motion.y - corner.nz * gap
 
 
 @inner_kernel
-def settles(z: Floats, course: Course) -> bool:
+def settles(state: np.record, course: Course) -> bool:
     """Whether both lower corners are on the floor, or so near and slow that they return at once."""
-    cos, sin = math.cos(z[THETA]), math.sin(z[THETA])
+    motion = state.motion
+    cos, sin = math.cos(motion.theta), math.sin(motion.theta)
     for i in range(FLOOR):
-        arm, gap, rate = seen(course.corners[i], z, cos, sin)
-        back = -SETTLING_TIME * course.longest * pulled(course.corners[i], z, arm)
+        corner = course.corners[i]
+        arm, gap, rate = contact_state(corner, motion, cos, sin)
+        back = -SETTLING_TIME * course.longest * gap_acceleration(corner, state, arm)
         if gap > SETTLING_GAP or not abs(rate) <= max(SETTLING_GAP, back):
             return False
     return True

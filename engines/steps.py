@@ -213,20 +213,20 @@ class AdaptiveStep:
         march raises `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end /
         `largest` steps, `end` the last of the scene's `run_times`.
         """
-        from rockcheck.engines import kernels
+        from rockcheck.engines import adaptive_march, kernels
         from rockcheck.scenes.compiled import for_types_of
 
-        course, run = kernels.begun(scene, self.largest, self.short)
+        course, run, request = adaptive_march.start(scene, self.largest, self.short)
         most_steps = 100_000 + 20 * int(course.end / self.largest)
         first = np.empty((ROOM, kernels.COLUMNS))
-        first[0, :7] = 0.0, *run.state[:6]
+        first[0, :7] = 0.0, *run.states[0].motion
         step = for_types_of(kernels.step, run, course, (0.0, 0.0, 0.0), first[0])
         planned = kernels.plan(run, course)
 
         def march() -> Marched:
             rows, count, going = first, 1, planned
             while going:
-                x, y, theta, vx, vy, w, dt, ax, ay, impact = run.asked.tolist()
+                x, y, theta, vx, vy, w, dt, ax, ay, impact = request.tolist()
                 kicked = world.push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
                 if count == len(rows):
                     rows = np.concatenate([rows, np.empty_like(rows)])

@@ -1,21 +1,7 @@
 """The block with its floor and walls, a record that compiled code reads by name: SETTING."""
 
-import numpy as np
-
 from rockcheck.scenes.compiled import inner_kernel
-
-
-def record(**fields: object) -> np.dtype[np.void]:
-    """The type of a record with these fields, which Python reads by name, too."""
-    return np.dtype((np.record, np.dtype(list(fields.items()), align=True)))
-
-
-def filled(kind: np.dtype[np.void], /, **values: object) -> np.record:
-    """A record with these values; a field that is not named is zero."""
-    assert kind.names is not None
-    found: np.record = np.array([tuple([values.get(name, 0) for name in kind.names])], kind)[0]
-    return found
-
+from rockcheck.scenes.named_record import record
 
 #: One side of the block as it stands: its lower corner, which is the pivot where the block tips to
 #: that side, and its top corner.

@@ -28,11 +28,12 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.block import record, side_of
+from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
 from rockcheck.ebm.core.names import CONTACT_SETS, CONTACTS, Contact, Friction, Kind, Law, Rule
 from rockcheck.ebm.core.series import NOISE
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
+from rockcheck.scenes.named_record import record
 
 # A solution to try: the contacts that push, as bits and by their number; the unknowns, which are
 # these and, where the pivot sticks, the floor's tangent; a Friction, and the direction of slip.

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rockcheck.ebm.core.block import filled, record
 from rockcheck.ebm.core.names import Shape
 from rockcheck.ebm.core.series import RECIPROCAL
 from rockcheck.scenes import Excitation, Floats, Record, Ricker, Wave, Wavelet
 from rockcheck.scenes.compiled import inner_kernel
+from rockcheck.scenes.named_record import filled, record
 
 NEVER = np.inf
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rockcheck.ebm.core import names
-from rockcheck.ebm.core.block import SETTING, filled, record
+from rockcheck.ebm.core.block import SETTING
 from rockcheck.ebm.core.contact_impacts import IMPACT
 from rockcheck.ebm.core.ground import FORM, Ground
 from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Pivot, Row
@@ -18,13 +18,12 @@ from rockcheck.ebm.core.series import WIDTH
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.scenes import Floats
 from rockcheck.scenes.compiled import inner_kernel, kernel
+from rockcheck.scenes.named_record import MOTION, filled, record
 
 #: How many modes there are.
 MODES = 128
 
 
-#: Of the mass's centre, which stands at x = 0 at first; world frame.
-MOTION = record(x="f8", y="f8", theta="f8", vx="f8", vy="f8", w="f8")
 MODE = record(
     # A Family.
     family="i8",
@@ -83,6 +82,7 @@ EXTREMES = record(
 )
 STATE = record(
     control=CONTROL,
+    # Of the mass's centre, which stands at x = 0 at first; world frame.
     motion=MOTION,
     mode=MODE,
     # Why the run has ended, an Ending.

@@ -51,6 +51,7 @@ def test_damping_ratio_inverts_restitution(e):
 def test_the_least_restitution_vanishes_with_the_length_of_a_contact():
     """Four times as stiff, half as long: so a study of the step finds it."""
     assert [least_restitution(k, 2.0) for k in (4e8, 1e8)] == pytest.approx([1e-4, 2e-4])
+    assert least_restitution(1e-3, 2.0) == 1.0
     assert damping_ratio(0.0, least_restitution(1e-3, 2.0)) == 0.0
     assert restitution_of(damping_ratio_of_paper(0.0)) == pytest.approx(math.exp(-2.0), rel=1e-12)
 
@@ -124,3 +125,11 @@ def test_effective_mass_is_the_impulse_of_the_rigid_impact(mu, k_c, sliding):
     mass = effective_mass(*impact[:6], mu, e)
     assert mass == pytest.approx(push_of_impact(*impact) / (1.0 + e), rel=1e-9)
     assert not sliding or mass == pytest.approx(1.0 / (k_n - math.copysign(mu, sliding) * k_c))
+
+
+@pytest.mark.parametrize(("mu", "slips"), [(0.34, True), (0.36, False)])
+def test_a_corner_that_slides_as_it_arrives_slips_where_the_impact_cannot_hold_it(mu, slips):
+    k_n, k_t, k_c = 1.2, 3.8, 0.7
+    held = 1.0 / (k_n - k_c * k_c / k_t)
+    mass = effective_mass(k_n, k_t, k_c, -1.0, 1.0, mu, mu, 0.5)
+    assert mass == pytest.approx(1.0 / (k_n - mu * k_c) if slips else held)

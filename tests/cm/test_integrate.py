@@ -4,10 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from step_parts import LOADED, G, parameters, state_of
+from step_parts import LOADED, STIFFNESS, G, parameters, state_of
 
 from rockcheck import Block, ContinuousModel, Floor, Record, Wall
-from rockcheck.cm.integrate import is_blown_up, step_length, write_row
+from rockcheck.cm.base_motion import base_of
+from rockcheck.cm.geometry import FLOOR
+from rockcheck.cm.integrate import advance, is_blown_up, step_length, take_step, write_row
+from rockcheck.cm.state import STRIKE
 
 PLAIN = LOADED.replace(
     block=Block(half_width=0.3, half_height=1.0), walls=[], duration=0.1, output_step=0.005
@@ -119,11 +122,44 @@ def test_a_leaning_block_presses_on_wall_and_floor():
     assert history.cost.evaluations > 2 * history.cost.steps
 
 
-def test_a_falling_block_has_overturned():
-    falling = PLAIN.replace(initial_rotation=1.5, initial_angular_velocity=2.0)
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_a_falling_block_has_overturned(side, sign):
+    falling = PLAIN.replace(initial_rotation=1.5 * sign, initial_angular_velocity=2.0 * sign)
     history = played(falling)
-    assert history.outcome == "overturned left"
-    assert 0.02 < history.event_list[-1].t < 0.0354
+    assert history.outcome == f"overturned {side}"
+    fall = history.event_list[-1].t
+    assert 0.02 < fall < 0.0354
+    extremes = history.extremes
+    left, right = (0.5 * math.pi, 0.0)[:: int(sign)]
+    assert (extremes.rotation_left, extremes.rotation_right) == (left, right)
+    assert (extremes.rotation_left_s, extremes.rotation_right_s) == (fall, 0.0)[:: int(sign)]
+
+
+def test_the_work_on_a_flying_block_is_its_gain_of_energy():
+    shaken = PLAIN.replace(
+        initial_height=1.0,
+        initial_velocity=0.4,
+        excitation=Record.from_samples([30.0, -50.0, 70.0], 0.02),
+        vertical=Record.from_samples([-60.0, 20.0, 40.0], 0.02),
+    )
+    state, made = state_of(shaken), parameters(shaken)
+    start = float(state.allowed_energy)
+    times = np.array([0.06])
+    advance(made, base_of(shaken), state, np.zeros(9, STRIKE), 0.06, times, np.empty((1, 6)))
+    motion = state.motion
+    energy = 0.5 * (motion.vx**2 + motion.vy**2) + G * (motion.y - 1.0)
+    assert abs(energy - start) > 0.1
+    assert state.allowed_energy - start == pytest.approx(energy - start, rel=1e-9)
+
+
+def test_a_contact_that_closes_is_young_for_four_contact_times():
+    state, made = state_of(PLAIN.replace(initial_height=1e-6)), parameters(PLAIN)
+    state.motion.vy, state.closing_time = -0.5, 1e-5
+    count = take_step(made, base_of(PLAIN), 1.0, state, np.zeros(9, STRIKE), 0)
+    assert state.contacts["closed"][FLOOR].tolist() == [True, True]
+    assert state.settle_time == pytest.approx(0.5e-5 + 4.0 / math.sqrt(STIFFNESS))
+    assert state.contact_step < 1.01 * 0.02 / math.sqrt(STIFFNESS)
+    assert (state.first_strike, count) == (0.5e-5, 0)
 
 
 # Steps

@@ -23,7 +23,12 @@ def weights(scene):
     return -STIFFNESS * gaps * state.contacts["closed"][FLOOR], corners
 
 
-@pytest.mark.parametrize("block", [PLAIN.block, LOADED.block], ids=["plain", "loaded"])
+BESIDE = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.08, 0.0))
+
+
+@pytest.mark.parametrize(
+    "block", [PLAIN.block, LOADED.block, BESIDE], ids=["plain", "loaded", "loaded at half height"]
+)
 def test_a_standing_block_is_in_balance(block):
     forces, corners = weights(LOADED.replace(block=block))
     assert np.sum(forces) == pytest.approx(G, rel=1e-6)
@@ -89,6 +94,13 @@ def test_constants_are_the_scenes():
     assert made.friction_damping == 1e5 * 1e4
     assert made.flat_angle == 1e-4 * LOADED.block.alpha
     assert made.surfaces.tolist() == [LEFT_WALL, RIGHT_WALL, FLOOR]
+
+
+def test_the_inertia_is_the_blocks_where_it_is_given():
+    block = Block(half_width=0.3, half_height=1.0, moment_of_inertia=0.2)
+    made = parameters(PLAIN.replace(block=block))
+    assert made.inverse_inertia == pytest.approx(1.0 / block.gyration_squared)
+    assert made.inverse_inertia != pytest.approx(3.0 / (0.09 + 1.0))
 
 
 def test_a_scene_without_walls_has_the_floor_alone():

@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 from step_parts import LOADED, STIFFNESS, G, parameters, state_of, step_at
 
+from rockcheck import Wall
 from rockcheck.cm.contact_law import felt_share
-from rockcheck.cm.geometry import FLOOR, LEFT_WALL, RIGHT_WALL, Corner, apply_impulse, pair_at
+from rockcheck.cm.geometry import (
+    FLOOR,
+    LEFT_WALL,
+    RIGHT_WALL,
+    Corner,
+    apply_impulse,
+    corners_at,
+    pair_at,
+)
+from rockcheck.cm.impacts import closing_time
 from rockcheck.cm.surface_forces import (
     apply_surfaces,
     push,
@@ -183,6 +193,27 @@ def test_the_floors_forces_agree_with_the_velocity_they_give():
     assert after == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.parametrize(("comes", "sign"), [(0, -1.0), (1, 1.0)])
+def test_an_open_corner_of_the_floor_comes_as_the_forces_move_it(comes, sign):
+    """Those at the other corner, on which the block stands and slips."""
+    made, state = parameters(), state_of()
+    theta, w = 8e-5 * sign, -1.3 * sign
+    corners = corners_at(made.reach, theta)
+    pivot = 2 * (1 - comes)
+    v0 = (0.2, -w * corners[pivot], w)
+    place = 0.08, -corners[pivot + 1] - 1e-7
+    step = step_at(made, place=place, theta=theta, v0=v0, length=LENGTH)
+    state.contacts["closed"][FLOOR] = [comes == 1, comes == 0]
+    free = v0[0], v0[1] - LENGTH * G, w
+    v, closing, _ = surface_force(state, made, FLOOR, step, free, LENGTH)
+    assert state.friction.slips
+    _, before = pair_at(step, free, FLOOR, 0.0, made.inverse_inertia)
+    _, after = pair_at(step, v, FLOOR, 0.0, made.inverse_inertia)
+    expected = closing_time(made, before[comes], after[comes].rate, LENGTH)
+    assert closing == pytest.approx(expected, rel=1e-9)
+    assert expected < 1e-3
+
+
 # All surfaces
 
 
@@ -224,6 +255,27 @@ def test_one_surface_alone_is_solved_at_once():
     step = step_at(made, place=(0.08, state.motion.y), theta=0.0, v0=(0.0, 0.0, 0.0), length=LENGTH)
     apply_surfaces(state, made, step, (0.0, -LENGTH * G, 0.0), True)
     assert state.sweeps == 1
+
+
+@pytest.mark.parametrize(("surface", "theta"), [(RIGHT_WALL, 0.05), (LEFT_WALL, 0.05)])
+def test_sweeps_go_on_whichever_corner_is_pushed(surface, theta):
+    """The pivot on the floor, and a corner on the wall that the block is pressed to."""
+    side = "left" if surface == LEFT_WALL else "right"
+    scene = LOADED.replace(walls=[Wall(side=side, gap=0.07)])
+    made, state = parameters(scene), state_of(scene)
+    corners = corners_at(made.reach, theta)
+    out = -1.0 if surface == LEFT_WALL else 1.0
+    reach = max(out * corners[i] for i in range(0, 8, 2))
+    x = out * (made.distance[surface] - reach + 1e-6)
+    step = step_at(
+        made, place=(x, -corners[1] - 1e-7), theta=theta, v0=(0.0, 0.0, 0.0), length=LENGTH
+    )
+    state.contacts["closed"] = False
+    struck = 0 if surface == RIGHT_WALL else 1
+    state.contacts["closed"][[surface, FLOOR], [struck, 0]] = True
+    apply_surfaces(state, made, step, (out * LENGTH * 3.0, -LENGTH * G, 0.0), True)
+    assert state.sweeps > 1
+    assert state.contacts[surface, struck].force > 0.0
 
 
 @pytest.mark.parametrize("settled", [False, True])

@@ -14,7 +14,7 @@ from rockcheck import (
     Wall,
     engines,
 )
-from rockcheck.engines import kernels
+from rockcheck.engines import adaptive_march
 from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.discrepancy import impact_laws
 
@@ -73,7 +73,9 @@ def test_where_there_is_nothing_to_tell(restitution: float, of: dict, played: di
     assert law_followed(scene.replace(**of), UNILATERAL.simulate(scene.replace(**played))) is None
 
 
-@pytest.mark.parametrize("closed", [kernels.CLOSED, 1.4 * kernels.CLOSED, 4.0 * kernels.CLOSED])
+@pytest.mark.parametrize(
+    "closed", [adaptive_march.CLOSED, 1.4 * adaptive_march.CLOSED, 4.0 * adaptive_march.CLOSED]
+)
 @pytest.mark.parametrize(
     "engine",
     [
@@ -120,7 +122,7 @@ def test_corners_that_land_at_one_instant_share_the_impact(
 ) -> None:
     """So with steps that end at events all engines follow the closed branch, however near a corner
     must be to touch."""
-    monkeypatch.setattr(kernels, "CLOSED", closed)
+    monkeypatch.setattr(adaptive_march, "CLOSED", closed)
     model = getattr(engines, engine)(time_step="adaptive")
     found = law_followed(scene, model.simulate(scene))
     assert (found.law, found.errors["closed"]) == ("closed", pytest.approx(0.0, abs=3e-6))
