@@ -352,6 +352,11 @@ def test_a_wall_that_the_scene_has_not_is_put_beside_the_other():
     assert found.task.scene.wall("left") == SCENE.walls[0]
 
 
+def test_a_threshold_takes_as_long_as_a_run():
+    found, _ = thresholds([FALL])
+    assert found.task.expected == pytest.approx(COMPILED_RUN)
+
+
 def test_a_wall_that_is_tried_is_plastic_unless_it_is_told_otherwise():
     assert GapRange("right").restitution == 0.0
 
