@@ -446,7 +446,7 @@ def test_another_model_that_falls_makes_the_outcome_uncertain():
 
 
 def test_another_model_that_nothing_decided_leaves_the_outcome():
-    answer, _ = contributions(gathered({"a": RUNS["a"]}, cm={"a": ran("undecided", 0.9)}))
+    answer, _ = contributions(gathered({"c": RUNS["c"]}, cm={"c": ran("undecided", 0.9)}))
     assert answer.of == "peak rotation"
 
 

@@ -50,6 +50,12 @@ def test_a_record_without_runs_does_not_count():
     assert share.high == pytest.approx(beta.ppf(0.975, 1.25, 1.75))
 
 
+def test_what_always_happens_under_few_records_may_always_happen():
+    share = share_of_runs(np.array([DRAWS, DRAWS]), np.array([DRAWS, DRAWS]))
+    assert share.low == pytest.approx(0.1581, abs=1e-4)  # sqrt(0.025): both of two
+    assert share.high == 1.0
+
+
 def test_parts_of_a_run_have_an_interval():
     share = share_of_runs(np.array([30, 6]), np.array([60, 60]))
     assert share.low == pytest.approx(beta.ppf(0.025, 0.6, 2.4))
