@@ -53,7 +53,7 @@ def share_of_runs(hits: NDArray[np.int64], runs: NDArray[np.int64]) -> Share:
     if records == 1:
         low, high = wilson_interval(count / total, total)
         return Share(count, total, count / total, float(low), float(high), "Wilson")
-    share = float(np.mean(hits[has_runs] / runs[has_runs])) if total > records else count / total
+    share = float(np.mean(hits[has_runs] / runs[has_runs]))
     if total > records or records < FEW_RECORDS:
         low, high = exact_interval(share, records)
         return Share(count, total, share, float(low), float(high), "Clopper-Pearson")
