@@ -112,7 +112,7 @@ def _turn(run):
     At one instant each further event doubles the slack, as in a selection (ebm.core.modes).
     """
     state = run.state
-    modes.slacken(state)
+    modes.relax_tolerance(state)
     if state.guard == Guard.SLIP:
         yielded = not state.winds
         state.winds, state.mode.slip = True, -state.mode.slip

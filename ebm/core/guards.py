@@ -17,9 +17,10 @@ How to add a guard:
 4. `ebm.core.coulomb._change` names the event by the modes before and after it. A new one is a
    member of `Event` with a line in `EVENT_NAMES`, and stands in the glossary.
 
-A guard ends its mode, and takes part in the choice of the next one (`ebm.core.modes.wrong_by`): it
-is not negative in a mode that may begin. What only tells, as the passing of an angle, is no guard:
-`ebm.core.steps.advance` finds the top of a swing so, by a root of its own, and `note` writes it.
+A guard ends its mode, and takes part in the choice of the next one (`modes.constraint_violation`):
+it is not negative in a mode that may begin. What only tells, as the passing of an angle, is no
+guard: `ebm.core.steps.advance` finds the top of a swing so, by a root of its own, and `note` writes
+it.
 """
 
 import math

@@ -112,11 +112,11 @@ def resolve(block, base, run):
     state = run.state
     state.before, state.known, state.changing = mode_code(state), False, True
     state.event = Event.UNTOLD
-    modes.leave(state, KIND[state.guard])
+    modes.mark_mode_ended(state, KIND[state.guard])
     if state.guard <= Guard.FAR_GAP:
         strike(block, base, run, settle.settling_speed(state))
         if state.impulse > 0.0:
-            modes.forget(state)  # a new motion: all modes may be tried again
+            modes.reset_tried_modes(state)  # a new motion: all modes may be tried again
         elif block.unilateral:
             state.event = Event.UNTOLD  # a block in flight passes theta = 0
 

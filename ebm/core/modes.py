@@ -8,7 +8,7 @@ block and for the corner that stays on the wall come out as the one consistent c
 the closed forms against it.
 
 Termination. At one instant a mode is selected once. One that has ended at that instant is selected
-again only where no other fits. Then, and where none fits at all, the mode that is wrong by least
+again only where no other fits. Then, and where none fits at all, the mode that is violated least
 goes on with a *slack*: the noise that its guards are allowed. Each further such selection at that
 instant doubles the least slack. It soon exceeds all forces, and time goes on.
 """
@@ -16,6 +16,7 @@ instant doubles the least slack. It soon exceeds all forces, and time goes on.
 import itertools
 import math
 from collections import namedtuple
+from enum import IntEnum
 
 import numpy as np
 
@@ -54,6 +55,9 @@ def _candidates(first: int) -> list[tuple[int, ...]]:
     return rows
 
 
+#: The passes of a selection: the first mode that fits; else that which is violated least, among
+#: those not tried at this instant, and among those tried.
+Search = IntEnum("Search", "FITS UNTRIED TRIED", start=0)
 #: Row 1 has the left side first, row -1 (the last one) the right one.
 _CANDIDATES = np.array([_candidates(side) for side in (1, 1, -1)], MODE)
 # The numbers of those that tilt to the first side, but for the first of all, an upright block's
@@ -64,7 +68,7 @@ _FREE = _TILTS[(_LEFT["tip"] | _LEFT["far"])[_TILTS] == 0][0]
 
 
 @inner_kernel
-def forget(state):
+def reset_tried_modes(state):
     """A new instant begins: no mode has been tried in it."""
     state.tried[:] = 0
     state.slack = state.least_slack = 1.0
@@ -72,27 +76,27 @@ def forget(state):
 
 
 @inner_kernel
-def leave(state, kind):
+def mark_mode_ended(state, kind):
     """Notes that a guard of this kind has ended the mode.
 
     If it was a force's, and by rounding only, the mode may go on once.
     """
     if state.t - state.since > series.INSTANT:
-        forget(state)
+        reset_tried_modes(state)
     code = code_of(state.mode)
     state.tried[code] = kind != Kind.FORCE or state.t - state.began <= series.INSTANT
     state.ended = code if kind == Kind.FORCE else -1
 
 
 @inner_kernel
-def slacken(state):
+def relax_tolerance(state):
     """Gives the mode the least slack, and doubles that for the next selection at this instant."""
     state.slack = state.least_slack
     state.least_slack *= 2.0
 
 
 @inner_kernel
-def wrong_by(block, base, run, measured):
+def constraint_violation(block, base, run, measured):
     """0 if the mode can begin, else the slack (in units of noise) with which it could.
 
     A mode can begin with every guard leaving zero upward. Infinite if the mode needs a motion that
@@ -110,7 +114,7 @@ def wrong_by(block, base, run, measured):
     for which in range(len(guards.KIND)):
         if a[Row.THERE, which] != 0.0:
             ahead = guards.seen(guards.KIND[which], smooth)
-            worst = max(worst, _guard_wrong_by(state, which, order, ahead, a, measured))
+            worst = max(worst, _guard_violation(state, which, order, ahead, a, measured))
             if worst == np.inf:
                 break
     return worst
@@ -132,8 +136,8 @@ def _stands(block, state, degree, ahead, a):
 
 
 @inner_kernel
-def _guard_wrong_by(state, which, order, ahead, a, measured):
-    """What one guard adds to `wrong_by`."""
+def _guard_violation(state, which, order, ahead, a, measured):
+    """What one guard adds to `constraint_violation`."""
     mode = state.mode
     noise, degree = series.NOISE[guards.KIND[which]], guards.guard(which, order, a)
     if which <= Guard.FAR_GAP and a[Row.GUARD, 1] < -contacts.SLOW:
@@ -186,7 +190,7 @@ def hangs_flat(mode):
 
 
 @inner_kernel
-def _possible(block, state, at):
+def _is_possible(block, state, at):
     """Whether the contacts of the mode are closed and its slip agrees with the motion."""
     mode, motion = state.mode, state.motion
     flat, mine = mode.family == Family.FLAT, mode.tip + 2 * mode.far
@@ -281,7 +285,7 @@ def _touching(block, base, state):
 
 @called_kernel
 def select(block, base, run):
-    """Writes the consistent mode into the state, or the one that is wrong by least.
+    """Writes the consistent mode into the state, or the one that is violated least.
 
     False where the state is not finite.
     """
@@ -289,48 +293,46 @@ def select(block, base, run):
     state.began = state.t
     at = _touching(block, base, state)
     least, chosen = np.inf, -1
-    # One that fits; else that which is wrong by least, among those not tried and those tried.
-    for trial in range(3):
-        wrong, number = _least_wrong(block, base, run, at, trial)
-        if wrong == 0.0:
+    for search in (Search.FITS, Search.UNTRIED, Search.TRIED):
+        violation, number = _least_violated(block, base, run, at, search)
+        if violation == 0.0:
             # One that goes on, since what ended it was noise, is allowed twice that: else the same
             # noise would end it again and again.
             state.slack = 2.0 if code_of(mode) == state.ended else 1.0
             state.rules[Rule.HANGS] += hangs_flat(mode)
             return True
-        if wrong < least:
-            least, chosen = wrong, number
+        if violation < least:
+            least, chosen = violation, number
     if chosen < 0:
         return False
     state.mode = _CANDIDATES[at.first, chosen]
     again = least <= state.least_slack
     state.rules[Rule.MODE_AGAIN if again else Rule.LEAST_CONTRADICTION] += 1
-    slacken(state)
+    relax_tolerance(state)
     state.slack = max(least, state.slack)
     return True
 
 
 @inner_kernel
-def _least_wrong(block, base, run, at, trial):
-    """The slack of the candidate that is least wrong, and its number.
+def _least_violated(block, base, run, at, search):
+    """The slack of the candidate that is violated least, and its number.
 
-    The first one that fits is left in the state. Trial 2, the last, looks at the modes that have
-    been tried at this instant.
+    The first one that fits is left in the state.
     """
     least, chosen = np.inf, -1
     for number in range(at.begin, at.end):
         if least == 0.0:
             break
-        if _comes_up(block, run.state, at, number, trial == 2):
-            wrong = wrong_by(block, base, run, trial > 0)
-            wrong = max(wrong, run.state.least_slack if trial == 2 else 0.0)
-            if wrong < least:
-                least, chosen = wrong, number
+        if _is_candidate(block, run.state, at, number, search == Search.TRIED):
+            violation = constraint_violation(block, base, run, search != Search.FITS)
+            violation = max(violation, run.state.least_slack if search == Search.TRIED else 0.0)
+            if violation < least:
+                least, chosen = violation, number
     return least, chosen
 
 
 @inner_kernel
-def _comes_up(block, state, at, number, again):
+def _is_candidate(block, state, at, number, again):
     """Writes a candidate, if the walls that it leans on are touched.
 
     Returns whether it is possible, and has been tried at this instant (`again`) or not.
@@ -343,4 +345,4 @@ def _comes_up(block, state, at, number, again):
         return False
     state.mode = mode
     tried = state.tried[code_of(mode)] != 0
-    return tried == again and _possible(block, state, at)
+    return tried == again and _is_possible(block, state, at)

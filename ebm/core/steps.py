@@ -18,7 +18,7 @@ from rockcheck.ebm.core.decide import (
     swings_again,
 )
 from rockcheck.ebm.core.ground import next_exceedance
-from rockcheck.ebm.core.modes import leave
+from rockcheck.ebm.core.modes import mark_mode_ended
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import (
     Ending,
@@ -208,7 +208,7 @@ def rest(block, base, run):
         state.ending = Ending.DONE
         return
     state.t, state.stride, state.extremes.upright = until, np.inf, True
-    leave(state, Kind.FORCE)
+    mark_mode_ended(state, Kind.FORCE)
     state.guard, state.event = Guard.NONE, Event.RELEASE
     state.before, state.changing = 0, True
 

@@ -128,22 +128,22 @@ def test_what_was_tried_at_an_instant():
     once; one that a gap ended may not."""
     state = run_at(t=3.0, **TILTED, sense=1).state
     state.tried[:], state.slack, state.least_slack = 1, 7.0, 7.0
-    modes.forget(state)
+    modes.reset_tried_modes(state)
     assert (state.tried.any(), state.slack) == (False, 1.0)
     for slack in (1.0, 2.0):  # the least one is one noise
-        modes.slacken(state)
+        modes.relax_tolerance(state)
         assert state.slack == slack
     for kind, began, may in (
         (Kind.FORCE, 2.0, True),
         (Kind.FORCE, 3.0, False),
         (Kind.POSITION, 2.0, False),
     ):
-        modes.forget(state)
+        modes.reset_tried_modes(state)
         state.began = began
-        modes.leave(state, kind)
+        modes.mark_mode_ended(state, kind)
         assert state.tried[code_of(state.mode)] != may
     state.t = 4.0
-    modes.leave(state, Kind.RATE)
+    modes.mark_mode_ended(state, Kind.RATE)
     assert state.tried.sum() == 1, "what was tried at an earlier instant is forgotten"
 
 
