@@ -443,7 +443,10 @@ def test_a_side_that_cannot_be_played_is_no_tie(monkeypatch):
 
 def test_sides_whose_fates_differ_are_a_tie_even_if_they_part_after_the_end(monkeypatch):
     words = {-1: "at rest", 0: "at rest", 1: "overturned left"}
-    number = lambda scene: scene.floor.friction / OVER_LEFT  # noqa: E731
+
+    def number(scene):
+        return scene.floor.friction / OVER_LEFT
+
     monkeypatch.setattr(
         ties, "fate_words", lambda scene, model: words[round((number(scene) - 1.0) / 1e-7)]
     )

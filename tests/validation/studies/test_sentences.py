@@ -56,6 +56,11 @@ def test_falls_to_both_sides_are_told_by_side():
     assert falls(gathered(runs))[1] == "To the left 1, to the right 2."
 
 
+def test_of_one_fall_among_several_runs_the_side_is_told():
+    runs = {"a": RUNS["a"], "b": RUNS["a"], "c": RUNS["c"]}
+    assert falls(gathered(runs))[1] == "It falls to the right."
+
+
 @pytest.mark.parametrize(
     ("low", "high", "words"),
     [
