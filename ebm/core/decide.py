@@ -1,4 +1,4 @@
-"""When the outcome and the peak of a run are certain before its end. Only spectra ask for it."""
+"""When the outcome and the peak of a run are certain before its end, for spectra and fates."""
 
 import math
 

@@ -62,7 +62,7 @@ def may_go_on(block, base, run):
 
 @inner_kernel
 def _decide(block, base, state):
-    """Ends a run whose outcome and peak are certain, or that of which nothing kept can change.
+    """Ends a run whose outcome, peak, and all that it keeps beside them are certain.
 
     One that nothing decides is given up in time.
     """
