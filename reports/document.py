@@ -38,7 +38,7 @@ PLOT, DRAWING, DRAWING_MB = TypeAdapter(Plot), 60.0, 4000.0
 #: Characters above which a text has a wide column.
 LONG_TEXT = 24
 #: Of a verdict: its sign, and its colour on a terminal.
-VERDICTS = {
+SIGN_AND_COLOUR = {
     "": ("", ""),
     "pass": ("✓", "green"),
     "changed": ("△", "yellow"),
@@ -88,7 +88,7 @@ def _words(mark: Mark, column: Column, write: Callable[[float, int], str]) -> st
             said = write(value, digits)
         case _, value:
             said = str(value)
-    return f"{VERDICTS[mark.verdict][0]} {said}".strip()
+    return f"{SIGN_AND_COLOUR[mark.verdict][0]} {said}".strip()
 
 
 def failure_lines(failures: Mapping[str, str]) -> list[str]:

@@ -13,8 +13,8 @@ from rockcheck.reports.view import FALL, fall_to
 from rockcheck.scenes import Side, experience
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.finding import Axis, Block, Column, Panel, Plot, Series, Style, Table
-from rockcheck.validation.suite import across, results
-from rockcheck.validation.suite.tables import nearest, used
+from rockcheck.validation.suite import model_bias, results
+from rockcheck.validation.suite.limits_used import nearest, used
 from rockcheck.validation.suite.tolerances import known
 from rockcheck.validation.suite.verdicts import apart
 
@@ -107,7 +107,7 @@ def _moved(check: results.Check) -> bool:
     """Whether a figure left its drift band; without one, its limit."""
     value, expected = check.figure.value, check.expected
     if check.drift is None or value is None or expected is None:
-        return check.weighs != "pass"
+        return check.weight != "pass"
     ideal = known(check.figure.measure).ideal or 0.0
     return apart(value, expected, check.floor, ideal) > check.drift
 
@@ -182,7 +182,9 @@ def alike(run: results.Run, cells: Sequence[results.Cell]) -> list[list[results.
     groups: dict[tuple[str, str, bool, str], list[results.Cell]] = {}
     for cell in cells:
         outcome = outcome_of(run, cell) if cell.outcome else ""
-        groups.setdefault((cell.verdict, cell.words, bool(cell.checks), outcome), []).append(cell)
+        groups.setdefault(
+            (cell.verdict, cell.verdict_words, bool(cell.checks), outcome), []
+        ).append(cell)
     return list(groups.values())
 
 
@@ -196,10 +198,10 @@ def accuracy(run: results.Run) -> list[Block]:
     """
     # one that was falling at the end does not stand
     stand = [cell for cell in run.cells if not outcome_of(run, cell).startswith("falling")]
-    pairs = across.pairs_of([run.model_copy(update={"cells": stand})])
+    pairs = model_bias.pairs_of([run.model_copy(update={"cells": stand})])
     settings = {cell.model: cell.settings for cell in run.cells}
     models = [model for model in run.models if model in pairs]
-    here = {model: across.trust_in(pairs[model]) for model in models}
+    here = {model: model_bias.trust_in(pairs[model]) for model in models}
     in_all = {
         model: experience.trust_of(model, settings.get(model, {})).get("peak_rotation")
         for model in models

@@ -37,8 +37,11 @@ from rockcheck.scenes import (
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, stated
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import Plot
-from rockcheck.validation.suite import results
-from rockcheck.validation.suite.tables import files_of, junit, markdown, shown
+from rockcheck.validation.suite import results, verdict_scale
+from rockcheck.validation.suite.job_page import markdown
+from rockcheck.validation.suite.junit import junit
+from rockcheck.validation.suite.run_tables import files_of
+from rockcheck.validation.suite.shown_scenes import shown
 
 #: The page to open.
 INDEX = "index.html"
@@ -201,8 +204,8 @@ class _Pages:
             "formats": self.formats,
             "looks": style.looks(self.run.models),
             "channels": CHANNELS,
-            "SEVERITY": results.SEVERITY,
-            "VERDICTS": tables.VERDICTS,
+            "SEVERITY": verdict_scale.SEVERITY,
+            "VERDICTS": tables.NAME_AND_SIGN,
             "tables": tables,
             "overview": overview,
             "row_cells": document.row_cells,

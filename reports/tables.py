@@ -19,14 +19,15 @@ from rockcheck.validation.finding import (
     Column,
     Mark,
     Table,
+    Verdict,
     text,
 )
 from rockcheck.validation.suite import results
-from rockcheck.validation.suite.tables import used
+from rockcheck.validation.suite.limits_used import used
 from rockcheck.validation.suite.tolerances import known
 
 #: What a verdict is called and the sign that goes with its colour.
-VERDICTS = {
+NAME_AND_SIGN = {
     "pass": ("within tolerance", "✓"),
     "better": ("better", "✓"),
     "not defined": ("not defined here", "–"),
@@ -58,7 +59,7 @@ def checks_table(cells: Iterable[results.Cell], name: str = "") -> Table:
 def verdict_mark(cell: results.Cell) -> Mark:
     """The verdict on a cell, also where there is nothing to judge."""
     return (
-        Mark(VERDICTS[cell.verdict][0], cell.verdict)
+        Mark(NAME_AND_SIGN[cell.verdict][0], cell.verdict)
         if cell.verdict != "pass" or cell.checks
         else Mark("nothing judged")
     )
@@ -90,12 +91,13 @@ def worst_table(run: results.Run, links: Mapping[str, str]) -> Table:
 def _check_row(
     cell: results.Cell, check: results.Check, links: Mapping[str, str] | None = None
 ) -> list[Any]:
-    figure, weighs = check.figure, "" if check.verdict == "not defined" else check.weighs
+    figure = check.figure
+    colour: Verdict = "" if check.verdict == "not defined" else check.weight
     against = f"against {label_of(figure.against)}, " if figure.against else ""
     return [
-        Mark(check.words, "changed")
-        if check.words == "no tolerance yet"
-        else Mark(VERDICTS[check.verdict][0], weighs),
+        Mark(check.verdict_words, "changed")
+        if check.waits_for_tolerance
+        else Mark(NAME_AND_SIGN[check.verdict][0], colour),
         Mark(cell.scene, link=(links or {}).get(cell.scene, "")),
         cell.model,
         Mark(figure.label, words=known(figure.measure).formula, more=against + window(figure)),
@@ -126,7 +128,7 @@ def worst_first(run: results.Run) -> list[tuple[results.Cell, results.Check | No
             (
                 (cell, check)
                 for cell, check in run.checks()
-                if check.weighs != "pass" and check.words != "no tolerance yet"
+                if check.weight != "pass" and not check.waits_for_tolerance
             ),
             key=lambda pair: (pair[1].verdict != "fail", -used(pair[1])),
         ),
@@ -193,7 +195,7 @@ def measures_table(view: SceneView, against: str) -> Table:
         limit = f"limit {number(check.limit)}" if check else ""
         mark = Mark(
             f"{number(figure.value, 4)} {unit(figure.unit)}",
-            check.weighs if check and check.verdict != "not defined" else "",
+            check.weight if check and check.verdict != "not defined" else "",
             more="; ".join(filter(None, [limit, figure.note])),
         )
         marks.setdefault((figure.measure, figure.window, model), mark)

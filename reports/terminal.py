@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
-from rockcheck.reports.document import VERDICTS, failure_lines, row_cells
+from rockcheck.reports.document import SIGN_AND_COLOUR, failure_lines, row_cells
 from rockcheck.scenes import errors
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text
 
@@ -88,7 +88,7 @@ def _show_line(line: str, colour: str, screen: Console) -> None:
 def _show_text(text: Text, screen: Console) -> None:
     facts = [f"{name}: {value}" for name, value in text.facts]
     for line in filter(None, (text.text, *facts, *text.items)):
-        _show_line(line, VERDICTS[text.verdict][1], screen)
+        _show_line(line, SIGN_AND_COLOUR[text.verdict][1], screen)
 
 
 def _show_table(table: Table, screen: Console) -> None:
@@ -109,7 +109,7 @@ def _text_columns(table: Table) -> list[TextColumn]:
     cells: list[list[Line]] = [[] for _ in table.columns]
     for row in islice(table.rows, table.most):
         for number, (mark, _, words) in enumerate(row_cells(row, table.columns, "{:.{}g}".format)):
-            cells[number].append(Line(errors.inert(words), VERDICTS[mark.verdict][1]))
+            cells[number].append(Line(errors.inert(words), SIGN_AND_COLOUR[mark.verdict][1]))
     return [
         TextColumn(column.head, column_cells, _is_left(column))
         for column, column_cells in zip(table.columns, cells, strict=True)

@@ -64,7 +64,7 @@ def rockcheck_check(
         suite: str | Path | None = None,
         strict: bool | Literal["both"] = False,
     ) -> results.Cell:
-        from rockcheck.validation.suite import runner, suites, tables
+        from rockcheck.validation.suite import reasons, runner, suites
 
         own = config.rootpath / "rockcheck.toml"
         chosen = str(
@@ -85,7 +85,7 @@ def rockcheck_check(
             strict=strict,
         )
         cell = finished.by_scene[scene][model]
-        if wrong := list(tables.cell_lines(cell, strict)):
+        if wrong := list(reasons.cell_lines(cell, strict)):
             pytest.fail("\n".join(wrong), pytrace=False)
         if all(check.verdict == "not defined" for check in cell.checks):
             pytest.fail(

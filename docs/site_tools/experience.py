@@ -14,7 +14,7 @@ from typing import Any
 
 from rockcheck.scenes import experience, writing
 from rockcheck.validation.execute import models
-from rockcheck.validation.suite import across, results
+from rockcheck.validation.suite import model_bias, results
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "scenes" / "data" / "experience.json"
@@ -31,8 +31,8 @@ def experience_of(runs: Sequence[results.Run]) -> experience.Experience:
     The domain is the range of each axis, `scenes.experience.axes_of`.
     """
     trust: dict[str, dict[str, experience.Trust]] = {}
-    for model, pairs in sorted(across.pairs_of(runs).items()):
-        if found := across.trust_in(pairs):
+    for model, pairs in sorted(model_bias.pairs_of(runs).items()):
+        if found := model_bias.trust_in(pairs):
             trust[model] = {"peak_rotation": found}
     scenes = [experience.axes_of(run.load_scene(name)) for run in runs for name in run.scenes]
     domain = {}

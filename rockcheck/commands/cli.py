@@ -20,7 +20,7 @@ import typer.core
 
 from rockcheck.commands import console, report_file, speaking
 from rockcheck.scenes import InputError, ModelFailure, printable, progress
-from rockcheck.validation.suite import results
+from rockcheck.validation.suite import verdict_scale
 
 #: The commands, in the order of the help: module and function below this package; an example.
 COMMANDS = {
@@ -60,7 +60,7 @@ EXIT_CODES = {
     1: "out of tolerance, or an invariant is broken",
     2: "bad input, or a file that cannot be read or written",
     3: "a model failed",
-    results.FAULT: "a fault of rockcheck itself: please report it",
+    verdict_scale.FAULT: "a fault of rockcheck itself: please report it",
     progress.INTERRUPTED: "interrupted by Ctrl-C",
 }
 
@@ -236,7 +236,7 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         return _told(
             f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
             f" {where or f'this: {error}'}",
-            results.FAULT,
+            verdict_scale.FAULT,
         )
     # A study has gathered what there is, or Typer has caught it.
     if code == progress.INTERRUPTED:

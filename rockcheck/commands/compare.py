@@ -14,7 +14,7 @@ from rockcheck.validation import Discrepancy, compare
 from rockcheck.validation.discrepancy import figures, hints, measured, measures
 from rockcheck.validation.discrepancy.compare import motion_of, motion_words
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text, text
-from rockcheck.validation.suite import across, results
+from rockcheck.validation.suite import results, run_changes
 
 #: Value of --align for the shift at which the rotations agree best.
 BEST = "best"
@@ -69,7 +69,7 @@ def run(
         if changes.wrote(reference):
             told(changes.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
-        told(across.difference(results.Run.load(reference), results.Run.load(candidate)))
+        told(run_changes.difference(results.Run.load(reference), results.Run.load(candidate)))
     if plot is not None:
         check_file(plot, "--plot")
     common_scene = load_scene(scene) if scene else None

@@ -35,7 +35,16 @@ from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, files, printable
 from rockcheck.validation.execute import models
 from rockcheck.validation.finding import Finding, Text
-from rockcheck.validation.suite import accepting, across, results, runner, suites, tables
+from rockcheck.validation.suite import (
+    accepting,
+    reasons,
+    results,
+    run_summary,
+    run_tables,
+    runner,
+    suites,
+    trend,
+)
 from rockcheck.validation.suite.cells import Suite
 
 
@@ -143,7 +152,7 @@ def run(
         suite = _scene(what, of_scene, allow_code or ())
     else:
         if history is not None:
-            check_file(history, "--history", across.recall)
+            check_file(history, "--history", trend.read_history)
         suite = _suite(what, of_scene, allow_code or ())
     folder = _folder_of(suite, played.out)
     from rockcheck.reports import site, terminal
@@ -156,10 +165,10 @@ def run(
         strict="both" if strict == "both" else strict is not None,
     )
     page = site.keep(finished, folder, pages=pages.report)
-    terminal.show(tables.finding_of(finished), console())
+    terminal.show(run_tables.finding_of(finished), console())
     if finished.exit_code:
-        better = tables.improvements(finished) if strict == "both" else ()
-        tell_wrong([*tables.verdict_lines(finished), *better])
+        better = reasons.improvements(finished) if strict == "both" else ()
+        tell_wrong([*reasons.verdict_lines(finished), *better])
     tell_faults(finished, folder)
     if history is not None:
         _show_trend(finished, suite, history, folder, published=pages.report)
@@ -175,7 +184,7 @@ def run(
     told(
         Finding("validate", suite.name, "", exit_code=finished.exit_code),
         said=[("report", page)],
-        value={**tables.summary(finished), **left_out, "report": page},
+        value={**run_summary.summary(finished), **left_out, "report": page},
     )
 
 
@@ -195,11 +204,11 @@ def _show_trend(
     """Add a run to a history of runs, and show the trend; as a page where it is `published`."""
     from rockcheck.reports import document, terminal
 
-    moment = across.moment_of(finished, suite.path.parent)
-    trend = across.trend_of(across.remember(history, moment))
-    terminal.show(trend, console())
+    this_run = trend.summary_of_run(finished, suite.path.parent)
+    finding = trend.trend_of(trend.append_history(history, this_run))
+    terminal.show(finding, console())
     if published:
-        page = document.publish(trend, usable_folder(folder, "trend"), of_run=True)
+        page = document.publish(finding, usable_folder(folder, "trend"), of_run=True)
         console().print(f"trend: {page}", soft_wrap=True)
 
 

@@ -10,7 +10,7 @@ import pytest
 from rockcheck.commands.cli import main
 from rockcheck.reports import site
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import across, results
+from rockcheck.validation.suite import results, run_changes, trend
 
 SUITE = """
 reference = "still"
@@ -120,8 +120,8 @@ def test_the_peak_of_a_block_that_fell_is_no_figure_that_changes(peak, note, nam
         )
 
     before = reached(peak)
-    assert [one.name for one in across.changes(before, reached(peak + 0.1))] == names
-    assert list(across.moment_of(before, Path()).figures.values()) == [kept]
+    assert [one.name for one in run_changes.changes(before, reached(peak + 0.1))] == names
+    assert list(trend.summary_of_run(before, Path()).figures.values()) == [kept]
 
 
 @pytest.mark.needs("git")
@@ -142,25 +142,25 @@ def test_a_history_of_runs_grows_by_a_line_and_shows_what_moved(capsys, typed):
         ["git", "rev-parse", "--short=12", "HEAD"], capture_output=True, text=True, check=True
     ).stdout.strip()
     lines = Path("runs.jsonl").read_text("utf-8").splitlines()
-    moments = [across.Moment.model_validate_json(line) for line in lines]
+    moments = [trend.RunSummary.model_validate_json(line) for line in lines]
     assert [one.commit for one in moments] == [head, f"{head}-dirty", f"{head}-dirty"]
     name = "short, near: theta_peak against still"
     first, second, third = (one.figures[name] for one in moments)
     assert (second / first, third) == (pytest.approx(1.05, rel=1e-6), second)
     # nothing has varied in one run: no empty table; a figure that is gone has varied
     assert [
-        [table.name for table in across.trend_of(some).tables() if table.on == "page"]
+        [table.name for table in trend.trend_of(some).tables() if table.on == "page"]
         for some in (
             moments[:1],
             [moments[0], moments[0].model_copy(update={"figures": {}})],
         )
     ] == [["runs"], ["figures", "runs"]]
-    trend, page = (Path(f"a/{of}index.html").read_text("utf-8") for of in ("trend/", ""))
+    trend_page, page = (Path(f"a/{of}index.html").read_text("utf-8") for of in ("trend/", ""))
     assert (
         [
             words
             for words in ("mine over 3 runs", name, head, '"../index.html"', f"{second:.6g}")
-            if words not in trend
+            if words not in trend_page
         ],
         'href="trend/index.html"' in page,
     ) == ([], True)

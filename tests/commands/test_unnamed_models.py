@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.validation.execute import models
-from rockcheck.validation.suite import cells, runner, suites, tables
+from rockcheck.validation.suite import cells, reasons, runner, suites
 
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
 SCENE = """
@@ -90,7 +90,7 @@ def test_an_engine_that_nobody_named_is_left_out_when_its_time_is_over(monkeypat
     assert by_model["ebm-unilateral"].status == "done"
     assert by_model["box2d"].status == "unavailable"
     assert by_model["box2d"].reason.startswith("did not end within 0.05 s; left out, since nobody")
-    assert "box2d: did not end within" in "\n".join(tables.verdict_lines(finished))
+    assert "box2d: did not end within" in "\n".join(reasons.verdict_lines(finished))
     assert finished.exit_code == 0
 
 

@@ -19,7 +19,7 @@ from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
-from rockcheck.validation.suite import results, tables
+from rockcheck.validation.suite import limits_used, results
 from rockcheck.validation.uncertainty import population
 
 
@@ -70,7 +70,7 @@ def test_index_lists_what_is_wrong_worst_first(run, index):
         )
     )
     assert [first.model, second.model, last.status] == ["mujoco", "mujoco", "absent"]
-    order = [(check.verdict != "fail", -tables.used(check)) for _, check in rest]
+    order = [(check.verdict != "fail", -limits_used.used(check)) for _, check in rest]
     assert order == sorted(order)
     wrong = [check.verdict for _, check in run.checks() if check.verdict in ("fail", "changed")]
     assert sorted(check.verdict for _, check in rest) == sorted(wrong)
@@ -101,7 +101,7 @@ def test_index_answers_three_questions_first(run, index):
         scene for scene, row in matrix(run).items() if any(entry.apart for entry in row.values())
     ]
     verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
-    shares = [tables.used(check) for _, check in found.changed]
+    shares = [limits_used.used(check) for _, check in found.changed]
     assert shares == sorted(shares, reverse=True)
     assert (found.judged, len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
     at_a_glance, after = re.search('<dl class="glance"(.*?)</dl>(.*)', index, re.DOTALL).groups()
@@ -182,7 +182,7 @@ def test_a_run_without_tolerances_says_how_to_get_them(tmp_path, finished):
 def test_a_card_says_once_what_models_share(run, index):
     card = index.split('<article class="card">')[1]
     cells = run.by_scene["free"].values()
-    words = {(cell.verdict, cell.words, cell.outcome) for cell in cells}
+    words = {(cell.verdict, cell.verdict_words, cell.outcome) for cell in cells}
     assert len(words) < len(cells)
     assert card.count("<li>") == len(words)
 

@@ -30,7 +30,7 @@ from rockcheck.validation.paper.spectra import (
     panels_with,
 )
 
-VERDICTS: dict[str, Verdict] = {
+CLAIM_COLOURS: dict[str, Verdict] = {
     "holds": "pass",
     "holds in part": "changed",
     "does not hold": "fail",
@@ -67,7 +67,7 @@ def _claims(paper: Paper, claims: Sequence[Claim]) -> Table:
             [
                 claim.about["sentence"],
                 claim.about["place"],
-                Mark(claim.verdict, VERDICTS[claim.verdict]),
+                Mark(claim.verdict, CLAIM_COLOURS[claim.verdict]),
                 claim.finding,
                 claim.about["criterion"],
                 ", ".join(map(str, claim.about["figures"])),
@@ -161,7 +161,9 @@ def _evidence(name: str, title: str, by_sentence: Mapping[str, Sequence[Evidence
     for sentence, evidence in by_sentence.items():
         for figure in evidence:
             verdict = words[figure.holds]
-            rows.append([sentence, figure.case, figure.value, Mark(verdict, VERDICTS[verdict])])
+            rows.append(
+                [sentence, figure.case, figure.value, Mark(verdict, CLAIM_COLOURS[verdict])]
+            )
     return Table(
         name,
         [text("name", "of"), text("what"), text("value"), text("holds", "")],

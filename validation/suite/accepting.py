@@ -195,7 +195,7 @@ def _change(check: results.Check, line: Mapping[str, Any]) -> str:
         is_looser = line["limit"] > check.limit
     if is_looser:
         return "loosened"
-    return "tightened" if check.weighs == "pass" else "moved"
+    return "tightened" if check.weight == "pass" else "moved"
 
 
 def _round(value: float, down: bool = False) -> float:

@@ -64,7 +64,7 @@ def _is_judged_beside(suite: Suite, planned: Planned, checks: Sequence[results.C
 
     They do where the reference solves the same equations.
     """
-    moved = any(check.kind == "absolute" and check.weighs != "pass" for check in checks)
+    moved = any(check.kind == "absolute" and check.weight != "pass" for check in checks)
     label = planned.variant.label
     rotation = tolerances.ToleranceKey(
         planned.scene_name, label, suite.config.reference, "theta_rms"

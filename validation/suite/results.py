@@ -16,7 +16,7 @@ This module does not know how a cell is simulated, compared or shown.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path, PurePath
@@ -30,43 +30,26 @@ from rockcheck.validation.discrepancy import impact_laws
 from rockcheck.validation.discrepancy.ensemble import Sample
 from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.finding import Verdict
+from rockcheck.validation.suite.verdict_scale import (
+    FAILS,
+    FAULT,
+    FOR_MACHINES,
+    SEVERITY,
+    WEIGHTS,
+    CheckVerdict,
+    CheckWeight,
+    Strict,
+    VerdictWords,
+)
 from rockcheck.validation.uncertainty import population
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 
 RUN_FILE = "run.json"
 SCHEMA_FILE = "run.schema.json"
 FORMAT = 1
-#: Exit code of a fault in rockcheck itself, EX_SOFTWARE of sysexits: no verdict has it.
-FAULT = 70
-
-#: Verdict on one check: as expected; nearer to the perfect value; a ratio to zero; inside the
-#: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
-CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]
-#: Verdict on a cell or a run for people: the worst of its checks, "incomplete" where a model is not
-#: installed, "error" where one failed. What waits for nothing but tolerances has not failed.
-Words = Literal["not judged", "pass", "incomplete", "changed", "no tolerance yet", "fail", "error"]
-#: The verdict for machines by that for people, the worst last.
-VERDICTS: Mapping[Words, Verdict] = {
-    "not judged": "pass",
-    "pass": "pass",
-    "incomplete": "incomplete",
-    "changed": "changed",
-    "no tolerance yet": "fail",
-    "fail": "fail",
-    "error": "error",
-}
-#: What fails besides figures out of a limit: nothing; changed figures and a model that is not
-#: installed; "both": better figures, too.
-Strict = bool | Literal["both"]
-FAILS: Mapping[Strict, tuple[CheckVerdict, ...]] = {
-    False: ("fail",),
-    True: ("fail", "changed"),
-    "both": ("fail", "changed", "better"),
-}
 Status = Literal["done", "failed", "absent", "unavailable"]
 #: The statuses of a cell whose model is not installed.
 MISSING = ("absent", "unavailable")
-SEVERITY = tuple(VERDICTS)
 #: "numerical": two solutions of the same equations. "model form": the reference forbids free
 #: flight, the candidate does not. "measured": one of the two was measured. "exact": against a
 #: closed form. "absolute": a figure of the cell itself against its expected value.
@@ -100,22 +83,23 @@ class Check(Stored):
     beside: float | None = None
 
     @property
-    def weighs(self) -> Literal["pass", "changed", "fail"]:
-        """The check's weight in the cell's verdict: "better" and "not defined" count as "pass"."""
-        return "pass" if self.verdict == "better" or self.verdict == "not defined" else self.verdict
+    def weight(self) -> CheckWeight:
+        """What the check counts as in the verdict on its cell."""
+        return WEIGHTS[self.verdict]
+
+    @property
+    def waits_for_tolerance(self) -> bool:
+        """Whether it fails for nothing but a tolerance, which its figure has not yet."""
+        return self.limit is None and not self.gap and self.figure.value is not None
 
     def fails(self, strict: Strict) -> bool:
         """Whether the check is out of tolerance in a run of that strictness."""
         return self.verdict in FAILS[strict]
 
     @property
-    def words(self) -> str:
+    def verdict_words(self) -> str:
         """The verdict for people: a figure without a tolerance has not failed."""
-        return (
-            "no tolerance yet"
-            if self.limit is None and not self.gap and self.figure.value is not None
-            else self.verdict
-        )
+        return "no tolerance yet" if self.waits_for_tolerance else self.verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,20 +176,20 @@ class Cell(Stored):
         return None if self.numerical is None else self.numerical.converged
 
     @property
-    def words(self) -> Words:
+    def verdict_words(self) -> VerdictWords:
         """The worst of the cell's checks; "error" if the model failed, "incomplete" if missing."""
         if self.status != "done":
             return "error" if self.status == "failed" else "incomplete"
-        found: list[Words] = [
-            "no tolerance yet" if check.words == "no tolerance yet" else check.weighs
+        weights: list[VerdictWords] = [
+            "no tolerance yet" if check.waits_for_tolerance else check.weight
             for check in self.checks
         ]
-        return max(found, key=SEVERITY.index, default="pass")
+        return max(weights, key=SEVERITY.index, default="pass")
 
     @property
     def verdict(self) -> Verdict:
         """The verdict for machines: a figure without a tolerance does not pass."""
-        return VERDICTS[self.words]
+        return FOR_MACHINES[self.verdict_words]
 
 
 class EnsembleRecord(Stored):
@@ -281,20 +265,20 @@ class Run(Stored):
         return self.faults if judged or not self.judged else (*self.faults, nothing)
 
     @property
-    def words(self) -> Words:
+    def verdict_words(self) -> VerdictWords:
         """The worst cell's verdict; at least "fail" where something is `wrong`.
 
         "not judged" if a run without judgement passes.
         """
-        found: list[Words] = ["fail" if self.wrong else "pass"]
-        found += [cell.words for cell in self.cells if cell.status != "unavailable"]
-        worst = max(found, key=SEVERITY.index)
+        words: list[VerdictWords] = ["fail" if self.wrong else "pass"]
+        words += [cell.verdict_words for cell in self.cells if cell.status != "unavailable"]
+        worst = max(words, key=SEVERITY.index)
         return "not judged" if worst == "pass" and not self.judged else worst
 
     @property
     def verdict(self) -> Verdict:
         """The verdict for machines, as that of a cell."""
-        return VERDICTS[self.words]
+        return FOR_MACHINES[self.verdict_words]
 
     @property
     def exit_code(self) -> int:
@@ -325,7 +309,7 @@ class Run(Stored):
     @property
     def without_tolerance(self) -> int:
         """Number of figures that need a tolerance and have none yet; none of them passes."""
-        return sum(check.words == "no tolerance yet" for _, check in self.checks())
+        return sum(check.waits_for_tolerance for _, check in self.checks())
 
     def checks(self) -> Iterator[tuple[Cell, Check]]:
         """All checks with their cells."""

@@ -20,6 +20,7 @@ from rockcheck.validation.suite import (
     results,
     scene_results,
     tolerances,
+    verdict_scale,
 )
 from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.playing import SuiteTasks
@@ -32,7 +33,7 @@ def run_suite(
     *,
     jobs: int | None = None,
     force: bool = False,
-    strict: results.Strict = False,
+    strict: verdict_scale.Strict = False,
     scheduler: str | None = None,
     on_progress: progress.OnProgress = progress.unheard,
 ) -> results.Run:

@@ -22,7 +22,7 @@ import math
 
 from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import results
+from rockcheck.validation.suite import results, verdict_scale
 from rockcheck.validation.suite.tolerances import Tolerance
 from rockcheck.validation.uncertainty.numerical import Numerical
 
@@ -76,7 +76,7 @@ def judge(
     line = tolerance or Tolerance(limit=0.0)
     floor = measure.resolution if floor is None else floor
     value = figure.value
-    verdict: results.CheckVerdict = "fail"
+    verdict: verdict_scale.CheckVerdict = "fail"
     if figure.undefined:
         verdict, reason = "not defined", figure.note
     elif value is None or not math.isfinite(value):
@@ -110,7 +110,7 @@ def _verdict(
     floor: float,
     kind: results.Kind,
     perfect: float | None,
-) -> tuple[results.CheckVerdict, str]:
+) -> tuple[verdict_scale.CheckVerdict, str]:
     """The verdict by the table at the top of this module, and why the figure is no plain pass.
 
     `perfect`: the value to which a better one is nearer, None where it is not known.

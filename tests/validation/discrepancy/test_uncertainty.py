@@ -22,7 +22,7 @@ from rockcheck import (
 from rockcheck.ebm.batch import pack, run_batch
 from rockcheck.scenes import experience, files
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import across, explain, results, suites, tables
+from rockcheck.validation.suite import explain, job_page, model_bias, results, suites
 from rockcheck.validation.suite.runner import run_suite
 from rockcheck.validation.uncertainty import numerical, population
 
@@ -195,7 +195,7 @@ def test_bias_and_scatter_are_recovered_and_cover():
     chance = np.random.default_rng(2)
     truth = chance.uniform(0.1, 0.9, 4000)
     model = 1.1 * truth * np.exp(0.05 * chance.standard_normal(4000) - 0.5 * 0.05**2)
-    trust = across.trust_in(list(zip(truth[:2000], model[:2000], strict=True)))
+    trust = model_bias.trust_in(list(zip(truth[:2000], model[:2000], strict=True)))
     assert (trust.bias, trust.scatter) == (
         pytest.approx(1.1, rel=5e-3),
         pytest.approx(0.05, rel=0.05),
@@ -262,7 +262,7 @@ def test_a_suite_explains_its_differences(uncertain, written, tmp_path):
     assert said["theta_rms"].u_input > 0.0
     assert {e.verdict for e in cells["coarse"].explanations} == {numerical.NOT_CONVERGED}
     assert run.inputs["shelf"].names == ("floor.friction", "walls.left.gap", "excitation.amplitude")
-    assert "not converged" in tables.markdown(run)
+    assert "not converged" in job_page.markdown(run)
     read_back = [cell.explanations for cell in again.cells]
     assert (again.up_to_date, read_back) == (4, [cell.explanations for cell in run.cells])
 

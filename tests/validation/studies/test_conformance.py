@@ -19,7 +19,7 @@ from rockcheck.ebm.ties import ties_of
 from rockcheck.scenes import writing
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.conformance import cards
-from rockcheck.validation.studies.conformance.cards import VERDICTS, Conformance
+from rockcheck.validation.studies.conformance.cards import WORDINGS, Conformance
 from rockcheck.validation.studies.conformance.changes import changes
 from rockcheck.validation.studies.conformance.export import STATE
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA, SCENES
@@ -181,7 +181,7 @@ def test_an_engine_gets_a_card_on_which_what_fails_is_known(name, settings, lack
     wrong, reported = verdicts(found, "fail", "error"), verdicts(found, "reported")
     assert (wrong, reported, found.exit_code) == (failing, {"RC-18", "RC-29"}, bool(failing))
     (engine,) = found.table("engines").records()
-    assert sum(engine.get(verdict, 0) for verdict in VERDICTS) == engine["total"]
+    assert sum(engine.get(verdict, 0) for verdict in WORDINGS) == engine["total"]
     assert engine["total"] == len(PHENOMENA)
     assert (engine["lacks"], bool(engine["version"])) == (lacks, True)
 

@@ -7,7 +7,14 @@ import pytest
 from rockcheck.ebm import EventBasedModel
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.store import COMPARISONS, Store
-from rockcheck.validation.suite import comparing, results, scene_results, suites, tables
+from rockcheck.validation.suite import (
+    comparing,
+    job_page,
+    results,
+    run_summary,
+    scene_results,
+    suites,
+)
 from rockcheck.validation.suite.runner import run_suite
 
 FLAT = "moreau or leading-first"
@@ -116,12 +123,14 @@ def test_outcomes_and_peaks_are_judged_by_the_nearest_law_and_histories_until_th
 
 
 def test_the_summary_names_the_laws_and_nothing_depends_on_them(run, suite_file, tmp_path):
-    assert "not judged" in tables.markdown(run)
-    laws = {(one["scene"], one["model"]): one["impact_law"] for one in tables.summary(run)["cells"]}
+    assert "not judged" in job_page.markdown(run)
+    laws = {
+        (one["scene"], one["model"]): one["impact_law"] for one in run_summary.summary(run)["cells"]
+    }
     assert (laws["of the law", "mujoco"], laws["plastic", "mujoco"]) == ("closed", None)
     silent = tuple(cell.model_copy(update={"impact_law": None}) for cell in run.cells)
     untold = run.model_copy(update={"cells": silent})
-    assert "not judged" not in tables.markdown(untold)
+    assert "not judged" not in job_page.markdown(untold)
     assert untold.verdict == run.verdict
     run.save(tmp_path)
     assert results.Run.load(tmp_path) == run

@@ -9,7 +9,15 @@ import pytest
 
 from rockcheck import Block, Floor, Rest, Scene, compare
 from rockcheck.validation.discrepancy import figures
-from rockcheck.validation.suite import across, results, tables, tolerances, verdicts
+from rockcheck.validation.suite import (
+    junit,
+    limits_used,
+    reasons,
+    results,
+    run_changes,
+    tolerances,
+    verdicts,
+)
 from rockcheck.validation.uncertainty import numerical
 
 SCENE = Scene(
@@ -189,7 +197,7 @@ def test_the_rule(measure, line, more, values):
 def test_the_share_of_its_limit_that_a_figure_uses(measure, line, shares):
     tolerance = line and tolerances.Tolerance(**line)
     assert {
-        value: tables.used(check(measure, value, tolerance, beside=0.0)) for value in shares
+        value: limits_used.used(check(measure, value, tolerance, beside=0.0)) for value in shares
     } == shares
 
 
@@ -236,12 +244,12 @@ NOTHING = check("peak_ratio", None, None, note="not defined here: the reference 
 def test_what_is_better_passes_unless_both_are_asked_for(strict, codes, failures):
     better = run_of(BETTER, PASSES, strict=strict)
     assert (better.exit_code, run_of(CHANGED, strict=strict).exit_code) == codes
-    (line,) = tables.improvements(better)
+    (line,) = reasons.improvements(better)
     assert line.startswith("s, m: theta_rms against r: 0.001 was 0.1")
     assert (
         better.verdict,
-        list(tables.verdict_lines(better)),
-        ET.fromstring(tables.junit(better)).get("failures"),
+        list(reasons.verdict_lines(better)),
+        ET.fromstring(junit.junit(better)).get("failures"),
     ) == ("pass", [], str(failures))
 
 
@@ -268,7 +276,7 @@ def test_a_ratio_to_nothing_is_not_defined(made, reference, candidate, defined):
 
 def test_what_is_not_defined_neither_passes_nor_fails():
     line = tolerances.Tolerance(expected=1.0, limit=0.1, drift=0.01)
-    assert NOTHING.words == "not defined"
+    assert NOTHING.verdict_words == "not defined"
     notes = (NOTHING.reason, "m has no column theta")
     verdicts = [check("peak_ratio", None, line, note=note).verdict for note in notes]
     assert verdicts == ["not defined", "fail"]
@@ -277,7 +285,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
         run.verdict,
         run.exit_code,
         run.without_tolerance,
-        ET.fromstring(tables.junit(run)).get("skipped"),
+        ET.fromstring(junit.junit(run)).get("skipped"),
     ) == ("pass", 0, 0, "1")
     assert run_of(NOTHING).verdict == "fail", "a run that judges nothing does not pass"
 
@@ -287,7 +295,7 @@ def test_what_is_not_defined_neither_passes_nor_fails():
     ("values", "moved"), [((1e-15, -3e-17), False), ((1e-15, 1e-3), True), ((0.0, None), True)]
 )
 def test_what_moves_within_its_resolution_is_no_trend(name, values, moved):
-    assert across._moved(name, *values) == moved
+    assert run_changes.has_moved(name, *values) == moved
 
 
 SUITE = """

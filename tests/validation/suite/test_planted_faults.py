@@ -12,7 +12,7 @@ import planted
 import pytest
 
 from rockcheck.validation.execute.models import REFERENCE, Work
-from rockcheck.validation.suite import results, suites
+from rockcheck.validation.suite import results, suites, verdict_scale
 from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.runner import run_suite
 
@@ -63,7 +63,7 @@ def with_faults(name: str, faults: Sequence[str], places: Sequence[str]) -> Suit
 
 
 def out_of_tolerance(
-    run: results.Run, fault: str, place: str, strict: results.Strict = False
+    run: results.Run, fault: str, place: str, strict: verdict_scale.Strict = False
 ) -> Iterator[str]:
     """Scene and figure by which a run fails the model with a fault."""
     for cell in run.cells:

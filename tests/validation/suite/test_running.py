@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 from rockcheck.validation.execute.pool import Call, Pool
-from rockcheck.validation.suite import results, suites, tables
+from rockcheck.validation.suite import junit, reasons, results, suites
 from rockcheck.validation.suite.playing import SuiteTasks
 from rockcheck.validation.suite.runner import run_suite
 
@@ -116,12 +116,12 @@ def test_a_model_that_is_not_installed_is_named(tmp_path, run, monkeypatch, stri
     }
     failed = int(strict and status == "absent")
     verdict = "incomplete" if status == "absent" else "pass"
-    assert (done.verdict, done.exit_code, list(tables.verdict_lines(done))) == (
+    assert (done.verdict, done.exit_code, list(reasons.verdict_lines(done))) == (
         verdict,
         failed,
         ["pybullet: not installed: so"],
     )
-    (suite,) = ElementTree.fromstring(tables.junit(done))
+    (suite,) = ElementTree.fromstring(junit.junit(done))
     assert [int(suite.get(name)) for name in ("skipped", "failures")] == [1 - failed, failed]
 
 
@@ -223,7 +223,7 @@ def test_missing_tolerance_missing_cell_and_nothing_judged_do_not_pass(
 ):
     done = run(write_suite(tmp_path, models, tolerances))
     assert [check.reason for _, check in done.checks()] == reasons
-    assert (done.faults, done.without_tolerance, done.words, done.exit_code) == (
+    assert (done.faults, done.without_tolerance, done.verdict_words, done.exit_code) == (
         faults,
         missing,
         words,

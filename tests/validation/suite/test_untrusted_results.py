@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 
 from rockcheck.validation.execute.store import COMPARISONS, HISTORIES, Store
-from rockcheck.validation.suite import results, suites, tables
+from rockcheck.validation.suite import job_page, junit, results, suites
 from rockcheck.validation.suite.runner import run_suite
 
 SUITE = """
@@ -149,11 +149,11 @@ def test_names_in_the_summary_and_in_junit_are_text():
         models=(EVIL,),
         cells=(results.Cell(scene=EVIL, model=EVIL, status="failed", reason=EVIL),),
     )
-    text = tables.markdown(made)
+    text = job_page.markdown(made)
     assert text.replace("\n", "").isprintable()
     assert len([line for line in text.splitlines() if line.startswith("#")]) == 1
     bare = re.sub(r"\\[\[\]`!]", "", text)
     assert [mark for mark in ("<", "://", "](", "![", "`") if mark in bare] == []
     rows = [line.replace("\\|", "") for line in text.splitlines() if line.startswith("|")]
     assert [row.count("|") for row in rows] == [3] * 3
-    assert ElementTree.fromstring(tables.junit(made)).get("errors") == "1"
+    assert ElementTree.fromstring(junit.junit(made)).get("errors") == "1"

@@ -6,7 +6,16 @@ import xml.etree.ElementTree as ET
 import pytest
 
 from rockcheck.validation.discrepancy import figures, impact_laws, measures
-from rockcheck.validation.suite import results, tables, tolerances, verdicts
+from rockcheck.validation.suite import (
+    job_page,
+    junit,
+    results,
+    run_summary,
+    run_tables,
+    shown_scenes,
+    tolerances,
+    verdicts,
+)
 from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 EXACT = tolerances.Tolerance(expected=1.0, limit=0.0, drift=0.0, why="the same outcome")
@@ -68,7 +77,7 @@ def totals(element: ET.Element) -> dict[str, int]:
 @pytest.mark.parametrize(("strict", "failures"), [(False, [1, 1, 1]), (True, [2, 2, 1])])
 def test_totals_and_failures_of_the_junit_file(strict, failures):
     root = ET.fromstring(
-        tables.junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
+        junit.junit(run_of(*MIXED, strict=strict, faults=("s.m.r: theta_rms: no such cell",)))
     )
     suites = {suite.get("name"): suite for suite in root.iter("testsuite")}
     assert {name: totals(suite) for name, suite in suites.items()} == {
@@ -94,7 +103,7 @@ def test_totals_and_failures_of_the_junit_file(strict, failures):
 @pytest.mark.parametrize(("read_back", "seconds"), [(False, 7.5), (True, 0.0)])
 def test_a_cell_that_was_read_back_took_no_time(read_back, seconds):
     ran = cell("a", "m", cost=results.CostRecord(worker_seconds=7.5), read_back=read_back)
-    assert float(ET.fromstring(tables.junit(run_of(ran))).find("testsuite").get("time")) == seconds
+    assert float(ET.fromstring(junit.junit(run_of(ran))).find("testsuite").get("time")) == seconds
 
 
 SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
@@ -113,7 +122,7 @@ SURE = Quantity(name="theta_peak", unit="alpha", value=0.5, verdict="converged")
 )
 def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, marks):
     numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
-    root = ET.fromstring(tables.junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
+    root = ET.fromstring(junit.junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
     cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
     assert ([[(one.tag, one.get("message")) for one in case] for case in cases], totals(root)) == (
         marks,
@@ -128,7 +137,7 @@ def test_the_table_of_laws_has_the_models_that_met_a_landing():
         for law in ("closed", "open")
     }
     cells = (cell(*names, impact_law=met.get(law)) for names, law in laws.items())
-    table = tables.markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
+    table = job_page.markdown(run_of(*cells)).split("(not judged):")[1].strip().splitlines()
     rows = [[entry.strip() for entry in line.strip("|").split("|")] for line in table]
     assert [rows[0], *rows[2:]] == [
         ["scene", "landing", "m", "n"],
@@ -138,7 +147,7 @@ def test_the_table_of_laws_has_the_models_that_met_a_landing():
 
 
 def test_the_summary_names_what_is_not_a_pass():
-    text = tables.markdown(run_of(*MIXED))
+    text = job_page.markdown(run_of(*MIXED))
     said = (
         "## 💥 rockcheck mine: error",
         "3 simulations, 0 up to date, 5 checks",
@@ -150,37 +159,37 @@ def test_the_summary_names_what_is_not_a_pass():
 def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     """The one that is out of tolerance, the nearest to their limits, and all ensembles; JUnit has
     every scene."""
-    near = [cell(f"near {n}", "m", check(0.4)) for n in range(tables.MOST_SHOWN - 1)]
+    near = [cell(f"near {n}", "m", check(0.4)) for n in range(shown_scenes.MOST_SHOWN - 1)]
     far = [cell(f"far {n}", "m", check(0.25)) for n in range(30)]
     drawn = results.EnsembleRecord(name="drawn", definition={}, peaks={}, outcomes={})
     worst = (cell("drawn", "m", check(0.1)), *near, cell("out", "m", WAITS, check(0.75)))
     run = run_of(*far[:10], *worst[:-1], *far[10:], worst[-1], ensembles=(drawn,))
-    assert tables.shown(run) == tuple(one.scene for one in worst)
-    assert tables.shown(run_of(*near)) == tuple(one.scene for one in near)
-    found = tables.finding_of(run)
+    assert shown_scenes.shown(run) == tuple(one.scene for one in worst)
+    assert shown_scenes.shown(run_of(*near)) == tuple(one.scene for one in near)
+    found = run_tables.finding_of(run)
     rows, (wrong, better) = found.table("verdicts").rows, found.blocks[2:4]
     # what fails is worse than what waits for a tolerance
     assert (len(rows), rows[0][2], rows[-1][3]) == (
-        tables.MOST_SHOWN + 1,
+        shown_scenes.MOST_SHOWN + 1,
         worst[0].checks[0].figure.windowed,
         1.5,
     )
     assert (wrong.verdict, bool(better.text)) == ("fail", True)
-    text = tables.markdown(run)
+    text = job_page.markdown(run)
     # the number of the others is not a row of the table
     assert [words in text for words in ("| out |", "|\n\nand 30 more scenes", "| far 3 |")] == [
         True,
         True,
         False,
     ]
-    assert len(ET.fromstring(tables.junit(run)).findall("testsuite")) == len(run.cells)
+    assert len(ET.fromstring(junit.junit(run)).findall("testsuite")) == len(run.cells)
 
 
 def test_the_summary_of_a_run_that_is_wrong_everywhere_has_an_end():
-    text = tables.markdown(
-        run_of(*(cell(f"s{n}", "m", check(0.75)) for n in range(tables.MOST_SHOWN + 7)))
+    text = job_page.markdown(
+        run_of(*(cell(f"s{n}", "m", check(0.75)) for n in range(shown_scenes.MOST_SHOWN + 7)))
     )
-    assert text.count("is more than 0.5") == tables.MOST_SHOWN
+    assert text.count("is more than 0.5") == shown_scenes.MOST_SHOWN
     assert "- and 7 more, in junit.xml" in text
 
 
@@ -201,7 +210,7 @@ WAITS = check(0.25).model_copy(update={"limit": None, "verdict": "fail"})
     ],
 )
 def test_what_waits_for_its_tolerance_has_not_failed_unless_something_else_has(one, words):
-    assert one.words == words
+    assert one.verdict_words == words
 
 
 ABSENT = results.Cell(scene="a", model="n", status="absent", reason="needs it")
@@ -230,12 +239,12 @@ def test_the_worst_cell_is_the_verdict_of_the_run_and_has_its_exit_code(
         (
             run.verdict,
             run.exit_code,
-            any(f"<{red}" in tables.junit(run) for red in ("failure ", "error ")),
+            any(f"<{red}" in junit.junit(run) for red in ("failure ", "error ")),
         )
         for run in runs
     ] == [(verdict, code, code > 0), (verdict, strict, strict > 0)]
-    assert (runs[0].words == "not judged") == (not more.get("judged", True))
-    assert [one.get("verdict") for one in tables.summary(runs[0])["cells"]] == [
+    assert (runs[0].verdict_words == "not judged") == (not more.get("judged", True))
+    assert [one.get("verdict") for one in run_summary.summary(runs[0])["cells"]] == [
         None if "judged" in more or not (one.checks or one.reason) else one.verdict for one in cells
     ]
 
@@ -277,7 +286,7 @@ ALONE = check(0.9, "x_rms", against="")
     ],
 )
 def test_the_row_of_a_scene(cells, judged, row):
-    lines = tables.markdown(run_of(*cells, judged=judged)).splitlines()
+    lines = job_page.markdown(run_of(*cells, judged=judged)).splitlines()
     assert [line for line in lines if line.startswith("| a |")] == [row]
 
 

@@ -32,7 +32,7 @@ class Wording:
     many: str
 
 
-VERDICTS: dict[str, Wording] = {
+WORDINGS: dict[str, Wording] = {
     "pass": Wording("conforms", "pass", "", "conforms", "conform"),
     "fail": Wording("fails", "fail", "failed", "fails", "fail"),
     "lacks": Wording("has none", "incomplete", "skipped", "is lacking", "are lacking"),
@@ -171,7 +171,7 @@ def card_of(player: Player, results: Mapping[str, Result | pool.Failure]) -> Car
         "settings": player.setup,
         "step": player.step,
         "title": " ".join(filter(None, [player.label, version])) + f", {player.setup}",
-        "counts": {verdict: counts[verdict] for verdict in VERDICTS} | {"total": len(rows)},
+        "counts": {verdict: counts[verdict] for verdict in WORDINGS} | {"total": len(rows)},
         "phenomena": rows,
         "notes": list(dict.fromkeys(notes)),
     }
@@ -179,9 +179,9 @@ def card_of(player: Player, results: Mapping[str, Result | pool.Failure]) -> Car
 
 def answer_of(cards: Sequence[Card], conforming: int) -> str:
     """The last line: counts that add up."""
-    totals = {verdict: sum(card["counts"][verdict] for card in cards) for verdict in VERDICTS}
+    totals = {verdict: sum(card["counts"][verdict] for card in cards) for verdict in WORDINGS}
     words = [
-        f"{count} {VERDICTS[verdict].one if count == 1 else VERDICTS[verdict].many}"
+        f"{count} {WORDINGS[verdict].one if count == 1 else WORDINGS[verdict].many}"
         for verdict, count in totals.items()
         if count
     ]
@@ -195,7 +195,7 @@ def junit_of(cards: Sequence[Card]) -> str:
     for card in cards:
         cases = []
         for row in card["phenomena"]:
-            ended = VERDICTS[row["verdict"]].junit
+            ended = WORDINGS[row["verdict"]].junit
             name = f"{row['id']} {row['name']}"
             cases.append((card["title"], name, ended, row["reason"], "", None))
         suites.append((card["title"], cases))
@@ -219,10 +219,10 @@ def engines_table(cards: Sequence[Card]) -> Table:
     """Counts by card; the column of absent files stands where there are any."""
     shown = [
         verdict
-        for verdict in VERDICTS
+        for verdict in WORDINGS
         if verdict != "absent" or any(card["counts"]["absent"] for card in cards)
     ]
-    columns = [Column(verdict, VERDICTS[verdict].column) for verdict in shown]
+    columns = [Column(verdict, WORDINGS[verdict].column) for verdict in shown]
     return Table(
         "engines",
         [*HEAD, *columns, Column("total")],
@@ -256,7 +256,7 @@ def cards_table(cards: Sequence[Card]) -> Table:
 def mark_of(row: Mapping[str, Any]) -> Mark:
     """The value of a row with its verdict's colour."""
     digits = 6 if (row["limit"] or 1.0) < 1e-3 else 3
-    return Mark(row["value"], VERDICTS[row["verdict"]].colour, row["reason"], digits=digits)
+    return Mark(row["value"], WORDINGS[row["verdict"]].colour, row["reason"], digits=digits)
 
 
 def lines_of_faults(cards: Sequence[Card]) -> list[str]:
