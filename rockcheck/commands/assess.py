@@ -27,7 +27,13 @@ from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, Scene, Side, files, printable
 from rockcheck.validation.execute import models
 from rockcheck.validation.paper import FREQUENCIES
-from rockcheck.validation.studies.population import intensities, plan
+from rockcheck.validation.studies.population import intensity_measures, plan
+from rockcheck.validation.studies.population.levels import (
+    CAPACITIES,
+    Levels,
+    levels_of_pulses,
+    levels_of_records,
+)
 from rockcheck.validation.studies.population.study import Assessment
 from rockcheck.validation.suite import motions
 
@@ -227,27 +233,27 @@ def gap_values(text: str) -> tuple[float, ...]:
     return gaps
 
 
-def measure_of(levels: str | None, *, recorded: bool) -> intensities.Measure:
+def measure_of(levels: str | None, *, recorded: bool) -> intensity_measures.Measure:
     """The measure that `--levels` names. Raises `InputError`.
 
     Without a name it is PGA; of bounds without records, which scale pulses, over g tan(alpha).
     """
     words = (levels or "pga").split(":")
     if words[0] == "sa":
-        return intensities.measure_of(":".join(words[:2]))
+        return intensity_measures.measure_of(":".join(words[:2]))
     if words[0][:1].isdigit():
-        return intensities.measure_of("pga" if recorded else "pga-ratio")
-    return intensities.measure_of(words[0])
+        return intensity_measures.measure_of("pga" if recorded else "pga-ratio")
+    return intensity_measures.measure_of(words[0])
 
 
-def has_bounds(levels: str | None, measure: intensities.Measure) -> bool:
+def has_bounds(levels: str | None, measure: intensity_measures.Measure) -> bool:
     """Whether `--levels` says more than the measure."""
     return levels is not None and levels != measure.name
 
 
 def levels_of(
-    varied: Varied, measure: intensities.Measure, planned: plan.Plan, *, recorded: bool
-) -> intensities.Levels:
+    varied: Varied, measure: intensity_measures.Measure, planned: plan.Plan, *, recorded: bool
+) -> Levels:
     """The population that `--levels` asks for: MEASURE:LOW:HIGH:COUNT. Raises `InputError`.
 
     An incremental dynamic analysis under records; without any, the fragility under pulses of the
@@ -271,10 +277,10 @@ def levels_of(
     values = np.linspace(low, high, int(count))
     model: dict[str, Any] = {"model": planned.batch_model, "settings": planned.batch_settings}
     if recorded:
-        capacities = varied.capacity or intensities.CAPACITIES
-        return intensities.ida(
+        capacities = varied.capacity or CAPACITIES
+        return levels_of_records(
             planned.cases, values, measure, **model, capacities=tuple(capacities)
         )
     if measure.name != "pga-ratio":
         raise InputError(f"{measure.name} needs records; of pulses it is pga-ratio", "--levels")
-    return intensities.fragility(planned.own.scene, values, FREQUENCIES, **model)
+    return levels_of_pulses(planned.own.scene, values, FREQUENCIES, **model)

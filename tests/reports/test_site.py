@@ -20,7 +20,7 @@ from rockcheck.reports.tables import worst_first
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
 from rockcheck.validation.suite import limits_used, results
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 
 
 def addresses(text: str) -> list[str]:
@@ -218,7 +218,7 @@ def test_pages_made_side_by_side_are_those_made_one_by_one(tmp_path, site, finis
 
 def test_pages_are_written_again_and_those_of_scenes_that_are_gone_go(tmp_path, finished):
     write_site(tmp_path)
-    inputs = population.Inputs(
+    inputs = input_spread.Inputs(
         samples=7,
         model="ebm",
         names=("mu",),

@@ -28,20 +28,20 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.conformance.cards import cards_table
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA
-from rockcheck.validation.studies.population.intensities import (
-    Levels,
+from rockcheck.validation.studies.population.level_blocks import (
     curve_plot,
     curve_table,
     fit_table,
     line_blocks,
 )
+from rockcheck.validation.studies.population.levels import Levels
 from rockcheck.validation.studies.spectrum import scene_node
 from rockcheck.validation.studies.spectrum.study import Spectra
 from rockcheck.validation.studies.spectrum.tiles import Played, Request
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import Saving
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty.fragility import curve_of
 
 pytestmark = pytest.mark.browser
 SIZE = 20
@@ -120,7 +120,7 @@ def fragility() -> Finding:
     level = np.linspace(0.5, 5.0, 10)
     fell = np.random.default_rng(1).random((20, 2, 1)) < np.linspace(0.0, 1.0, 10)
     curves = [
-        population.curve_of(label, fell, np.zeros_like(fell), level)
+        curve_of(label, fell, np.zeros_like(fell), level)
         for label in ("with the wall", "without a wall")
     ]
     levels = levels_at(level, Column("intensity", "peak acceleration / (g tan α)"), per_g=0.2)

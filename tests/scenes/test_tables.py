@@ -11,7 +11,7 @@ from rockcheck.scenes.recordings.layout import has_decimal_commas, is_ambiguous_
 from rockcheck.scenes.recordings.order import Shape, are_times, runs_along_rows
 from rockcheck.scenes.recordings.recording import known_unit
 from rockcheck.scenes.recordings.tables import unit_of_name
-from rockcheck.validation.studies.population.intensities import measure_of
+from rockcheck.validation.studies.population.intensity_measures import measure_of
 from rockcheck.validation.suite.motions import RecordSet
 
 VALUES = np.sin(0.3 * np.arange(100))

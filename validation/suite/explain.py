@@ -11,7 +11,7 @@ from rockcheck.scenes import Scene
 from rockcheck.validation.discrepancy.figures import Figure
 from rockcheck.validation.discrepancy.impacts import SAME_IMPACT
 from rockcheck.validation.suite import results
-from rockcheck.validation.uncertainty import numerical, population
+from rockcheck.validation.uncertainty import input_spread, numerical
 
 #: Quantities whose differences are explained, with their units.
 QUANTITIES = {"theta_rms": "alpha", "peak_rotation": "alpha", "last_slip": "m"}
@@ -23,7 +23,7 @@ def explanations(
     cell: results.Cell,
     references: Iterable[results.Cell],
     scatters: Mapping[str, Mapping[str, float]],
-    inputs: population.Inputs | None,
+    inputs: input_spread.Inputs | None,
 ) -> Iterator[numerical.Explanation]:
     """The verdict on each quantity of a cell against each reference.
 
@@ -49,7 +49,7 @@ def _quantity_verdicts(
     reference: results.Cell,
     both_errors: Sequence[numerical.Numerical],
     scatters: Mapping[str, Mapping[str, float]],
-    inputs: population.Inputs | None,
+    inputs: input_spread.Inputs | None,
 ) -> Iterator[numerical.Explanation]:
     """The verdict on each quantity that differs in a comparable way."""
     for quantity, unit in QUANTITIES.items():
@@ -72,7 +72,7 @@ def _quantity_verdicts(
         )
 
 
-def _u_input(quantity: str, inputs: population.Inputs | None) -> float:
+def _u_input(quantity: str, inputs: input_spread.Inputs | None) -> float:
     """The uncertainty that the inputs cause, 0 where it is not known."""
     if inputs is None:
         return 0.0
@@ -102,7 +102,7 @@ def _end_time(figures: Sequence[Figure]) -> float:
 def _outcome_verdict(
     against: str,
     both_errors: Sequence[numerical.Numerical],
-    inputs: population.Inputs | None,
+    inputs: input_spread.Inputs | None,
 ) -> numerical.Explanation:
     """The verdict on two different outcomes; a falling block's peaks and slips do not compare."""
     reasons = [reason for error in both_errors for reason in error.reasons]

@@ -41,7 +41,7 @@ from rockcheck.validation.suite.verdict_scale import (
     Strict,
     VerdictWords,
 )
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 from rockcheck.validation.uncertainty.numerical import Explanation, Numerical
 
 RUN_FILE = "run.json"
@@ -250,7 +250,7 @@ class Run(Stored):
     tolerances_file: str = ""
     ensembles: tuple[EnsembleRecord, ...] = ()
     #: By scene, the effect of the spread of its inputs on its figures.
-    inputs: dict[str, population.Inputs] = Field(default_factory=dict)
+    inputs: dict[str, input_spread.Inputs] = Field(default_factory=dict)
     #: Scenes whose figure for a paper is drawn.
     printed: tuple[str, ...] = ()
 

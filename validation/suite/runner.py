@@ -24,7 +24,7 @@ from rockcheck.validation.suite import (
 )
 from rockcheck.validation.suite.cells import Suite
 from rockcheck.validation.suite.playing import SuiteTasks
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 
 
 def run_suite(
@@ -114,7 +114,7 @@ def _explained(
     tasks: SuiteTasks,
     scene_name: str,
     cells: list[results.Cell],
-    inputs: population.Inputs | None,
+    inputs: input_spread.Inputs | None,
 ) -> Iterator[results.Cell]:
     """The cells of a scene with the verdicts on their differences from the references.
 

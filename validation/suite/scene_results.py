@@ -15,7 +15,7 @@ from rockcheck.validation.discrepancy import impact_laws
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.execute.store import COMPARISONS, Store, name_of
 from rockcheck.validation.suite import tolerances
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 
 T = TypeVar("T")
 
@@ -43,18 +43,18 @@ def horizon_of(store: Store, scene: Scene) -> float:
     return _kept(store, scene, tolerances.HORIZON, horizon.__name__, float, computed)
 
 
-def input_effects_of(store: Store, uncertain: files.UncertainScene) -> population.Inputs:
+def input_effects_of(store: Store, uncertain: files.UncertainScene) -> input_spread.Inputs:
     """The effect of the spread of a scene's inputs on its figures."""
 
-    def propagated() -> population.Inputs:
-        return population.propagate(uncertain)
+    def propagated() -> input_spread.Inputs:
+        return input_spread.propagate(uncertain)
 
     return _kept(
         store,
         uncertain.scene,
         "inputs",
-        population.__name__,
-        population.Inputs,
+        input_spread.__name__,
+        input_spread.Inputs,
         propagated,
         spreads={key: spread.model_dump() for key, spread in uncertain.spreads.items()},
         correlation=uncertain.correlation.tolist(),

@@ -7,7 +7,7 @@ import pytest
 from rockcheck import Block, EventBasedModel, Floor, Scene
 from rockcheck.scenes import files
 from rockcheck.validation.suite import motions
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 
 BLOCK = Block(half_width=0.3, half_height=1.0)
 NORMAL = 1.959964
@@ -36,7 +36,7 @@ def span(one):
 
 
 def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
-    inputs = population.propagate(tilted(0.5), indices=False)
+    inputs = input_spread.propagate(tilted(0.5), indices=False)
     peak = pytest.approx((0.5, 0.5 - 0.05 * NORMAL, 0.5 + 0.05 * NORMAL), abs=2e-3)
     assert [(one.name, one.unit, span(one)) for one in inputs.figures] == [
         ("peak_rotation", "alpha", peak),
@@ -45,14 +45,14 @@ def test_the_peak_of_free_rocking_is_spread_as_its_first_tilt():
     sure = [inputs.u_input(name) for name in ("peak_rotation", "end_time")]
     assert (sure, inputs.samples, inputs.model, inputs.sensitivities) == (
         [pytest.approx(0.05 * NORMAL, abs=2e-3), None],
-        population.SAMPLES,
+        input_spread.SAMPLES,
         "ebm-unilateral",
         (),
     )
-    wilson = NORMAL**2 / (population.SAMPLES + NORMAL**2)
+    wilson = NORMAL**2 / (input_spread.SAMPLES + NORMAL**2)
     assert span(inputs.overturns) == pytest.approx((0.0, 0.0, wilson), rel=1e-3, abs=1e-12)
     # Just after the start the rotations are still spread as the first ones.
-    early = population.propagate(tilted(0.5, duration=0.02), indices=False)
+    early = input_spread.propagate(tilted(0.5, duration=0.02), indices=False)
     assert early.u_input("theta_rms") == pytest.approx(0.05 * NORMAL, abs=1e-3)
 
 
@@ -65,28 +65,28 @@ def test_the_slip_of_a_block_that_slides_to_a_stop_is_spread_as_its_friction():
         initial_velocity=1.0,
     )
     given = files.uncertain_scene(sliding, {"floor.friction": files.Spread(low=0.2, high=0.4)}, {})
-    found = population.propagate(given, indices=False).figures[1]
+    found = input_spread.propagate(given, indices=False).figures[1]
     stops = [1.0 / (2.0 * friction * sliding.gravity) for friction in (0.3, 0.395, 0.205)]
     assert (found.name, span(found)) == ("last_slip", pytest.approx(stops, rel=1e-3))
 
 
 @pytest.mark.parametrize("value", [0.5, 0.7])
 def test_a_figure_lies_within_its_farther_end(value):
-    one = population.Interval(name="a", unit="", value=value, low=0.4, high=0.8)
-    assert population.Inputs(
+    one = input_spread.Interval(name="a", unit="", value=value, low=0.4, high=0.8)
+    assert input_spread.Inputs(
         samples=2, model="", names=(), figures=(one,), overturns=one, sensitivities=()
     ).u_input("a") == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(
-    ("asked", "drawn"), [(33, 64), (2, 2), (population.SAMPLES, population.SAMPLES)]
+    ("asked", "drawn"), [(33, 64), (2, 2), (input_spread.SAMPLES, input_spread.SAMPLES)]
 )
 def test_draws_of_sobol_are_balanced(asked, drawn):
-    assert population.propagate(tilted(0.5), samples=asked, indices=False).samples == drawn
+    assert input_spread.propagate(tilted(0.5), samples=asked, indices=False).samples == drawn
 
 
 def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
-    found = population.propagate(
+    found = input_spread.propagate(
         tilted(1.0, duration=6.0), model=EventBasedModel(tolerance=1e-8), indices=False
     )
     assert span(found.overturns) == (
@@ -106,26 +106,26 @@ def test_half_of_the_blocks_let_go_at_the_balance_point_fall():
 
 @pytest.mark.parametrize(("tilt", "all_fall"), [(1.05, False), (1.3, True)])
 def test_where_the_scenes_own_block_falls_nothing_is_said_of_a_slip(tilt, all_fall):
-    drawn = population.propagate(tilted(tilt, duration=3.0), samples=64, indices=False)
+    drawn = input_spread.propagate(tilted(tilt, duration=3.0), samples=64, indices=False)
     names = [one.name for one in drawn.figures]
     assert (drawn.overturns.value == 1.0, names) == (all_fall, ["peak_rotation"])
 
 
 def test_what_the_peak_does_not_depend_on_has_no_index():
-    found = population.propagate(tilted(0.5), samples=64)
+    found = input_spread.propagate(tilted(0.5), samples=64)
     assert {one.name: (one.first, one.total) for one in found.sensitivities} | {"": found.note} == {
         "initial_rotation": pytest.approx((1.0, 1.0), abs=0.05),
         "floor.friction": pytest.approx((0.0, 0.0), abs=0.02),
         "": "",
     }
     assert (
-        population.sensitivities(tilted(0.5, given=FRICTION), EventBasedModel(), samples=16) == ()
+        input_spread.sensitivities(tilted(0.5, given=FRICTION), EventBasedModel(), samples=16) == ()
     )
 
 
 def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
     assert "no number of this scene is uncertain" in str(
-        fault_of(population.propagate, tilted(0.5, given={}))
+        fault_of(input_spread.propagate, tilted(0.5, given={}))
     )
 
 
@@ -142,7 +142,7 @@ def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
     ids=["by itself", "under a record"],
 )
 def test_correlated_inputs_have_no_indices_and_a_note_says_so(moved):
-    found = population.propagate(
+    found = input_spread.propagate(
         moved(tilted(0.5, {"initial_rotation, floor.friction": 0.5})), samples=64
     )
     assert (found.sensitivities, "correlated" in found.note) == ((), True)

@@ -24,7 +24,7 @@ from rockcheck.scenes import experience, files
 from rockcheck.validation.discrepancy import figures
 from rockcheck.validation.suite import explain, job_page, model_bias, results, suites
 from rockcheck.validation.suite.runner import run_suite
-from rockcheck.validation.uncertainty import numerical, population
+from rockcheck.validation.uncertainty import input_spread, numerical
 
 BOOKCASE = Scene(
     name="bookcase",
@@ -141,7 +141,7 @@ def test_sobol_indices_agree_with_brute_force(written):
 
     points = chance.random((100_000, len(given.names)))
     found = peaks_of(given, points)
-    shares = {row.name: (row.first, row.total) for row in population.sensitivities(given, model)}
+    shares = {row.name: (row.first, row.total) for row in input_spread.sensitivities(given, model)}
     for k, name in enumerate(given.names):
         inside = [found[(points[:, k] * 50).astype(int) == n] for n in range(50)]
         noise = np.mean([np.var(one, ddof=1) / len(one) for one in inside])
@@ -156,9 +156,11 @@ def test_the_interval_of_the_share_that_falls_covers(uncertain):
     """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as
     often as they should: some fall, and count as 1, so that only its lower end leaves draws out."""
     given = files.load_uncertain_scene(uncertain)
-    many = population.propagate(given, samples=8192, seed=99, indices=False)
+    many = input_spread.propagate(given, samples=8192, seed=99, indices=False)
     peak = many.figures[0]
-    few = [population.propagate(given, samples=32, seed=seed, indices=False) for seed in range(60)]
+    few = [
+        input_spread.propagate(given, samples=32, seed=seed, indices=False) for seed in range(60)
+    ]
     shares = [one.overturns for one in few]
     assert np.mean([one.low <= many.overturns.value <= one.high for one in shares]) >= 0.9
     assert peak.high == 1.0
@@ -267,12 +269,12 @@ def test_a_suite_explains_its_differences(uncertain, written, tmp_path):
     assert (again.up_to_date, read_back) == (4, [cell.explanations for cell in run.cells])
 
 
-FALL_IN_PART = population.Inputs(
+FALL_IN_PART = input_spread.Inputs(
     samples=64,
     model="ebm-unilateral",
     names=("floor.friction",),
     figures=(),
-    overturns=population.Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4),
+    overturns=input_spread.Interval(name="overturns", unit="1", value=0.3, low=0.2, high=0.4),
     sensitivities=(),
 )
 

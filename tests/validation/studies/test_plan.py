@@ -10,7 +10,7 @@ from rockcheck import Rest, Ricker, Wall, load_scene
 from rockcheck.scenes import files
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
-from rockcheck.validation.studies.population.intensities import measure_of
+from rockcheck.validation.studies.population.intensity_measures import measure_of
 from rockcheck.validation.studies.population.plan import (
     GapRange,
     Plan,

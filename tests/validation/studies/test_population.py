@@ -23,19 +23,18 @@ from rockcheck import (
 from rockcheck.scenes import files, recordings
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import Finding
-from rockcheck.validation.studies.population.intensities import (
+from rockcheck.validation.studies.population.intensity_measures import MEASURES, measure_of
+from rockcheck.validation.studies.population.level_blocks import blocks_of
+from rockcheck.validation.studies.population.levels import (
     CAPACITIES,
-    MEASURES,
     PULSES,
-    blocks_of,
-    fragility,
-    ida,
-    measure_of,
+    levels_of_pulses,
+    levels_of_records,
 )
 from rockcheck.validation.studies.population.plan import Plan
 from rockcheck.validation.studies.population.study import Assessment
 from rockcheck.validation.studies.population.tasks import COMPILED_RUN
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import fragility
 
 SCENE = Scene(
     name="rack",
@@ -74,13 +73,13 @@ def cases_of(motions, scene=SCENE):
 
 def lines_at(motions, levels=LEVELS, measure="pga", capacities=CAPACITIES, scene=SCENE):
     cases = cases_of(motions, scene)
-    return ida(
+    return levels_of_records(
         cases, levels, measure_of(measure), "ebm-unilateral", (("tolerance", 1e-8),), capacities
     )
 
 
 def pulses_at(scene, levels=LEVELS, frequencies=(1.0, 2.0)):
-    return fragility(scene, levels, frequencies, "ebm-unilateral", ())
+    return levels_of_pulses(scene, levels, frequencies, "ebm-unilateral", ())
 
 
 def played(levels):
@@ -290,7 +289,7 @@ MANY, OVER = 10**7, np.linspace(0.5, 8.0, 60)
     ],
 )
 def test_the_lognormal_curve_is_found_again(intensities, counts, runs, curve):
-    found = population.fit_lognormal(intensities, counts, np.full(len(counts), runs))
+    found = fragility.fit_lognormal(intensities, counts, np.full(len(counts), runs))
     assert found == pytest.approx(curve, rel=1e-3)
 
 
@@ -298,7 +297,7 @@ def test_a_curve_is_found_where_few_overturn_and_none_where_shares_do_not_rise()
     counts = np.array([0] * 23 + [1, 1, 2, 4, 2, 1, 2, 1, 2, 2, 1, 4, 3, 5, 5, 5, 4])
     intensities = np.linspace(0.02, 2.0, 40)
     found, *none = (
-        population.fit_lognormal(intensities, one, np.full(40, 12))
+        fragility.fit_lognormal(intensities, one, np.full(40, 12))
         for one in (counts, counts[::-1], *(np.full(40, count) for count in (0, 1, 8, 12)))
     )
     assert found == (pytest.approx(2.15, abs=0.25), pytest.approx(0.35, abs=0.15))
@@ -310,10 +309,10 @@ def test_a_fitted_median_lies_inside_its_interval():
     is none."""
     hit = np.array([[[True] * 6] * 2, [[False] * 3 + [True] * 3] * 2, [[False] * 5 + [True]] * 2])
     never = np.zeros_like(hit)
-    curve = population.curve_of("made", hit, never, LEVELS, 200)
+    curve = fragility.curve_of("made", hit, never, LEVELS, 200)
     chance = np.random.default_rng(8)
     draws = [hit[chance.integers(3, size=3)].sum(axis=(0, 1)) for _ in range(400)]
-    medians = [population.fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
+    medians = [fragility.fit_lognormal(LEVELS, drawn, np.full(6, 6))[0] for drawn in draws]
     assert [curve.low, curve.high] == pytest.approx(
         np.nanquantile(medians, [0.025, 0.975]).tolist(), rel=0.2
     )
@@ -321,13 +320,13 @@ def test_a_fitted_median_lies_inside_its_interval():
     assert [point[4] for point in curve.points] == pytest.approx(
         norm.cdf(np.log(LEVELS / curve.median) / curve.dispersion).tolist()
     )
-    assert math.isnan(population.curve_of("made", ~never, never, LEVELS, 200).low)
+    assert math.isnan(fragility.curve_of("made", ~never, never, LEVELS, 200).low)
 
 
 def test_the_band_holds_the_binomial_spread():
     hit = np.zeros((100, 2, 3), dtype=bool)
     hit[:50, :, 1] = hit[:, :, 2] = True  # directions alike: no more is known than from 100 runs
-    none, half, _ = population.curve_of(
+    none, half, _ = fragility.curve_of(
         "made", hit, np.zeros_like(hit), np.array([1.0, 2.0, 3.0])
     ).points
     assert half[1:4] == pytest.approx([0.5, 0.5 - 1.96 * 0.05, 0.5 + 1.96 * 0.05], abs=0.015)
@@ -350,7 +349,7 @@ def test_the_band_covers_as_often_as_it_says(motions, shared):
         alone = math.sqrt(0.4**2 - shared**2) * chance.standard_normal((motions, 2))
         capacity = 1.5 * np.exp(shared * chance.standard_normal((motions, 1)) + alone)
         hit = intensities > capacity[:, :, None]
-        points = np.array(population.curve_of("", hit, np.zeros_like(hit), intensities).points)
+        points = np.array(fragility.curve_of("", hit, np.zeros_like(hit), intensities).points)
         inside.append((points[:, 2] <= truth) & (truth <= points[:, 3]))
     assert np.mean(inside) >= 0.94
     assert np.min(np.mean(inside, axis=0)) >= 0.9
@@ -365,7 +364,7 @@ def test_a_curve_never_counts_a_failed_run_as_safe():
     some[2:, :, 1] = some[0, 0, 2] = True
     all_at_2 = some | (np.arange(3) == 1)
     plain, curve, nowhere, nothing = (
-        population.curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
+        fragility.curve_of("made", hit, failed, np.array([1.0, 2.0, 3.0]))
         for failed in (np.zeros_like(hit), some, all_at_2, np.ones_like(hit))
     )
     assert [[point[1] for point in one.points] for one in (plain, curve, nowhere)] == [
@@ -451,7 +450,7 @@ def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records,
     ) == (
         pytest.approx(
             np.mean(
-                np.isinf(np.reshape(population.play(pulses, models.build(model)), (6, 100))), axis=1
+                np.isinf(np.reshape(fragility.play(pulses, models.build(model)), (6, 100))), axis=1
             )
         ),
         [True, True],

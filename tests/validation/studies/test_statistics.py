@@ -29,7 +29,7 @@ from rockcheck.validation.studies.population import (
     statistics,
 )
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.intensities import measure_of, size_of
+from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
 from rockcheck.validation.studies.population.plan import factors_of, gaps_looked_at
 from rockcheck.validation.studies.population.study import finding_of
 
@@ -339,7 +339,7 @@ def test_runs_without_the_wall_that_fall_are_counted():
 
 def test_the_draws_of_a_run_without_the_wall_count_in_its_place():
     drawn = results.Drawn(results=(RUNS["c"], RUNS["a"], RUNS["b"]))
-    assert statistics.counted_runs(drawn) == (RUNS["a"], RUNS["b"])
+    assert drawn.counted == (RUNS["a"], RUNS["b"])
 
 
 def test_at_a_gap_where_no_wall_is_struck_there_is_no_speed():

@@ -26,7 +26,7 @@ from rockcheck.validation.finding import (
     text,
 )
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.intensities import size_of
+from rockcheck.validation.studies.population.intensity_measures import size_of
 from rockcheck.validation.studies.population.sentences import UNITS, count_of
 from rockcheck.validation.studies.population.statistics import (
     FallAnswer,

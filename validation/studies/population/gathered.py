@@ -55,7 +55,7 @@ class Gathered:
         """
         drawn = self._ended(self.plan.drawn, results.Drawn)
         by_case = {
-            case: [*drawn[case].results[1:]] if case in drawn else [result]
+            case: [*drawn[case].draws] if case in drawn else [result]
             for case, result in self.as_it_is.items()
         }
         return {
@@ -72,7 +72,7 @@ class Gathered:
     def drawn(self) -> dict[str, Sequence[results.RunResult]]:
         """By case, the results of all its draws, in their order."""
         drawn = self._ended(self.plan.drawn, results.Drawn)
-        return {case: result.results[1:] for case, result in drawn.items()}
+        return {case: result.draws for case, result in drawn.items()}
 
     @cached_property
     def others(self) -> dict[str, dict[str, results.RunResult]]:

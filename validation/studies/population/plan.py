@@ -19,7 +19,8 @@ from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
-from rockcheck.validation.studies.population.intensities import Levels, Measure, size_of
+from rockcheck.validation.studies.population.intensity_measures import Measure, size_of
+from rockcheck.validation.studies.population.levels import Levels
 from rockcheck.validation.studies.population.tasks import (
     CertaintyTask,
     Draws,

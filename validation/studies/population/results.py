@@ -14,8 +14,8 @@ from rockcheck.ebm import fates
 from rockcheck.scenes import Side, history
 from rockcheck.scenes.extremes import Extremes
 from rockcheck.validation.discrepancy import figures
+from rockcheck.validation.uncertainty.input_spread import Sensitivity
 from rockcheck.validation.uncertainty.numerical import Numerical
-from rockcheck.validation.uncertainty.population import Sensitivity
 
 #: Fates of a run: the outcomes of a history, then one that nothing decided, and a run that failed.
 UNDECIDED, FAILED = "undecided", "failed"
@@ -116,10 +116,23 @@ class Shown(figures.Stored):
 
 
 class Drawn(figures.Stored):
-    """The results of draws of a scene's uncertain numbers, in the order of the draws."""
+    """The results of draws of a scene's uncertain numbers.
+
+    `results` has the scene as it is first, then its draws in their order.
+    """
 
     kind: Literal["drawn"] = "drawn"
     results: tuple[RunResult, ...]
+
+    @property
+    def draws(self) -> tuple[RunResult, ...]:
+        """The results of the draws; empty where no number is uncertain."""
+        return self.results[1:]
+
+    @property
+    def counted(self) -> tuple[RunResult, ...]:
+        """The runs that count: the draws or, where there are none, the scene as it is."""
+        return self.draws or self.results
 
 
 class FallInterval(figures.Stored):

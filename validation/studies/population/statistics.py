@@ -13,7 +13,7 @@ from rockcheck.scenes import Side
 from rockcheck.validation.discrepancy.compare import QUANTITIES, spread
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.gathered import Gathered
-from rockcheck.validation.studies.population.intensities import size_of
+from rockcheck.validation.studies.population.intensity_measures import size_of
 from rockcheck.validation.studies.population.plan import FINE_UP_TO, clearance_of
 from rockcheck.validation.uncertainty.lognormal import Lognormal, fit_least
 from rockcheck.validation.uncertainty.proportions import FEW_RECORDS, Share, share_of_runs
@@ -194,7 +194,7 @@ def _gap_answer(gathered: Gathered, side: Side) -> GapAnswer | None:
         for case_falls in by_draw(case, search.intervals)
     )
     first = min(falls, key=lambda case: case.intervals[0].low, default=None)
-    counted = [run for drawn in free.values() for run in counted_runs(drawn)]
+    counted = [run for drawn in free.values() for run in drawn.counted]
     finely = round(min(task.fine[-1], task.fine[0] + FINE_UP_TO), 12)  # as the grid is
     every, beyond_every = _widest_steps(np.array(task.fine), finely)
     draws_every, draws_beyond_every = _widest_steps(np.array(task.coarse), finely)
@@ -226,11 +226,6 @@ def _widest_steps(grid: np.ndarray, middle: float) -> tuple[float, float]:
     is_beyond = grid[:-1] >= middle
     near = np.max(steps[~is_beyond], initial=0.0)
     return float(near), float(np.max(steps[is_beyond], initial=0.0))
-
-
-def counted_runs(drawn: results.Drawn) -> Sequence[results.RunResult]:
-    """The draws; where there are none, the scene as it is."""
-    return drawn.results[1:] or drawn.results
 
 
 def by_draw(case: str, intervals: Sequence[results.FallInterval]) -> list[CaseFalls]:

@@ -15,7 +15,7 @@ from rockcheck.validation.studies.population import (
     certainty,
     certainty_blocks,
     data,
-    intensities,
+    level_blocks,
     results,
     search_blocks,
     sentences,
@@ -74,7 +74,7 @@ def finding_of(gathered: Gathered) -> Finding:
         HAND: sentences.method_sentences(scores, events),
     }
     if plan.levels:
-        answers[INTENSITY].append(intensities.sentence_of(plan.levels, curves))
+        answers[INTENSITY].append(level_blocks.sentence_of(plan.levels, curves))
     page: list[Block] = [
         blocks.scene_text(scene, gathered),
         blocks.answer_table(answers),
@@ -86,7 +86,7 @@ def finding_of(gathered: Gathered) -> Finding:
         *search_blocks.intensity_blocks(intensity),
     ]
     if plan.levels:
-        page += intensities.blocks_of(plan.levels, curves, gathered.done)
+        page += level_blocks.blocks_of(plan.levels, curves, gathered.done)
     page += [
         blocks.run_table(gathered),
         *blocks.history_plot(gathered),

@@ -24,7 +24,7 @@ from rockcheck.validation.execute.fate import fate_of
 from rockcheck.validation.studies.population import results, search
 from rockcheck.validation.studies.population.rows import table_of
 from rockcheck.validation.study import Task
-from rockcheck.validation.uncertainty import population
+from rockcheck.validation.uncertainty import input_spread
 from rockcheck.validation.uncertainty.numerical import numerical_uncertainty
 
 Numbers = tuple[tuple[str, float], ...]
@@ -389,7 +389,7 @@ class SensitivityTask(CaseTask):
     def play(self) -> results.Sensitivities:
         """Sobol's indices."""
         assert self.given is not None, "a scene with uncertain numbers"
-        return results.Sensitivities(indices=population.sensitivities(self.given, self.built()))
+        return results.Sensitivities(indices=input_spread.sensitivities(self.given, self.built()))
 
 
 def draws_of(given: files.UncertainScene, count: int) -> tuple[Numbers, ...]:
