@@ -134,6 +134,22 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
         assert above.channels["x"][-1] == pytest.approx(-0.5 * 1e-7 * G * limit * 9.0, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("friction", "kind", "begins"), [("coulomb", "slip", 0.25), ("no-slip", "uplift", 0.5)]
+)
+def test_what_cannot_slip_waits_for_the_slope(friction, kind, begins):
+    """Under an acceleration that grows evenly a block slips as it passes the friction; one that
+    cannot slip stands up to its slope."""
+    growing = scene_of(
+        floor=Floor(friction=0.5 * SLOPE),
+        excitation=Record.from_samples([0.0, 2.0 * SLOPE * G], time_step=1.0),
+        duration=0.6,
+    )
+    first = play(growing, friction=friction).event_list[0]
+    assert first.kind == kind
+    assert first.t == pytest.approx(begins, abs=1e-9)
+
+
 @pivots
 def test_balance_point(pivot):
     back, on, over = (

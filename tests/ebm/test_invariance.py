@@ -136,6 +136,32 @@ def test_dynamic_similarity(pivot, scale):
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
+def test_walls_out_of_reach_do_not_matter(pivot):
+    model = EventBasedModel(pivot=pivot)
+    free = model.simulate(scene_of()).channels
+    beside = model.simulate(scene_of(walls=walls(left=50.0, right=50.0, e=1.0))).channels
+    for name, channel in free.items():
+        np.testing.assert_array_equal(beside[name], channel, err_msg=name)
+
+
+@pytest.mark.parametrize(("energy_cap", "gains"), [(False, 6), (True, 0)])
+def test_the_energy_cap_removes_every_gain(energy_cap, gains):
+    """Newton's restitution with friction can add energy at an impact; capped, it never does."""
+    scene = scene_of(
+        block=Block(half_width=0.7, half_height=0.72),
+        floor=Floor(friction=0.187, restitution=0.95),
+        walls=walls(left=0.05, right=0.05, e=1.0),
+        excitation=Rest(),
+        initial_rotation=0.02,
+        initial_velocity=1.32,
+        initial_angular_velocity=-0.78,
+        duration=2.0,
+    )
+    model = EventBasedModel(pivot="unilateral", energy_cap=energy_cap)
+    assert model.simulate(scene).cost.energy_gains == gains
+
+
+@pytest.mark.parametrize("pivot", PIVOTS)
 def test_constant_vertical_acceleration_is_gravity(pivot):
     model = EventBasedModel(pivot=pivot, tolerance=1e-13)
     shaken, heavy = (

@@ -95,6 +95,29 @@ def test_history_of_a_paper_scene():
     assert history.settings == EventBasedModel().model_dump()
 
 
+def test_the_floor_pushes_at_each_impact_on_it():
+    scene = load_scene("fig4a").replace(duration=8.0)
+    pushes = [
+        event.impulse
+        for event in EventBasedModel().simulate(scene).event_list
+        if event.kind == "floor impact"
+    ]
+    assert len(pushes) > 50
+    assert min(pushes) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        ({}, "ebm"),
+        ({"pivot": "unilateral"}, "ebm-unilateral"),
+        ({"friction": "bouc-wen"}, "ebm-bouc-wen"),
+    ],
+)
+def test_a_model_is_named_by_its_pivot_or_friction(settings, name):
+    assert EventBasedModel(**settings).name == name
+
+
 @pytest.mark.parametrize(
     ("settings", "steps"),
     [

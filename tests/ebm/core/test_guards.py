@@ -198,6 +198,19 @@ def test_uplift_is_found_to_rounding(amplitude, period, symmetric):
     assert abs(ground.acceleration(base, t * (1.0 - 1e-14))) < limit
 
 
+def test_uplift_is_found_in_few_evaluations(monkeypatch):
+    evaluated, limit, plain = [], math.tan(0.25), ground.acceleration
+    monkeypatch.setattr(ground, "acceleration", lambda g, t: evaluated.append(t) or plain(g, t))
+    pulses = [
+        Ricker(amplitude=amplitude, period=period)
+        for amplitude in np.linspace(2.6, 30.0, 12)
+        for period in (0.3, 1.1, 4.0)
+    ]
+    for pulse in pulses:
+        ground.next_exceedance(ground.ground_of(pulse, 9.81, 0.4), 0.0, -limit, limit, 0.0, 0.0)
+    assert len(pulses) <= len(evaluated) < 25 * len(pulses)
+
+
 WALLS = (Wall(side="left", gap=0.3), Wall(side="right", gap=0.4))
 
 

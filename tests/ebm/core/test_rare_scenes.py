@@ -315,6 +315,14 @@ def test_a_block_that_falls_is_decided_on_the_way(settings):
     assert decided.runs[0].t * unit < whole.event_list[-1].t - 0.1
 
 
+def test_a_vertical_record_of_zeros_costs_no_step():
+    scene = scene_of(PAPER_BLOCK, 0.5, 5.0, excitation=Ricker(amplitude=4.0, period=1.0))
+    zeros = scene.replace(vertical=Record.from_samples(np.zeros(1000), 0.005))
+    without, flat = EventBasedModel().simulate(scene), EventBasedModel().simulate(zeros)
+    assert flat.cost.steps == without.cost.steps
+    np.testing.assert_array_equal(flat.channels["theta"], without.channels["theta"])
+
+
 def test_every_modelling_choice_has_a_pinned_scene():
     """A choice that no scene needs would go."""
     assert {one["name"] for one in PINNED.values()} == set(names.RULE_NAMES)

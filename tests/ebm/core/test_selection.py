@@ -47,6 +47,16 @@ def test_selection_at_rest_is_shentons_map(friction, pivot):
     assert seen == {"rest", "rock"} | ({"slide", "slide-rock"} if friction != "no-slip" else set())
 
 
+def test_a_history_begins_in_the_mode_that_is_selected():
+    """So what these tests ask of the selection holds for the model."""
+    rng = np.random.default_rng(48)
+    for _ in range(20):
+        a, mu, alpha = 10.0 ** rng.uniform(-1.0, 0.3), rng.uniform(0.05, 1.2), rng.uniform(0.1, 0.8)
+        at = upright(a, 1.0, alpha, mu, mu)
+        history = EventBasedModel().simulate(at.scene.replace(duration=0.02, output_step=0.01))
+        assert history.channels["mode"][1] == Core(at, "bilateral").select(at.state).name
+
+
 @pytest.mark.parametrize("pivot", PIVOTS)
 @pytest.mark.parametrize("touch", ["none", "tip", "far"])
 def test_selection_of_a_tilted_block(touch, pivot):

@@ -104,6 +104,24 @@ def test_a_force_of_which_only_every_fourth_power_is_there_has_a_step(order):
     assert 0.15 < series.force_step(row_of(terms[: order + 1]), 0, order, 1e-10, 10.0) < 0.35
 
 
+@pytest.mark.parametrize(
+    ("terms", "reach", "step"),
+    [
+        ([1.0, 1e3, 1e6, 1e9], 1.0, math.sqrt(1e-15)),
+        ([1.0, 1e3, 1e6, 1e9], 1e-8, 1e-8),  # no longer than is asked for
+        ([1.0, 0.0, 0.0, 0.0], 1.0, 1.0),  # a constant
+    ],
+)
+def test_the_last_terms_of_a_force_bound_its_step(terms, reach, step):
+    assert series.force_step(row_of(terms), 0, 3, 1e-9, reach) == pytest.approx(step)
+
+
+def test_a_position_asks_for_shorter_steps_than_a_force():
+    """For the terms of its rate to be below the tolerance, too."""
+    terms = row_of([1.0, 1e3, 1e6, 1e9])
+    assert series.step_size(terms, 0, 0, 3, 1e-9, 1.0) < series.force_step(terms, 0, 3, 1e-9, 1.0)
+
+
 @pytest.mark.parametrize("rate", [-np.inf, np.nan])
 def test_a_search_for_a_root_ends_where_the_series_is_not_finite(rate):
     """Its halvings would not: no bound holds for what is not a number."""
