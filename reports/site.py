@@ -16,7 +16,16 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
-from rockcheck.reports import document, drawers, manifest, overview, style, tables
+from rockcheck.reports import (
+    document,
+    drawers,
+    manifest,
+    overview,
+    style,
+    table_text,
+    tables,
+    templates,
+)
 from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.reports.histories_figure import histories_figure, thumbnail as thumbnail_of
 from rockcheck.reports.payload import payload_of, summary_of
@@ -104,7 +113,7 @@ def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     The histories are there already. Pages of an earlier run are removed, since they show other
     numbers: the index, the trend, and unless it is to have `pages` all. Two runs take turns.
     """
-    contents = {f"{table.name}.csv": document.csv(table) for table in files_of(run)}
+    contents = {f"{table.name}.csv": table_text.csv(table) for table in files_of(run)}
     contents |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
         earlier = manifest.read(folder)
@@ -159,7 +168,7 @@ def write_site(
     with _turn(folder):
         earlier = manifest.read(folder)
         pages = _Pages(folder, wanted, all_figures)
-        document.write_assets(folder)
+        templates.write_assets(folder)
         paths = _write_pages(pages, jobs, on_progress)
         written = {path.relative_to(folder).as_posix() for path in paths}
         manifest.remove_left_over(folder, earlier, written)
@@ -189,7 +198,7 @@ class _Pages:
         ]
         views: list[SceneView | EnsembleView] = [*self.scenes, *self.ensembles]
         self.views = {view.name: view for view in views}
-        self.links = {view.name: f"{document.PAGES}/{view.slug}.html" for view in views}
+        self.links = {view.name: f"{templates.PAGES}/{view.slug}.html" for view in views}
         #: What every page shows, and calls.
         self.common: dict[str, Any] = {
             "site": {
@@ -200,7 +209,7 @@ class _Pages:
                 ],
             },
             "run": self.run,
-            "here": document.folder_argument(folder),
+            "here": templates.folder_argument(folder),
             "formats": self.formats,
             "looks": style.looks(self.run.models),
             "channels": CHANNELS,
@@ -208,7 +217,7 @@ class _Pages:
             "VERDICTS": tables.NAME_AND_SIGN,
             "tables": tables,
             "overview": overview,
-            "row_cells": document.row_cells,
+            "row_cells": table_text.row_cells,
         }
 
     def write(self, name: str) -> list[Path]:
@@ -224,7 +233,7 @@ class _Pages:
                 template, (context, paths) = "finding.html", self._write_ensemble(view)
             case None:
                 template, (context, paths) = "index.html", self._write_index()
-        page = document.write_page(
+        page = templates.write_page(
             self.folder, address, template, view=view, **context, **self.common
         )
         return [*paths, page]
@@ -235,7 +244,7 @@ class _Pages:
         The figures are a thumbnail of all rotations, and where the run asks for them those for a
         paper.
         """
-        drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
+        drawn = writing.made(self.folder, templates.PAGES, document.FIGURES)
         curves = (
             (view.t, columns["theta"], view.looks[model]) for model, columns in view.drawn.items()
         )
@@ -245,10 +254,10 @@ class _Pages:
         for against, stem in stems.items():
             figure = histories_figure(view, against)
             paths += style.save(figure, drawn / stem, self.formats)
-        data = writing.made(self.folder, document.PAGES, "data") / f"{view.slug}.js"
+        data = writing.made(self.folder, templates.PAGES, "data") / f"{view.slug}.js"
         payload = writing.script_text("window.rockcheck", payload_of(view))
         paths.append(writing.write_whole(data, payload))
-        scene_folder = writing.made(self.folder, document.PAGES, "scene-files")
+        scene_folder = writing.made(self.folder, templates.PAGES, "scene-files")
         scene_files = write_scene_file(view.scene, scene_folder, view.slug)
         paths += [scene_folder / name for name in scene_files]
         neighbours = [None, *self.scenes, None]
@@ -277,7 +286,7 @@ class _Pages:
 
     def _write_ensemble(self, view: EnsembleView) -> tuple[dict[str, Any], list[Path]]:
         """Write an ensemble's figures and tables; returns what its page shows, and them."""
-        page, drawn = view.page(), writing.made(self.folder, document.PAGES, document.FIGURES)
+        page, drawn = view.page(), writing.made(self.folder, templates.PAGES, document.FIGURES)
         curves = [
             (*view.curves[model], look)
             for model, look in view.looks.items()
@@ -289,13 +298,13 @@ class _Pages:
             paths += style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
         for table in page.tables():
             *parts, name = table.name.split("/")
-            path = writing.made(self.folder, document.PAGES, *parts) / f"{name}.csv"
-            paths.append(writing.write_whole(path, document.csv(table)))
+            path = writing.made(self.folder, templates.PAGES, *parts) / f"{name}.csv"
+            paths.append(writing.write_whole(path, table_text.csv(table)))
         return {"found": page}, paths
 
     def _write_index(self) -> tuple[dict[str, Any], list[Path]]:
         """Write the figures of the index; returns what it shows, and them."""
-        drawn = writing.made(self.folder, document.PAGES, document.FIGURES)
+        drawn = writing.made(self.folder, templates.PAGES, document.FIGURES)
         blocks, matrix = overview.accuracy(self.run), overview.matrix(self.run)
         paths = []
         for block in blocks:

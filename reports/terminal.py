@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
-from rockcheck.reports.document import SIGN_AND_COLOUR, failure_lines, row_cells
+from rockcheck.reports.table_text import SIGN_AND_COLOUR, failure_lines, row_cells
 from rockcheck.scenes import errors
 from rockcheck.validation.finding import Block, Column, Finding, Table, Text
 

@@ -1,38 +1,17 @@
-"""The contract that every model signs: a Scene goes in, a History comes out."""
+"""The contract that every model signs: a Scene goes in, a History comes out.
+
+The names of this package are listed in the stub `__init__.pyi`; each is loaded when it is first
+used, so that an error in a command's arguments costs no numbers.
+"""
+
+import lazy_loader
 
 if __name__ == "scenes":  # found in the folder of the sources: it would be a second copy
     raise ImportError("scenes is a part of rockcheck: import rockcheck.scenes")
 
+__getattr__, __dir__, _ = lazy_loader.attach_stub(__name__, __file__)
 
-from rockcheck.scenes.base import (
-    Finite as Finite,
-    Floats as Floats,
-    Frozen as Frozen,
-    NonNegative as NonNegative,
-    Positive as Positive,
-    Shown as Shown,
-)
-from rockcheck.scenes.block import Block, Pivot as Pivot, Side as Side
-from rockcheck.scenes.errors import InputError, ModelFailure, printable as printable
-from rockcheck.scenes.events import Event
-from rockcheck.scenes.excitations import (
-    Cosine,
-    Excitation as Excitation,
-    HalfSine,
-    Pulse as Pulse,
-    Record,
-    Rest,
-    Ricker,
-    Sine,
-    Wave as Wave,
-    Wavelet,
-)
-from rockcheck.scenes.extremes import Extremes as Extremes, WallExtremes as WallExtremes
-from rockcheck.scenes.files import load_scene, named_scenes
-from rockcheck.scenes.history import Cost, History
-from rockcheck.scenes.scene import PAPER_BLOCK as PAPER_BLOCK, Floor, Scene, Wall
-
-# Public names; the others are for the packages above.
+# Public names; the others of the stub are for the packages above.
 __all__ = [
     "Block",
     "Cosine",

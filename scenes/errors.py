@@ -4,10 +4,14 @@ import re
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from pathlib import Path, PurePath
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from unicodedata import category
 
-from pydantic import ValidationError
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+#: Exit code of a fault in rockcheck itself, EX_SOFTWARE of sysexits: no verdict has it.
+FAULT = 70
 
 
 class InputError(ValueError):
@@ -97,7 +101,7 @@ def printable(value: object, limit: int = 80) -> str:
 _KINDS = ("int", "constrained-int", "constrained-str", "str", "tuple[str, ...]")
 
 
-def from_validation(error: ValidationError, keys: Iterable[str] = ()) -> InputError:
+def from_validation(error: "ValidationError", keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed.
 
     An unknown key comes before a missing one. `keys` are the allowed ones.

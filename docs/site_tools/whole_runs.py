@@ -27,7 +27,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from rockcheck.reports import document
+from rockcheck.reports import document, table_text
 from rockcheck.scenes import writing
 from rockcheck.validation.finding import Finding, Made, Mark, Plot, Table, Text, plain
 
@@ -94,7 +94,7 @@ def quoted(what: str) -> str:
     ]
     columns = [table.columns[place] for place in wanted]
     chosen = Table(name, columns, [[row[place] for place in wanted] for row in rows])
-    return document.block_markdown(chosen).strip()
+    return table_text.block_markdown(chosen).strip()
 
 
 def _like(cell: Any, patterns: str) -> bool:

@@ -12,17 +12,10 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from rockcheck.commands import (
-    OUT,
-    Played,
-    chosen_models,
-    model_names,
-    need_installed,
-    scene_names,
-    studied,
-    tell_left_out,
-    tell_record_notes,
-)
+from rockcheck.commands.ending import run_study
+from rockcheck.commands.model_choice import chosen_models, need_installed
+from rockcheck.commands.notices import tell_left_out, tell_record_notes
+from rockcheck.commands.options import OUT, Played, model_names, scene_names
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, Scene, Side, files, printable
 from rockcheck.validation.execute import models
@@ -161,7 +154,7 @@ def assess(
     _ = planned.numbers  # names a draw that is no scene, before anything is played
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
     tell_record_notes(case.scene for case in cases.values())
-    studied(Assessment(plan=planned), played)
+    run_study(Assessment(plan=planned), played)
 
 
 def draws_of(

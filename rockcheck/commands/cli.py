@@ -11,16 +11,14 @@ import time
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import fields, is_dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any, cast
 
 import typer
 import typer.core
 
-from rockcheck.commands import console, report_file, speaking
-from rockcheck.scenes import InputError, ModelFailure, printable, progress
-from rockcheck.validation.suite import verdict_scale
+from rockcheck.commands.console import console, output_mode, report_file
+from rockcheck.scenes import InputError, ModelFailure, errors, printable, progress
 
 #: The commands, in the order of the help: module and function below this package; an example.
 COMMANDS = {
@@ -60,7 +58,7 @@ EXIT_CODES = {
     1: "out of tolerance, or an invariant is broken",
     2: "bad input, or a file that cannot be read or written",
     3: "a model failed",
-    verdict_scale.FAULT: "a fault of rockcheck itself: please report it",
+    errors.FAULT: "a fault of rockcheck itself: please report it",
     progress.INTERRUPTED: "interrupted by Ctrl-C",
 }
 
@@ -74,7 +72,7 @@ COMMON = {
 }
 
 
-def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
+def with_common_options(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     """A command with the options that all of them have, --quiet and --json.
 
     A parameter that is a dataclass is a group of options, its fields. A `timed` command ends with
@@ -88,10 +86,10 @@ def spoken(does: Callable[..., None], *, timed: bool) -> Callable[..., None]:
     def command(context: typer.Context, *, quiet: bool, as_json: bool, **given: Any) -> None:
         for name, group in groups.items():
             given[name] = group(**{one.name: given.pop(one.name) for one in fields(group)})
-        with speaking("json" if as_json else "quiet" if quiet else "tables"):
+        with output_mode("json" if as_json else "quiet" if quiet else "tables"):
             try:
                 does(**given)
-            except typer.Exit:  # by `told`
+            except typer.Exit:  # by `finish_command`
                 if timed:
                     console().print(f"total: {time.perf_counter() - context.obj:.1f} s")
                 raise
@@ -164,7 +162,7 @@ class _Commands(typer.core.TyperGroup):
         does = pkgutil.resolve_name(f"rockcheck.commands.{where}")
         alone = typer.Typer(rich_markup_mode=None, add_completion=False)
         alone.command(name=cmd_name, cls=_EachOnce, epilog=f"Example: {example}")(
-            spoken(does, timed=cmd_name not in AT_ONCE)
+            with_common_options(does, timed=cmd_name not in AT_ONCE)
         )
         return typer.main.get_command(alone)
 
@@ -181,7 +179,9 @@ app = typer.Typer(
 
 def _version(asked: bool) -> None:
     if asked:
-        print(f"rockcheck {version('rockcheck')}")
+        from rockcheck.version import __version__
+
+        print(f"rockcheck {__version__}")
         raise typer.Exit
 
 
@@ -229,14 +229,16 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
     except MemoryError:
         return _told("out of memory; what was finished is kept", 3)
     except Exception as error:
+        from rockcheck.version import __version__
+
         where = report_file(
-            f"rockcheck {version('rockcheck')}, Python {sys.version}\n"
+            f"rockcheck {__version__}, Python {sys.version}\n"
             + "".join(traceback.format_exception(error))
         )
         return _told(
             f"a fault of rockcheck itself, {type(error).__name__}: please report it with"
             f" {where or f'this: {error}'}",
-            verdict_scale.FAULT,
+            errors.FAULT,
         )
     # A study has gathered what there is, or Typer has caught it.
     if code == progress.INTERRUPTED:

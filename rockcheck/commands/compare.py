@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 from pydantic import FiniteFloat, TypeAdapter
 
-from rockcheck.commands import PlotOption, check_file, scene_names, told
+from rockcheck.commands.checks import check_file
+from rockcheck.commands.ending import finish_command
+from rockcheck.commands.options import PlotOption, scene_names
 from rockcheck.reports.style import save_as
 from rockcheck.scenes import History, InputError, Scene, load_scene, printable
 from rockcheck.validation import Discrepancy, compare
@@ -67,9 +69,11 @@ def run(
         from rockcheck.validation.studies.conformance import changes
 
         if changes.wrote(reference):
-            told(changes.changes(reference, candidate))
+            finish_command(changes.changes(reference, candidate))
     if reference.is_dir() or candidate.is_dir():
-        told(run_changes.difference(results.Run.load(reference), results.Run.load(candidate)))
+        finish_command(
+            run_changes.difference(results.Run.load(reference), results.Run.load(candidate))
+        )
     if plot is not None:
         check_file(plot, "--plot")
     common_scene = load_scene(scene) if scene else None
@@ -84,7 +88,7 @@ def run(
     hint = hints.hint(histories["reference"], shifted, until, common_scene)
     finding = _finding(discrepancy, histories, common_scene, shift, _hint_words(hint, shift))
     figures = [("figure", save_as(discrepancy.plot(), plot))] if plot is not None else []
-    told(finding, said=figures, value=finding.as_dict())
+    finish_command(finding, said=figures, value=finding.as_dict())
 
 
 def _seconds(align: str | None) -> float | None:

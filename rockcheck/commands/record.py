@@ -7,14 +7,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from rockcheck.commands import (
-    PlotOption,
-    answer,
-    check_file,
-    console,
-    settings_of,
-    tell_left_out,
-)
+from rockcheck.commands.checks import check_file
+from rockcheck.commands.console import answer, console
+from rockcheck.commands.model_choice import settings_of
+from rockcheck.commands.notices import tell_left_out
+from rockcheck.commands.options import PlotOption
 from rockcheck.reports.style import save_as
 from rockcheck.scenes import InputError, printable, recordings
 from rockcheck.scenes.recordings import sets

@@ -14,19 +14,12 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from rockcheck.commands import (
-    AllowCodeOption,
-    JobsOption,
-    check_file,
-    check_one_model,
-    console,
-    model_names,
-    progress,
-    report_file,
-    scene_names,
-    settings_of,
-    told,
-)
+from rockcheck.commands.checks import check_file
+from rockcheck.commands.console import console, report_file
+from rockcheck.commands.ending import finish_command
+from rockcheck.commands.model_choice import check_one_model, settings_of
+from rockcheck.commands.options import AllowCodeOption, JobsOption, model_names, scene_names
+from rockcheck.commands.progress_bar import progress
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
 from rockcheck.scenes import History, Scene, errors, files, printable, writing
 from rockcheck.scenes.history_files import check_format
@@ -52,7 +45,7 @@ def scenes() -> None:
         Table(title, [text(title), text("about", " ")], list(rows.items()), most=len(rows))
         for title, rows in listings.items()
     ]
-    told(
+    finish_command(
         Finding("scenes", "", "", tables),
         value={f"{title}s": rows for title, rows in listings.items()},
     )
@@ -83,7 +76,7 @@ def new(
         f"{path}: a block of {size}",
         f"next: rockcheck simulate {path} --model ebm-unilateral",
     ]
-    told(Finding("new", "", "", [Text(items=lines)]), value={"file": path})
+    finish_command(Finding("new", "", "", [Text(items=lines)]), value={"file": path})
 
 
 def run(
@@ -153,7 +146,7 @@ def run(
     notes = Text(items=[f"note: {note}" for note in history.notes], verdict="changed")
     written = (("history", path) for path in histories)
     drawn = (("figure", save_as(history.plot(), path)) for path in figures)
-    told(
+    finish_command(
         Finding("simulate", title, "", [notes]),
         said=chain(written, drawn),
         value={
@@ -224,4 +217,4 @@ def warm(jobs: JobsOption = None) -> None:
     seconds = {name: taken[name] for name in PARTS}
     columns = [text("compiled code for"), Column("s", digits=2)]
     table = Table("compiled", columns, list(seconds.items()))
-    told(Finding("warm", "", "", [table]), value={"seconds": seconds})
+    finish_command(Finding("warm", "", "", [table]), value={"seconds": seconds})

@@ -12,24 +12,21 @@ from typing import Annotated, Any, NoReturn, get_args
 
 import typer
 
-from rockcheck.commands import (
+from rockcheck.commands.checks import check_file, usable_folder
+from rockcheck.commands.ending import finish_command, played_study, run_study
+from rockcheck.commands.model_choice import check_one_model, names_in, need_installed, settings_of
+from rockcheck.commands.notices import tell_missing
+from rockcheck.commands.options import (
     OUT,
     AllowCodeOption,
     JobsOption,
     OutOption,
     Played,
-    check_one_model,
     completing,
     model_names,
-    names_in,
-    need_installed,
-    settings_of,
-    studied,
-    tell_missing,
-    told,
-    usable_folder,
 )
 from rockcheck.scenes import errors, files, printable
+from rockcheck.validation import history_file
 from rockcheck.validation.execute import models, store
 from rockcheck.validation.finding import Finding, Text
 from rockcheck.validation.paper import AMPLITUDES, FIGURES, FREQUENCIES, Panel, paper_panels
@@ -131,7 +128,7 @@ def spectrum(
                 "--agreement",
             )
         tell_missing()
-    studied(study.Spectra(panels, request, agreement or 0), played)
+    run_study(study.Spectra(panels, request, agreement or 0), played)
 
 
 def benchmark(
@@ -139,22 +136,49 @@ def benchmark(
         str,
         typer.Argument(
             metavar="[WHAT]",
-            help="all, ebm (batches), models (work and precision), skipping, or convergence.",
+            help="all, ebm (batches), models (work and precision), skipping, convergence, or"
+            " commands (what each command costs; not in all).",
         ),
     ] = "all",
     out: OutOption = OUT / "benchmark",
     quick: Annotated[bool, typer.Option("--quick", help="Fewer scenes and settings.")] = False,
     jobs: JobsOption = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(
+            "--history",
+            help="Of commands: append their costs to FILE (a JSON line a run), and draw all.",
+        ),
+    ] = None,
 ) -> None:
     """Run time against error, for every model.
 
-    Work and precision, compiled batches, what a scene does not need, and what engines converge to.
+    Work and precision, compiled batches, what a scene does not need, and what engines converge to;
+    or what each command costs a person who waits for it.
     """
+    if what == "commands":
+        _measure_commands(Played(out, jobs), quick, history)
+    if history is not None:
+        raise errors.InputError("is of commands: rockcheck benchmark commands", "--history")
     from rockcheck.validation.studies.work_precision.study import What, WorkPrecision
 
-    part: What = errors.one_of("benchmark", what, get_args(What))
+    part: What = errors.one_of("benchmark", what, (*get_args(What), "commands"))
     tell_missing()
-    studied(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)
+    run_study(WorkPrecision(part, quick), Played(out, jobs), minutes=MINUTES)
+
+
+def _measure_commands(played: Played, quick: bool, history: Path | None) -> NoReturn:
+    """What each command costs, now and over the runs of a history."""
+    from rockcheck.validation.studies.command_cost.study import CommandCost, CostsOfRun
+
+    earlier: list[CostsOfRun] = []
+    if history is not None:
+        check_file(history, "--history", lambda path: None)
+        earlier = history_file.read_history(history, CostsOfRun)
+    finding = played_study(CommandCost(quick, earlier), played, force=True)
+    if history is not None:
+        history_file.append_history(history, CostsOfRun.model_validate(finding.data))
+    finish_command(finding, played.out)
 
 
 def stress(
@@ -207,7 +231,7 @@ def stress(
             "maps are of engines and cm: an event-based model has no step", "--models"
         )
     tell_missing()
-    studied(Stress(part, seed, quick, runs, tuple(names)), played)
+    run_study(Stress(part, seed, quick, runs, tuple(names)), played)
 
 
 def conformance(
@@ -282,7 +306,7 @@ def conformance(
     setups = ("best", "default") if setup == "both" else (setup,)
     players = [named(*pair, settings) for pair in itertools.product(names, setups)]
     players += [written(folder) for folder in folders]
-    studied(Conformance(tuple(players), limit), played)
+    run_study(Conformance(tuple(players), limit), played)
 
 
 def _tune(
@@ -293,7 +317,7 @@ def _tune(
     wanted = WANTED.keys() - {"restitution"}
     if unknown := settings.keys() - wanted:
         raise errors.unknown_name("setting", min(unknown), wanted)
-    studied(Tuning(tuple(Tune(name, restitution, **settings) for name in names)), played)
+    run_study(Tuning(tuple(Tune(name, restitution, **settings) for name in names)), played)
 
 
 def _engine_names(words: Sequence[str], default: Sequence[str]) -> list[str]:
@@ -327,7 +351,7 @@ def _export(folder: Path) -> NoReturn:
         f"{len(names)} scenes in {folder}, README.md says how they are meant; then:",
         f"  rockcheck conformance --histories {folder}",
     ]
-    told(
+    finish_command(
         Finding("export", "", "", [Text(items=lines)]),
         value={"folder": folder, "scenes": {name: f"{name}.toml" for name in names}},
     )

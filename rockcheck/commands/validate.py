@@ -14,23 +14,13 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from rockcheck.commands import (
-    ALL,
-    AllowCodeOption,
-    Played,
-    check_file,
-    chosen_models,
-    completing,
-    console,
-    model_names,
-    progress,
-    tell_left_out,
-    tell_missing,
-    tell_record_notes,
-    tell_wrong,
-    told,
-    usable_folder,
-)
+from rockcheck.commands.checks import check_file, usable_folder
+from rockcheck.commands.console import console, tell_wrong
+from rockcheck.commands.ending import finish_command
+from rockcheck.commands.model_choice import ALL, chosen_models
+from rockcheck.commands.notices import tell_left_out, tell_missing, tell_record_notes
+from rockcheck.commands.options import AllowCodeOption, Played, completing, model_names
+from rockcheck.commands.progress_bar import progress
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, files, printable
 from rockcheck.validation.execute import models
@@ -152,7 +142,7 @@ def run(
         suite = _scene(what, of_scene, allow_code or ())
     else:
         if history is not None:
-            check_file(history, "--history", trend.read_history)
+            check_file(history, "--history", trend.read_runs)
         suite = _suite(what, of_scene, allow_code or ())
     folder = _folder_of(suite, played.out)
     from rockcheck.reports import site, terminal
@@ -181,7 +171,7 @@ def run(
                 on_progress=on_progress,
             )
     left_out = {} if suite.judged else {"left_out": suite.left_out}
-    told(
+    finish_command(
         Finding("validate", suite.name, "", exit_code=finished.exit_code),
         said=[("report", page)],
         value={**run_summary.summary(finished), **left_out, "report": page},
@@ -205,7 +195,7 @@ def _show_trend(
     from rockcheck.reports import document, terminal
 
     this_run = trend.summary_of_run(finished, suite.path.parent)
-    finding = trend.trend_of(trend.append_history(history, this_run))
+    finding = trend.trend_of(trend.append_run(history, this_run))
     terminal.show(finding, console())
     if published:
         page = document.publish(finding, usable_folder(folder, "trend"), of_run=True)
@@ -336,7 +326,7 @@ def accept(
     finished = play(loaded, folder, played)
     changes, refused = accepting.accept(loaded, finished, reason, write=not dry_run)
     tell_faults(finished, folder)
-    told(
+    finish_command(
         Finding(
             "accept",
             loaded.name,
@@ -400,4 +390,4 @@ def report(
                 on_progress=on_progress,
             )
     what = "report" if output is None else "figure"
-    told(Finding(what, "", ""), said=[(what, path)], value={what: path})
+    finish_command(Finding(what, "", ""), said=[(what, path)], value={what: path})

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from rockcheck import Block, Floor, History, MuJoCo, Scene, Wall, commands, load_scene
+from rockcheck import Block, Floor, History, MuJoCo, Scene, Wall, load_scene
+from rockcheck.commands import console, progress_bar
 from rockcheck.commands.cli import COMMANDS, HIDDEN
 from rockcheck.scenes import progress
 
@@ -160,9 +161,9 @@ def test_a_long_work_tells_a_log_how_far_it_is(
     voice, steps, every, early, least, said, monkeypatch, capsys
 ):
     """Of `steps` a number is a time (s), in which the parts said last go on."""
-    monkeypatch.setattr(commands, "EVERY", every)
-    monkeypatch.setattr(commands, "EARLY", early)
-    with commands.speaking(voice), commands.progress("validate") as on_progress:
+    monkeypatch.setattr(progress_bar, "EVERY", every)
+    monkeypatch.setattr(progress_bar, "EARLY", early)
+    with console.output_mode(voice), progress_bar.progress("validate") as on_progress:
         for step in steps:
             time.sleep(step) if isinstance(step, float) else on_progress(*step)
     out, err = capsys.readouterr()

@@ -31,7 +31,7 @@ ALONE = ("--no-report", "--jobs", "1")
 def few(monkeypatch):
     missing = models.not_installed
     monkeypatch.setattr(
-        "rockcheck.commands.not_installed",
+        "rockcheck.commands.model_choice.not_installed",
         lambda name: missing(name) if name in FEW else "not here",
     )
 
@@ -74,7 +74,8 @@ def test_what_an_engine_does_not_model_is_told_beside_its_figure(typed):
 
 def test_a_scene_that_no_model_can_play_says_why(refused, monkeypatch):
     monkeypatch.setattr(
-        "rockcheck.commands.not_installed", lambda name: "" if name == "ebm" else "not here"
+        "rockcheck.commands.model_choice.not_installed",
+        lambda name: "" if name == "ebm" else "not here",
     )
     line = refused("validate", scene("restitution = 0.7"), *ALONE)
     assert "no model can play it: floor.restitution" in line

@@ -47,9 +47,10 @@ def test_every_data_file_is_in_the_wheel():
         for path in (path for path in (ROOT / folder).rglob("*") if path.is_file()):
             if path.suffix == ".py" or "__pycache__" in path.parts:
                 continue
-            elif named == ["data/**/*"]:
-                assert path.relative_to(ROOT).parts[1] == "data", path
-            elif path.parent.name == folder:
+            within = path.relative_to(ROOT / folder)
+            if within.parts[0] == "data":
+                assert "data/**/*" in named, path
+            elif len(within.parts) == 1:
                 assert any(path.match(pattern) for pattern in named), path
 
 

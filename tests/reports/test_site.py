@@ -8,8 +8,8 @@ import re
 import numpy as np
 import pytest
 
-from rockcheck.commands import OUT, assess, studies
-from rockcheck.reports.document import PAGES, folder_argument
+from rockcheck.commands import assess, studies
+from rockcheck.commands.options import OUT
 from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.reports.line_plots import GREY, colours
 from rockcheck.reports.manifest import MANIFEST
@@ -17,6 +17,7 @@ from rockcheck.reports.overview import PEAKS, glance, matrix
 from rockcheck.reports.show.words import duration, number
 from rockcheck.reports.site import STUDIES, write_site
 from rockcheck.reports.tables import worst_first
+from rockcheck.reports.templates import PAGES, folder_argument
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
 from rockcheck.validation.suite import limits_used, results

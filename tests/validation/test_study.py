@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 from squares import Squares
 
-from rockcheck.reports.document import block_markdown, csv, publish
+from rockcheck.reports.document import publish
+from rockcheck.reports.table_text import block_markdown, csv
 from rockcheck.scenes import progress
 from rockcheck.validation.execute.store import RECORDS, Store
 from rockcheck.validation.finding import (

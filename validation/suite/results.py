@@ -32,7 +32,6 @@ from rockcheck.validation.discrepancy.figures import Figure, Stored
 from rockcheck.validation.finding import Verdict
 from rockcheck.validation.suite.verdict_scale import (
     FAILS,
-    FAULT,
     FOR_MACHINES,
     SEVERITY,
     WEIGHTS,
@@ -282,9 +281,9 @@ class Run(Stored):
 
     @property
     def exit_code(self) -> int:
-        """0 pass, 1 out of tolerance (`strict`: see `Strict`), 3 a model failed, else `FAULT`."""
+        """0 pass, 1 out of tolerance (see `Strict`), 3 a model failed, else `errors.FAULT`."""
         if any(cell.unexpected for cell in self.cells):
-            return FAULT
+            return errors.FAULT
         if self.verdict == "error":
             return 3
         return int(

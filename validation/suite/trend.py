@@ -5,16 +5,13 @@ appended, and a finding on what moved and what varied. The command calls it.
 """
 
 import math
-import os
-import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pydantic import Field, ValidationError
+from pydantic import Field
 
-from rockcheck.scenes import InputError, errors, printable, reading
+from rockcheck.validation import history_file
 from rockcheck.validation.discrepancy.figures import Stored
 from rockcheck.validation.finding import (
     Axis,
@@ -34,9 +31,6 @@ from rockcheck.validation.suite.run_changes import has_moved
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Environment variables in which continuous integration gives its commit.
-COMMITS = ("GITHUB_SHA", "CI_COMMIT_SHA", "BUILD_SOURCEVERSION", "CIRCLE_SHA1")
-
 
 class RunSummary(Stored):
     """One run in a history: time, commit, version, verdict, and every judged figure.
@@ -55,33 +49,13 @@ class RunSummary(Stored):
 
 
 def summary_of_run(run: results.Run, folder: Path) -> RunSummary:
-    """A run as a line of a history; the suite lies in `folder`.
-
-    The commit is that checked out in `folder`, "-dirty" appended if files have changed. Outside of
-    a repository it is the continuous integration's, "" without one.
-    """
-    commit = next((os.environ[name][:12] for name in COMMITS if os.environ.get(name)), "")
-    if git := shutil.which("git"):
-        described = subprocess.run(
-            [
-                git,
-                "-C",
-                str(folder),
-                *["describe", "--always", "--dirty", "--abbrev=12", "--exclude", "*"],
-            ],
-            capture_output=True,
-            text=True,
-            check=False,
-            stdin=subprocess.DEVNULL,
-        )
-        if described.returncode == 0:
-            commit = described.stdout.strip()
+    """A run as a line of a history; the suite lies in `folder`, whose commit it has."""
     names = [
         (f"{cell.scene}, {cell.model}: {check.figure.title}", check) for cell, check in run.checks()
     ]
     return RunSummary(
         created=run.created,
-        commit=printable(commit),
+        commit=history_file.commit_of(folder),
         rockcheck=run.versions.get("rockcheck", ""),
         suite=run.suite,
         verdict=run.verdict_words,
@@ -93,39 +67,18 @@ def summary_of_run(run: results.Run, folder: Path) -> RunSummary:
     )
 
 
-def read_history(path: Path) -> list[RunSummary]:
-    """The runs of a history, the oldest first; none where there is no file yet.
+def read_runs(path: Path) -> list[RunSummary]:
+    """The runs of a history; raises `InputError`, naming a line that is unusable."""
+    return history_file.read_history(path, RunSummary)
+
+
+def append_run(path: Path, run: RunSummary) -> list[RunSummary]:
+    """Append a run to the history; returns all its runs of the same suite, the oldest first.
 
     Raises `InputError`, naming a line that is unusable.
     """
-    if not path.exists():
-        return []
-    runs: list[RunSummary] = []
-    for number, line in enumerate(reading.read_text(path).splitlines(), 1):
-        if not line.strip():
-            continue
-        try:
-            runs.append(RunSummary.model_validate_json(line))
-        except ValidationError as error:
-            raise InputError(
-                f"{printable(path)}, line {number}: not a run of a history:"
-                f" {errors.from_validation(error)}"
-            ) from None
-    return runs
-
-
-def append_history(path: Path, run: RunSummary) -> list[RunSummary]:
-    """Append a run to the history; returns all its runs of the same suite, the oldest first.
-
-    Raises `InputError` (see `read_history`).
-    """
-    earlier = read_history(path)
-    with path.open("a+b") as stream:
-        if stream.tell():  # an editor may have left the last line without its end
-            stream.seek(-1, os.SEEK_END)
-        end = b"" if stream.read(1) in b"\n" else b"\n"
-        stream.write(end + run.model_dump_json().encode() + b"\n")
-    return [each for each in (*earlier, run) if each.suite == run.suite]
+    runs = history_file.append_history(path, run)
+    return [each for each in runs if each.suite == run.suite]
 
 
 #: Most figures drawn: those that varied most. The table has all that varied.

@@ -17,9 +17,6 @@ from typing import Literal
 
 from rockcheck.validation.finding import Verdict
 
-#: Exit code of a fault in rockcheck itself, EX_SOFTWARE of sysexits: no verdict has it.
-FAULT = 70
-
 #: Verdict on one check: as expected; nearer to the perfect value; a ratio to zero; inside the
 #: limit, but outside the drift band; outside the limit or not to be judged. See `tolerances`.
 CheckVerdict = Literal["pass", "better", "not defined", "changed", "fail"]

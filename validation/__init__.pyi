@@ -1,0 +1,1 @@
+from .discrepancy.compare import Discrepancy as Discrepancy, compare as compare
