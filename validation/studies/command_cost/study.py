@@ -62,15 +62,15 @@ COMMANDS = {
             "compare a.csv b.csv",
             "two histories of 36 s",
             before=(
-                "simulate fig5a --model ebm-unilateral --out a.csv",
-                "simulate fig5a --model cm --out b.csv",
+                "simulate fig5a --model ebm-unilateral -o a.csv",
+                "simulate fig5a --model cm -o b.csv",
             ),
         ),
         Command("validate smoke", "six scenes, five models"),
         Command("validate paper", "the paper's scenes", long=True),
         Command("validate walls", "walls at many gaps", long=True),
         Command(
-            "report rockcheck-report --scene fig4a -o fig4a.svg",
+            "report rockcheck-report --scene smoke-record -o record.svg",
             "a figure for print",
             before=("validate smoke",),
         ),
@@ -186,7 +186,7 @@ def cost_table(costs: Mapping[str, CommandCosts]) -> Table:
         Column("slowest", "slowest first", "s", digits=2, brief=False),
         Column("cpu", "CPU", "s", digits=2, help="in an empty folder, of all processes"),
         Column("cpu_again", "CPU again", "s", digits=2, brief=False),
-        Column("peak", "peak memory", "MB", digits=2, help="of the largest process"),
+        Column("peak", "peak memory", "MB", digits=3, help="of the largest process"),
     ]
     rows = []
     for command, record in costs.items():
