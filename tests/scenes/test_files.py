@@ -28,11 +28,9 @@ period = 0.98
 
 def test_a_scene_file(written):
     scene = load_scene(written("bookcase.toml", TEXT))
-    assert (scene.name, scene.wall("left").gap, scene.excitation) == (
-        "bookcase",
-        0.053,
-        Ricker(amplitude=6.0, period=0.98),
-    )
+    assert scene.name == "bookcase"
+    assert scene.wall("left").gap == 0.053
+    assert scene.excitation == Ricker(amplitude=6.0, period=0.98)
     assert load_scene(str(written("a.toml", 'name = "other"\n' + TEXT))).name == "other"
 
 
@@ -106,8 +104,11 @@ def test_a_record_is_looked_up_beside_the_file_then_in_the_package(written, faul
 def test_the_papers_scenes(name, friction, gap, restitution):
     scene = load_scene(name)
     record, walls = scene.excitation, [] if gap is None else [("left", gap, restitution)]
-    assert (scene.name, scene.floor.friction, scene.duration) == (name, friction, 36.0)
-    assert (scene.block, record.time_step) == (PAPER_BLOCK, 0.02)
+    assert scene.name == name
+    assert scene.floor.friction == friction
+    assert scene.duration == 36.0
+    assert scene.block == PAPER_BLOCK
+    assert record.time_step == 0.02
     assert record.peak == pytest.approx(1.6 * 0.31882, abs=1e-9)
     assert [(wall.side, wall.gap, wall.restitution) for wall in scene.walls] == walls
     assert scene.description
@@ -148,7 +149,9 @@ def test_a_number_has_its_mean_its_standard_deviation_and_its_distribution(
     given, mean, sd, at, share
 ):
     law = files.Spread(**given).law
-    assert (law.mean(), law.std(), law.cdf(at)) == pytest.approx((mean, sd, share), rel=1e-12)
+    assert law.mean() == pytest.approx(mean, rel=1e-12)
+    assert law.std() == pytest.approx(sd, rel=1e-12)
+    assert law.cdf(at) == pytest.approx(share, rel=1e-12)
 
 
 @pytest.mark.parametrize(("given", "nominal"), [({}, 1.5), ({"value": 1.1}, 1.1)])
@@ -195,7 +198,9 @@ def made():
 def test_numbers_stand_where_they_were_written():
     scene, spreads = made()
     assert list(spreads) == ["duration", "block.half_width", "walls.right.gap"]
-    assert (scene.duration, scene.block.half_width, scene.wall("right").gap) == (2.0, 0.4, 0.05)
+    assert scene.duration == 2.0
+    assert scene.block.half_width == 0.4
+    assert scene.wall("right").gap == 0.05
     other = files.with_numbers(
         scene,
         {
@@ -206,11 +211,10 @@ def test_numbers_stand_where_they_were_written():
             "walls.right.gap": 0.02,
         },
     )
-    assert (other.duration, other.block) == (
-        3.0,
-        Block(half_width=0.35, half_height=1.5, centre_of_mass=(0.1, 0.2)),
-    )
-    assert (other.wall("left").gap, other.wall("right").gap) == (0.06, 0.02)
+    assert other.duration == 3.0
+    assert other.block == Block(half_width=0.35, half_height=1.5, centre_of_mass=(0.1, 0.2))
+    assert other.wall("left").gap == 0.06
+    assert other.wall("right").gap == 0.02
 
 
 def test_correlations_that_contradict_each_other_are_refused(fault_of):

@@ -176,7 +176,8 @@ def test_a_folder_of_24_files_in_eight_formats_is_read_whole(tmp_path, written, 
             == intensity.peak_acceleration(record)
             == pytest.approx(abs(PEAKS[component]), abs=3e-4 if write is knet else digit)
         ), one["file"]
-        assert (one["step_s"], one["samples"]) == (STEP, len(expected)), one["file"]
+        assert one["step_s"] == STEP, one["file"]
+        assert one["samples"] == len(expected), one["file"]
         assert any("it is 0 here" in note for note in record.notes) == (write is csv_gal)
 
 
@@ -201,7 +202,9 @@ def test_several_components_in_one_file(write, names, written, told, fault_of):
     peaks = [Record.from_file(path, component=one).peak for one in (2, names[2])]
     assert peaks == pytest.approx([0.27, 0.15], abs=1e-7)
     said = told("record", str(path), "--read", f"component={names[1]}")
-    assert (said["component"], said["unit"], said["samples"]) == (names[1], "cm/s2", 401)
+    assert said["component"] == names[1]
+    assert said["unit"] == "cm/s2"
+    assert said["samples"] == 401
     assert said["duration_s"] == pytest.approx(4.0)
     assert "no single component 4; there are 1 " in str(
         fault_of(Record.from_file, path, component=4)
@@ -224,10 +227,8 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
     record = recordings.read_record(
         written("MYG0041103111446.NS", knet("N-S", "4")), recordings.Reading(component=4)
     )
-    assert (record.component, record.notes) == (
-        "4",
-        ("the mean, 2.987 gal, is taken out: the offset of the digitiser",),
-    )
+    assert record.component == "4"
+    assert record.notes == ("the mean, 2.987 gal, is taken out: the offset of the digitiser",)
     assert abs(record.samples.mean()) < 1e-12
 
 
@@ -309,7 +310,8 @@ def test_of_a_folder_the_odd_file_is_named(tmp_path, typed, fault_of):
     assert "2.txt, line 1: 3 numbers a line" in json.loads(out)["left_out"][0]
     for words in ([tmp_path], [tmp_path / "[1-3].*"]):
         (motion, *more), (left_out,) = sets.motions_of(sets.files_of(words), recordings.Reading())
-        assert (motion[0], more) == ("1.AT2", [])
+        assert motion[0] == "1.AT2"
+        assert more == []
         assert "2.txt" in left_out
     for words in ([tmp_path, tmp_path / "2.txt"], [tmp_path / "2*"]):
         assert "2.txt" in str(fault_of(sets.motions_of, sets.files_of(words), recordings.Reading()))

@@ -28,8 +28,10 @@ def test_at2(header, dt, end, written):
     np.testing.assert_allclose(
         record.samples, np.array([0.02, -0.04, 0.6, 0.08, -0.1]) * G, rtol=1e-15
     )
-    assert (record.time_step, record.source) == (0.01, "motion.AT2")
-    assert (record.peak, record.quiet_after) == pytest.approx((0.6, 0.04))
+    assert record.time_step == 0.01
+    assert record.source == "motion.AT2"
+    assert record.peak == pytest.approx(0.6)
+    assert record.quiet_after == pytest.approx(0.04)
 
 
 def peer_record(component: str) -> Path:
@@ -46,7 +48,9 @@ def peer_record(component: str) -> Path:
 )
 def test_genuine_peer_files(component, count, peak):
     record, known = Record.from_file(peer_record(component)), pytest.approx(peak, abs=5e-5)
-    assert (record.time_step, len(record.samples), record.peak) == (0.01, count, known)
+    assert record.time_step == 0.01
+    assert len(record.samples) == count
+    assert record.peak == known
     assert np.isfinite(record.samples).all()
 
 
