@@ -58,8 +58,10 @@ CORNERS = [
 
 def test_the_largest_rotation_to_each_side_is_noted_with_its_time():
     noted = noted_of(PLACES)
-    assert (noted.rotation_left, noted.rotation_left_time) == (0.06, 1.0)
-    assert (noted.rotation_right, noted.rotation_right_time) == (0.09, 3.0)
+    assert noted.rotation_left == 0.06
+    assert noted.rotation_left_time == 1.0
+    assert noted.rotation_right == 0.09
+    assert noted.rotation_right_time == 3.0
 
 
 def test_the_first_of_equal_rotations_is_when_it_was_reached():
@@ -187,8 +189,14 @@ def told(strikes=(), *, outcome="moving", events=(), modes=(STILL,), last=(0.0, 
 def test_strikes_are_counted_by_wall():
     found = told([("left", 0.3, 2.0, 0.5), ("right", 0.4, 1.0, 0.2), ("left", 0.6, 1.5, 0.8)])
     left, right = found.walls["left"], found.walls["right"]
-    assert (left.strikes, left.first_s, left.impulse, left.speed) == (2, 0.3, 2.0, 0.8)
-    assert (right.strikes, right.first_s, right.impulse, right.speed) == (1, 0.4, 1.0, 0.2)
+    assert left.strikes == 2
+    assert left.first_s == 0.3
+    assert left.impulse == 2.0
+    assert left.speed == 0.8
+    assert right.strikes == 1
+    assert right.first_s == 0.4
+    assert right.impulse == 1.0
+    assert right.speed == 0.2
 
 
 def test_a_wall_that_is_never_struck_has_no_first_time():
@@ -199,8 +207,10 @@ def test_a_wall_that_is_never_struck_has_no_first_time():
 
 def test_what_stands_keeps_its_rotations():
     found = told()
-    assert (found.rotation_left, found.rotation_left_s) == (0.06, 1.0)
-    assert (found.rotation_right, found.rotation_right_s) == (0.09, 3.0)
+    assert found.rotation_left == 0.06
+    assert found.rotation_left_s == 1.0
+    assert found.rotation_right == 0.09
+    assert found.rotation_right_s == 3.0
     assert found.source == "model"
 
 

@@ -117,5 +117,7 @@ def test_a_corner_slips_as_its_offset_turns():
     made = parameters()
     corner = corner_over(step_at(made), (0.5, 0.1, 2.0), (0.0, 1.0), (-0.3, -0.8), 0.9, 3.0)
     assert corner.slip == 0.5 + 2.0 * 0.8
-    assert (corner.rx, corner.ry, corner.lever) == (-0.3, -0.8, -0.3)
+    assert corner.rx == -0.3
+    assert corner.ry == -0.8
+    assert corner.lever == -0.3
     assert corner.mobility == 1.0 + 3.0 * 0.3 * 0.3
