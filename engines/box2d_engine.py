@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import EngineFacts, LineLook
 from rockcheck.scenes import Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -132,3 +133,11 @@ class Box2D(Engine):
             "sleep": "World.sleeping_enabled",
         }
     )
+
+
+FACTS = EngineFacts(
+    engine=Box2D,
+    label="Box2D",
+    summary="the physics engine Box2D 3 (in two dimensions, single precision)",
+    look=LineLook("#3f6fb5", "#86aee8", (1.0, 1.0, 4.0, 1.0), "h"),
+)

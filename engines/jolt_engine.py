@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import EngineFacts, LineLook
 from rockcheck.scenes import ModelFailure, Scene
 
 SLAB, REACH = 10.0, 50.0  # half the thickness and half the extent of floor and walls
@@ -119,3 +120,11 @@ class Jolt(Engine):
             "friction": "frictions give their geometric mean",
         }
     )
+
+
+FACTS = EngineFacts(
+    engine=Jolt,
+    label="Jolt",
+    summary="the physics engine Jolt (single precision)",
+    look=LineLook("#a03e3e", "#dd8a84", (7.0, 1.5), "*"),
+)

@@ -9,6 +9,7 @@ import numpy as np
 from rockcheck.engines import steps
 from rockcheck.engines.contacts import Surface, contacts_of, corners_of, surfaces_of
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import BenchmarkSteps, EngineFacts, LineLook, SpectrumPlay
 from rockcheck.scenes import Floor, ModelFailure, Scene, printable
 
 # of the block's radius; contacts are points, and MuJoCo has no contact of a point with a plane
@@ -263,6 +264,7 @@ class MuJoCo(Engine):
     """
 
     name: ClassVar[str] = "mujoco"
+    package: ClassVar[str] = "mujoco"
     bounces_with: ClassVar[tuple[str, ...]] = ("best",)
     worlds: ClassVar[Worlds] = (_RigidMuJoCoWorld, MuJoCoWorld)
     contact_parameters: ClassVar[ContactParameters] = ContactParameters(
@@ -307,3 +309,15 @@ class MuJoCo(Engine):
     def tuned(self, step: float) -> dict[str, float]:
         """The share of a penetration that one step removes."""
         return {"erp": PUSHED_OUT}
+
+
+FACTS = EngineFacts(
+    engine=MuJoCo,
+    label="MuJoCo",
+    summary="the physics engine MuJoCo",
+    look=LineLook("#d55e00", "#e8762a", (2.0, 1.0), "^"),
+    spectrum=SpectrumPlay({"time_step": "adaptive", "largest_step": 2e-3}),
+    benchmark=BenchmarkSteps((1e-2, 1e-3, 1e-4, 3e-5), (1e-3, 1e-4, 4e-5)),
+    in_stress_maps=True,
+    in_short_studies=True,
+)

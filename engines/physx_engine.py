@@ -8,6 +8,7 @@ from typing import Any, ClassVar, Literal
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import EngineFacts, LineLook
 from rockcheck.scenes import Scene
 
 CORNER_RADIUS = 1e-4  # of the block's radius; contacts are points
@@ -144,3 +145,11 @@ class PhysX(Engine):
             "sleep": "sleep_threshold of set_body_config",
         }
     )
+
+
+FACTS = EngineFacts(
+    engine=PhysX,
+    label="PhysX",
+    summary="the physics engine PhysX 5 (single precision)",
+    look=LineLook("#4c7a1e", "#93c25f", (2.0, 2.0), "d"),
+)

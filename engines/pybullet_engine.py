@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import BenchmarkSteps, EngineFacts, LineLook, SpectrumPlay
 from rockcheck.scenes import Scene
 
 # of the block's radius; contacts are points, and Bullet has no contact of a point with a plane
@@ -203,3 +204,16 @@ class PyBullet(Engine):
             "sleep": "activationState without sleeping",
         }
     )
+
+
+FACTS = EngineFacts(
+    engine=PyBullet,
+    label="PyBullet",
+    summary="the physics engine PyBullet",
+    look=LineLook("#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
+    spectrum=SpectrumPlay({"time_step": "adaptive", "largest_step": 2e-3}),
+    benchmark=BenchmarkSteps((1e-2, 1e-3, 1e-4, 3e-5), (1e-3, 1e-4, 4e-5)),
+    in_stress_maps=True,
+    in_short_studies=True,
+    changes_without_wall="another share of penetration removed",
+)

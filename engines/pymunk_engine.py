@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from rockcheck.engines import contacts, steps
 from rockcheck.engines.engine import ContactParameters, Engine, Worlds
+from rockcheck.engines.facts import BenchmarkSteps, EngineFacts, LineLook, SpectrumPlay
 from rockcheck.scenes import Scene
 
 # half the thickness of floor and walls: Chipmunk's normals are exact where shapes do not cross each
@@ -123,3 +124,15 @@ class Pymunk(Engine):
             "sleep": "Space.sleep_time_threshold",
         }
     )
+
+
+FACTS = EngineFacts(
+    engine=Pymunk,
+    label="pymunk",
+    summary="the physics engine pymunk (Chipmunk, in two dimensions)",
+    look=LineLook("#7a8a00", "#b5c334", (1.0, 1.0), "<"),
+    # Fewer nodes show whether it agrees; a step of 3e-5 s would take too long.
+    spectrum=SpectrumPlay({"time_step": "adaptive", "largest_step": 2e-3}, share=0.3),
+    benchmark=BenchmarkSteps(convergence=(1e-3, 1e-4, 4e-5)),
+    in_stress_maps=True,
+)

@@ -17,6 +17,7 @@ from rockcheck.reports.table_text import csv, markdown, row_cells
 from rockcheck.reports.templates import folder_argument, write_assets, write_page
 from rockcheck.reports.workers import side_by_side
 from rockcheck.scenes import InputError, errors, printable, reading, writing
+from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Call, Failure, Pool, guarded
 from rockcheck.validation.finding import Finding, Plot
 
@@ -133,7 +134,7 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
             if plot.live and plot.kind == "spectra"
             for script in write_scripts(plot, figures)
         ),
-        looks=style.looks(style.LOOKS),
+        looks=style.looks(models.FAMILIES),
         row_cells=row_cells,
         formats=("svg",),
     )

@@ -8,8 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from rockcheck.reports.style import BY_KEY, LOOKS, PAGE, Figure, new_figure, power_of_ten
-from rockcheck.validation.finding import Axis, Panel, Plot
+from rockcheck.reports.style import PAGE, Figure, look_by_key, look_of, new_figure, power_of_ten
+from rockcheck.validation.finding import Axis, Panel, Plot, Series
 
 #: Colours by day and by night of series without a look, in their order; grey for "thin" ones
 #: and levels.
@@ -97,16 +97,19 @@ def _draw(ax: Any, panel: Panel, handles: dict[str, Any]) -> None:
         if series.style == "level":
             drawn = ax.axhline(y[0], color="#6e6e6e", linewidth=1.0, linestyle=(0, (6, 3)))
         else:
-            look = STYLES[series.style] | (
-                {"marker": LOOKS[series.look].marker}
-                if series.look in LOOKS and series.style == "line"
-                else {"linestyle": BY_KEY[series.look].line["linestyle"]}
-                if series.look in BY_KEY and series.style == "step"
-                else {}
-            )
-            (drawn,) = ax.plot(series.x, y, color=colour[0], **look)
+            (drawn,) = ax.plot(series.x, y, color=colour[0], **_line_of(series))
         if series.label and series.style != "thin":
             handles.setdefault(series.label, drawn)
+
+
+def _line_of(series: Series) -> dict[str, Any]:
+    """Keywords for the line of a series: its style's, and the marker or dashes of its look."""
+    line = dict(STYLES[series.style])
+    if series.style == "line" and (model := look_of(series.look)):
+        line["marker"] = model.marker
+    if series.style == "step" and (look := look_by_key(series.look)):
+        line["linestyle"] = look.line["linestyle"]
+    return line
 
 
 def colours(panel: Panel) -> list[tuple[str, str]]:
@@ -114,15 +117,17 @@ def colours(panel: Panel) -> list[tuple[str, str]]:
 
     Series with one label, such as a line and its fit, share a colour.
     """
-    own: dict[str, tuple[str, str]] = {}
-    return [
-        (BY_KEY[series.look].light, BY_KEY[series.look].dark)
-        if series.look in BY_KEY
-        else GREY
-        if series.style in ("thin", "level")
-        else own.setdefault(series.label, COLOURS[len(own) % len(COLOURS)])
-        for series in panel.series
-    ]
+    by_label: dict[str, tuple[str, str]] = {}
+    pairs = []
+    for series in panel.series:
+        if look := look_by_key(series.look):
+            pair = look.light, look.dark
+        elif series.style in ("thin", "level"):
+            pair = GREY
+        else:
+            pair = by_label.setdefault(series.label, COLOURS[len(by_label) % len(COLOURS)])
+        pairs.append(pair)
+    return pairs
 
 
 def strips(plot: Plot) -> Figure:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rockcheck.ebm.spectrum import LEFT, Spectrum
-from rockcheck.reports.style import LOOKS, PAGE, Figure, new_figure
+from rockcheck.reports.style import PAGE, Figure, label_of, new_figure
 from rockcheck.scenes import recordings
 from rockcheck.validation.finding import Plot
 
@@ -78,7 +78,7 @@ def spectra(plot: Plot) -> Figure:
             axes.tick_params(labelbottom=below, labelleft=beside, labelsize=6.5)
             axes.locator_params(integer=not data["record"])
             axes.spines[["top", "right"]].set_visible(True)
-            of = LOOKS[panel["row"]].label.replace(", ", ",\n") if "row" in panel else vertical
+            of = label_of(panel["row"]).replace(", ", ",\n") if "row" in panel else vertical
             axes.set_xlabel(horizontal if below else "", fontsize=7.0)
             axes.set_ylabel(of if beside else "", fontsize=7.0)
         if pulse:

@@ -19,8 +19,9 @@ from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rockcheck.engines import registry
 from rockcheck.scenes import InputError, printable, reading, writing
-from rockcheck.validation.execute import provenance
+from rockcheck.validation.execute import models, provenance
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,6 +61,7 @@ class Look:
         }
 
 
+#: The looks of the models that are no engines; an engine's is in its record.
 LOOKS = {
     look.key: look
     for look in (
@@ -67,14 +69,6 @@ LOOKS = {
         Look("ebm-unilateral", "EBM, unilateral", "#0072b2", "#3d9fdc", (), "s"),
         Look("ebm-bouc-wen", "EBM, Bouc-Wen", "#a87900", "#d19a10", (3.0, 1.0, 1.0, 1.0), "P"),
         Look("cm", "CM", "#009168", "#00b583", (5.0, 1.5), "D"),
-        Look("mujoco", "MuJoCo", "#d55e00", "#e8762a", (2.0, 1.0), "^"),
-        Look("pybullet", "PyBullet", "#bf5f92", "#d98ab4", (4.0, 1.0, 1.0, 1.0), "v"),
-        Look("pymunk", "pymunk", "#7a8a00", "#b5c334", (1.0, 1.0), "<"),
-        Look("dart", "DART", "#8c564b", "#c58a7f", (6.0, 1.0, 1.0, 1.0), ">"),
-        Look("drake", "Drake", "#6a51a3", "#a48fd6", (3.0, 1.0), "p"),
-        Look("box2d", "Box2D", "#3f6fb5", "#86aee8", (1.0, 1.0, 4.0, 1.0), "h"),
-        Look("physx", "PhysX", "#4c7a1e", "#93c25f", (2.0, 2.0), "d"),
-        Look("jolt", "Jolt", "#a03e3e", "#dd8a84", (7.0, 1.5), "*"),
         Look("measured", "measured", "#6e6e6e", "#a0a0a0", (), "x"),
     )
 }
@@ -87,25 +81,41 @@ SPARE = (
     Look("spare-4", "", "#8a1f4b", "#e0719e", (8.0, 2.0, 2.0, 2.0)),
     Look("spare-5", "", "#4f6f1f", "#94bb57", (1.0, 2.0)),
 )
-#: All looks by their keys, as a plot's series name them.
-BY_KEY = LOOKS | {look.key: look for look in SPARE}
 
 
-def looks(models: Iterable[str]) -> dict[str, Look]:
+@cache
+def look_of(model: str) -> Look | None:
+    """The look of a model of rockcheck; None of any other."""
+    if model not in models.ENGINE_NAMES:
+        return LOOKS.get(model)
+    facts = registry.facts_of(model)
+    line = facts.look
+    return Look(model, facts.label, line.light, line.dark, line.dash, line.marker)
+
+
+def look_by_key(key: str) -> Look | None:
+    """A look as a plot's series names it: by its model, or by the key of a spare one."""
+    return look_of(key) or next((look for look in SPARE if look.key == key), None)
+
+
+def every_look() -> list[Look]:
+    """The looks of all models of rockcheck in their order, then the spare ones."""
+    return [*looks(models.FAMILIES).values(), *SPARE]
+
+
+def looks(names: Iterable[str]) -> dict[str, Look]:
     """The look of each of a run's models.
 
     Models without one of their own get the spare colours, in order.
     """
     spare = cycle(SPARE)
-    return {
-        model: LOOKS[model] if model in LOOKS else replace(next(spare), label=model)
-        for model in models
-    }
+    return {name: look_of(name) or replace(next(spare), label=name) for name in names}
 
 
 def label_of(model: str) -> str:
     """A model's label: its name where it has no look of its own."""
-    return LOOKS[model].label if model in LOOKS else model
+    look = look_of(model)
+    return look.label if look else model
 
 
 #: The common style of all figures: sizes for a journal's page, a light grid, reproducible SVG.

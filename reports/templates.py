@@ -90,6 +90,6 @@ def write_assets(folder: Path) -> None:
         target / "models.css",
         "".join(
             f".look-{look.key} {{ --look: light-dark({look.light}, {look.dark}); }}\n"
-            for look in style.BY_KEY.values()
+            for look in style.every_look()
         ),
     )

@@ -2,11 +2,10 @@
 
 import pytest
 
-from rockcheck import ContinuousModel, engines
+from rockcheck import ContinuousModel
+from rockcheck.engines import registry
 
-ALL = [
-    engine for engine in (getattr(engines, name) for name in engines.__all__) if engine.installed()
-]
+ALL = [facts.engine for facts in registry.every() if facts.engine.installed()]
 DOUBLE = [engine for engine in ALL if engine.precision == "double"]
 SINGLE = [engine for engine in ALL if engine.precision == "single"]
 VARYING = [engine for engine in ALL if not engine.fixed_because]

@@ -15,7 +15,7 @@ from rockcheck.reports.histories_figure import histories_figure
 from rockcheck.reports.overview import accuracy, glance, matrix, why_apart
 from rockcheck.reports.show.words import duration, number, ratio, readable, window
 from rockcheck.reports.site import write_scene_file
-from rockcheck.reports.style import LOOKS, SPARE, looks, save
+from rockcheck.reports.style import every_look, look_of, looks, save
 from rockcheck.reports.tables import times_table
 from rockcheck.reports.view import FALL, scene_views, slugs_of
 from rockcheck.scenes import (
@@ -325,14 +325,14 @@ def contrast(first, second):
 
 
 def test_models_can_be_seen_and_told_apart():
-    shown = [*LOOKS.values(), *SPARE]
+    shown = every_look()
     assert min(contrast(look.light, "#ffffff") for look in shown) >= 3.0
     assert min(contrast(look.dark, "#14171b") for look in shown) >= 3.0
     assert len({look.light for look in shown}) == len(shown)
     many = looks(["ebm", "a", "cm", "b", "mujoco-coarse"])
     keys = [many.pop(name).key for name in ("a", "b", "mujoco-coarse")]
     assert keys == ["spare-1", "spare-2", "spare-3"]
-    assert many == {name: LOOKS[name] for name in ("ebm", "cm")}
+    assert many == {name: look_of(name) for name in ("ebm", "cm")}
 
 
 def test_numbers_for_people_do_not_break_in_sentences():

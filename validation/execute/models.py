@@ -5,13 +5,15 @@ import inspect
 import sys
 import tempfile
 import time
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
+from rockcheck.engines import registry
 from rockcheck.scenes import Cost, History, InputError, ModelFailure, Scene, errors, printable
 from rockcheck.scenes.base import MOST
 from rockcheck.validation.execute import pool
@@ -45,13 +47,13 @@ class Family:
 
 #: The fair reference for engines, and the model that forbids flight.
 REFERENCE, PAPER_MODEL = "ebm-unilateral", "ebm"
-ENGINES = "rockcheck.engines"
 #: What every model calculates with; and the libraries of those whose loops are compiled.
 NUMBERS = ("numpy", "scipy")
 COMPILED = ("numba", "llvmlite", *NUMBERS)
 #: Value of `time_step` for adaptive steps, whose compiled code the engines share.
 ADAPTIVE = "adaptive"
-FAMILIES: dict[str, Family] = {
+#: The models that rockcheck computes itself.
+EQUATIONS: dict[str, Family] = {
     "ebm": Family(
         "rockcheck.ebm",
         "EventBasedModel",
@@ -86,41 +88,51 @@ FAMILIES: dict[str, Family] = {
         COMPILED,
         compiled="continuous model",
     ),
-    "mujoco": Family(ENGINES, "MuJoCo", "the physics engine MuJoCo", {}, ("mujoco", *COMPILED)),
-    "pybullet": Family(
-        ENGINES, "PyBullet", "the physics engine PyBullet", {}, ("pybullet", *COMPILED)
-    ),
-    "pymunk": Family(
-        ENGINES,
-        "Pymunk",
-        "the physics engine pymunk (Chipmunk, in two dimensions)",
-        {},
-        ("pymunk", *COMPILED),
-    ),
-    "dart": Family(ENGINES, "Dart", "the physics engine DART", {}, ("dartpy", *COMPILED)),
-    "drake": Family(ENGINES, "Drake", "the physics engine Drake", {}, ("drake",)),
-    "box2d": Family(
-        ENGINES,
-        "Box2D",
-        "the physics engine Box2D 3 (in two dimensions, single precision)",
-        {},
-        ("pyb2d3",),
-    ),
-    "physx": Family(
-        ENGINES, "PhysX", "the physics engine PhysX 5 (single precision)", {}, ("sapien",)
-    ),
-    "jolt": Family(
-        ENGINES, "Jolt", "the physics engine Jolt (single precision)", {}, ("culverin",)
-    ),
+}
+#: The model that plays back what others computed or measured.
+MEASURED = {
     "measured": Family(
         "rockcheck.validation.discrepancy.measured",
         "Measured",
         "a CSV history from a shake table, or from any other program",
     ),
 }
-
 #: Names of the physics engines, installed or not.
-ENGINE_NAMES = tuple(name for name, kind in FAMILIES.items() if kind.module == ENGINES)
+ENGINE_NAMES = registry.names()
+
+
+class _Families(Mapping[str, Family]):
+    """The families by name; that of an engine is made from its record when it is first needed."""
+
+    def __getitem__(self, name: str) -> Family:
+        if name in ENGINE_NAMES:
+            return _family_of_engine(name)
+        if name in MEASURED:
+            return MEASURED[name]
+        return EQUATIONS[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*EQUATIONS, *ENGINE_NAMES, *MEASURED))
+
+    def __len__(self) -> int:
+        return len(EQUATIONS) + len(ENGINE_NAMES) + len(MEASURED)
+
+
+@cache
+def _family_of_engine(name: str) -> Family:
+    """An engine's family; the steps of one that can vary them are compiled."""
+    facts = registry.facts_of(name)
+    compiled = COMPILED if facts.steps_vary else ()
+    return Family(
+        facts.engine.__module__,
+        facts.engine.__name__,
+        facts.summary,
+        libraries=(facts.distribution, *compiled),
+    )
+
+
+#: All models, in the order in which they are listed.
+FAMILIES: Mapping[str, Family] = _Families()
 
 
 def family(name: str) -> Family:
@@ -136,11 +148,11 @@ def family(name: str) -> Family:
 
 def not_installed(name: str) -> str:
     """How to install the engine of that model; empty if it is installed, or none is needed."""
-    return (
-        str(class_of(name).hint())
-        if (family(name).module == ENGINES and not class_of(name).installed())
-        else ""
-    )
+    if name not in ENGINE_NAMES:
+        family(name)  # refuses a name that nobody knows
+        return ""
+    engine = registry.facts_of(name).engine
+    return "" if engine.installed() else engine.hint()
 
 
 def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
@@ -149,7 +161,7 @@ def compiles(name: str, settings: Mapping[str, Any] | None = None) -> str:
     Models share code, as engines share that of their adaptive steps. Compiling takes up to a
     minute, and does not count for the run's time limit: see `execute.pool.Call`.
     """
-    if family(name).module != ENGINES:
+    if name not in ENGINE_NAMES:
         return family(name).compiled
     return ADAPTIVE if getattr(build(name, settings), "time_step", None) == ADAPTIVE else ""
 

@@ -15,15 +15,18 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import Spectrum
 from rockcheck.ebm.spectrum import CALM, vary
+from rockcheck.engines import registry
 from rockcheck.engines.engine import Engine
 from rockcheck.validation.execute import models, provenance
 from rockcheck.validation.paper import Panel
 from rockcheck.validation.studies.spectrum import tiles
 
-CANDIDATES = ("ebm-unilateral", "cm", "mujoco", "pybullet", "pymunk", "dart", "drake")
+#: How engines play spectra, by name; those that play none are left out.
+ENGINE_PLAYS = {facts.name: facts.spectrum for facts in registry.every() if facts.spectrum}
+CANDIDATES = ("ebm-unilateral", "cm", *ENGINE_PLAYS)
 #: The share of the nodes that a model plays, where it is not all. These engines draw no map: fewer
-#: nodes show whether they agree; a run of DART costs four times, one of Drake twice the others'.
-PLAYED_SHARE = {"pymunk": 0.3, "dart": 0.1, "drake": 0.2}
+#: nodes show whether they agree.
+PLAYED_SHARE = {name: play.share for name, play in ENGINE_PLAYS.items() if play.share < 1.0}
 REFERENCES = {"ebm": "bilateral", "ebm-unilateral": "unilateral"}
 #: A node is near the boundary if a node of another outcome is among those at most this many nodes
 #: away, diagonals included.

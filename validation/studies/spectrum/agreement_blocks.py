@@ -6,12 +6,13 @@ In: what `agreement.agree` gives. Out: blocks of a finding. Called by the study.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from rockcheck.engines import registry
 from rockcheck.validation.finding import Block, Column, Plot, Table, Text, text
 from rockcheck.validation.paper import Panel
 from rockcheck.validation.studies.spectrum.agreement import REFERENCES, Agreement
 
-#: Libraries whose versions are told beside the shares.
-ENGINES = ("dartpy", "drake", "mujoco", "pybullet", "pymunk")
+#: Libraries whose versions stand beside the shares.
+LIBRARIES = sorted(facts.distribution for facts in registry.every() if facts.spectrum)
 MODEL = Column("model", kind="model")
 
 
@@ -49,7 +50,7 @@ def _text(agreement: Agreement, *, came_with_package: bool) -> str:
     settings = "; ".join(
         f"{model} {_settings_words(chosen)}" for model, chosen in agreement["settings"].items()
     )
-    engines = ", ".join(f"{name} {versions[name]}" for name in ENGINES if name in versions)
+    engines = ", ".join(f"{name} {versions[name]}" for name in LIBRARIES if name in versions)
     return f"{agreement['about']} {origin}. Settings: {settings}. {engines}."
 
 

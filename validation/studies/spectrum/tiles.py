@@ -23,6 +23,7 @@ from rockcheck.ebm.spectrum import (
     play_motions,
     play_nodes,
 )
+from rockcheck.engines import registry
 from rockcheck.scenes import Floats, InputError, ModelFailure, Scene, kinematics
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.paper import AMPLITUDES, FREQUENCIES, Panel
@@ -180,19 +181,17 @@ def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) ->
     return kept
 
 
-#: Settings of models in spectra that differ from their defaults: enough for outcomes, in a tenth
-#: of the time.
-SETTINGS: dict[str, dict[str, Any]] = {
-    "ebm": {"tolerance": TOLERANCE},
-    "ebm-unilateral": {"tolerance": TOLERANCE},
-    **{
-        engine: {"time_step": "adaptive", "largest_step": 2e-3}
-        for engine in ("mujoco", "pybullet", "pymunk")
-    },
-    "dart": {"time_step": "adaptive", "largest_step": 4e-3},
-    "drake": {"time_step": 1e-3},
-}
+#: Event-based models that play spectra with their tolerance.
+TOLERANT = ("ebm", "ebm-unilateral")
 MOST_SIZE = 5000
+
+
+def usual_settings(model: str) -> Mapping[str, Any]:
+    """Settings of a model in spectra that differ from its defaults: enough for outcomes."""
+    if model in TOLERANT:
+        return {"tolerance": TOLERANCE}
+    play = registry.facts_of(model).spectrum if model in models.ENGINE_NAMES else None
+    return play.settings if play else {}
 
 
 @dataclass(frozen=True)
@@ -220,7 +219,7 @@ class Request:
             raise InputError(
                 f"{self.size} is not allowed: give 2 to {MOST_SIZE} nodes an axis", "--size"
             )
-        usual, asked = SETTINGS.get(self.model, {}), self.settings
+        usual, asked = usual_settings(self.model), self.settings
         fixed = "time_step" in asked or asked.get("settings") == "default"
         settings = {**({} if fixed and "largest_step" in usual else usual), **asked}
         object.__setattr__(self, "settings", settings)

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from rockcheck.engines import registry
+from rockcheck.engines.facts import EngineFacts
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Block,
@@ -66,27 +68,34 @@ class ModelSetup(Work):
     finest: float = STEPS[-1]
 
 
+def setups_of_engine(facts: EngineFacts) -> list[ModelSetup]:
+    """An engine as it comes, at its best, and with adaptive steps where it has them."""
+    engine = facts.name
+    setups = [
+        ModelSetup(label=f"{engine} default", family=engine, settings={"settings": "default"}),
+        ModelSetup(label=engine, family=engine),
+    ]
+    if facts.steps_vary:
+        adaptive = ModelSetup(
+            label=f"{engine} adaptive",
+            family=engine,
+            settings={"time_step": "adaptive"},
+            knob="largest_step",
+            alone=PUSHED if facts.dear_adaptive_steps else HOUR,
+            finest=ADAPTIVE_FINEST,
+        )
+        setups.append(adaptive)
+    return setups
+
+
 SETUPS = {
     setup.label: setup
     for setup in (
         *(
             setup
-            for engine in ("mujoco", "pybullet", "pymunk", "dart", "drake")
-            for setup in (
-                ModelSetup(
-                    label=f"{engine} default", family=engine, settings={"settings": "default"}
-                ),
-                ModelSetup(label=engine, family=engine),
-                ModelSetup(
-                    label=f"{engine} adaptive",
-                    family=engine,
-                    settings={"time_step": "adaptive"},
-                    knob="largest_step",
-                    alone=PUSHED if engine == "dart" else HOUR,
-                    finest=ADAPTIVE_FINEST,
-                ),
-            )
-            if setup.label != "drake adaptive"  # its steps cannot vary
+            for facts in registry.every()
+            if facts.in_stress_maps
+            for setup in setups_of_engine(facts)
         ),
         ModelSetup(label="cm paper", family="cm", settings={"damping_rule": "paper"}),
         ModelSetup(label="cm", family="cm"),

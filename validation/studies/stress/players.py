@@ -11,6 +11,7 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.model import ImpactLaw
+from rockcheck.engines import registry
 from rockcheck.scenes import (
     InputError,
     ModelFailure,
@@ -270,8 +271,9 @@ _EVERY: tuple[EventBased | Approximate, ...] = (
     Tied("ebm-unilateral ties", 2000, 20, "scenes on a knife edge: what is said", "unilateral"),
     Approximate("cm", 2000, 40, "continuous model, standing 1e-8 R deep"),
     *(
-        Approximate(engine.lower(), 2000, 40, f"{engine}, best settings, steps of 0.002 sqrt(R/g)")
-        for engine in ("MuJoCo", "PyBullet")
+        Approximate(facts.name, 2000, 40, f"{facts.label}, best settings, steps of 0.002 sqrt(R/g)")
+        for facts in registry.every()
+        if facts.in_short_studies
     ),
 )
 PLAYERS = {player.label: player for player in _EVERY}

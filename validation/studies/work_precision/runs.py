@@ -18,6 +18,8 @@ import numpy as np
 import pandas as pd
 
 from rockcheck.ebm import EventBasedModel, predictability_horizon, spectrum
+from rockcheck.engines import registry
+from rockcheck.engines.facts import EngineFacts
 from rockcheck.scenes import PAPER_BLOCK, Floor, History, Rest, Ricker, Scene, Wall, load_scene
 from rockcheck.validation.discrepancy import impacts
 from rockcheck.validation.discrepancy.compare import compare
@@ -215,24 +217,52 @@ class DiagramLine(models.Work):
 
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-_STEPS = (1e-2, 1e-3, 1e-4, 3e-5)
-#: Three steps tell an order; the CM's step is 3/sqrt(k/m), k/m = g/penetration: 8e-4, 9e-5 and 1e-5
-#: s.
-_REFINED, _PENETRATIONS = (1e-3, 1e-4, 4e-5), (1e-6, 1e-8, 1e-10)
+#: Three tell an order; the CM's step is 3/sqrt(k/m), k/m = g/penetration: 8e-4, 9e-5 and 1e-5 s.
+_PENETRATIONS = (1e-6, 1e-8, 1e-10)
+#: Largest steps of engines that step adaptively, s.
 _LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
-#: Engines: their steps, those of convergence, which is not measured in single precision, and
-#: whether their steps can vary. The dearer a step, the fewer of them: the time of the whole
-#: benchmark is limited.
-ENGINES = {
-    "mujoco": (_STEPS, _REFINED, True),
-    "pybullet": (_STEPS, _REFINED, True),
-    "pymunk": (_STEPS[:3], _REFINED, True),
-    "dart": (_STEPS[:3], _REFINED[:2], True),
-    "drake": (_STEPS[:2], _REFINED[:2], False),
-    "box2d": (_STEPS[:3], (), False),
-    "physx": (_STEPS[:3], (), False),
-    "jolt": (_STEPS[:3], (), False),
-}
+#: Steps of engines with their default settings in a quick run, s; in a whole run the first
+#: `DEFAULT_STEPS` of their diagram.
+_QUICK_DEFAULT, DEFAULT_STEPS = (1e-2, 1e-3), 3
+
+
+def lines_of_engine(facts: EngineFacts) -> list[DiagramLine]:
+    """An engine's lines: fixed steps, adaptive ones where it has them, its default settings.
+
+    A quick run leaves out the finest step, which costs more than all others together.
+    """
+    engine, steps = facts.name, facts.benchmark.diagram
+    lines = [
+        DiagramLine(
+            label=engine,
+            family=engine,
+            knob="time_step",
+            values=steps,
+            quick=steps[: max(len(steps) - 1, 2)],
+            converge=facts.benchmark.convergence,
+        )
+    ]
+    if facts.steps_vary:
+        adaptive = DiagramLine(
+            label=f"{engine} adaptive",
+            family=engine,
+            settings={"time_step": "adaptive"},
+            knob="largest_step",
+            values=_LARGEST,
+            quick=_LARGEST[1:3],
+        )
+        lines.append(adaptive)
+    default = DiagramLine(
+        label=f"{engine} default",
+        family=engine,
+        settings={"settings": "default"},
+        knob="time_step",
+        values=steps[:DEFAULT_STEPS],
+        quick=_QUICK_DEFAULT,
+    )
+    return [*lines, default]
+
+
 LINES = {
     line.label: line
     for line in (
@@ -263,38 +293,7 @@ LINES = {
             quick=(1e-5, 1e-6, 1e-7),
             converge=_PENETRATIONS,
         ),
-        *(
-            line
-            for engine, (steps, refined, varies) in ENGINES.items()
-            for line in (
-                DiagramLine(
-                    label=engine,
-                    family=engine,
-                    knob="time_step",
-                    values=steps,
-                    # without the finest one, which costs more than all others together
-                    quick=steps[: max(len(steps) - 1, 2)],
-                    converge=refined,
-                ),
-                DiagramLine(
-                    label=f"{engine} adaptive",
-                    family=engine,
-                    settings={"time_step": "adaptive"},
-                    knob="largest_step",
-                    values=_LARGEST,
-                    quick=_LARGEST[1:3],
-                ),
-                DiagramLine(
-                    label=f"{engine} default",
-                    family=engine,
-                    settings={"settings": "default"},
-                    knob="time_step",
-                    values=steps[:3],
-                    quick=_STEPS[:2],
-                ),
-            )
-            if varies or "adaptive" not in line.label
-        ),
+        *(line for facts in registry.every() for line in lines_of_engine(facts)),
     )
 }
 #: Kinds of scenes over which the engines' settings are summed up: how the families' names begin.
@@ -485,7 +484,9 @@ def trends_of(points: pd.DataFrame) -> pd.DataFrame:
 
 def pooled(frame: pd.DataFrame, kinds: Mapping[str, tuple[str, ...]] = KINDS) -> pd.DataFrame:
     """Every setting of the engines' lines over all scenes of each kind; `family` is the kind."""
-    engines = _ordered(frame[[LINES[line].family in ENGINES for line in frame.line]], "line")
+    engines = _ordered(
+        frame[[LINES[line].family in models.ENGINE_NAMES for line in frame.line]], "line"
+    )
     return points_of(
         pd.concat(
             engines[engines.family.str.startswith(starts)].assign(family=kind)

@@ -19,6 +19,7 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.batch import pack_pulses, run_batch
+from rockcheck.engines import registry
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Floor,
@@ -138,29 +139,29 @@ def _batches(nodes: int) -> Iterator[Pair]:
 # --- histories: every model
 
 
+def _players() -> Iterator[tuple[str, models.Model, str]]:
+    """A label, its model, and what else changes with the wall: of all that are installed."""
+    for name in ("ebm", "ebm-unilateral", "cm"):
+        yield name, models.build(name), ""
+    for facts in registry.every():
+        if not facts.in_short_studies or not facts.engine.installed():
+            continue
+        fixed = models.build(facts.name, {"time_step": 1e-3})
+        yield facts.name, fixed, facts.changes_without_wall
+        if facts.steps_vary:
+            yield f"{facts.name} adaptive", models.build(facts.name, {"time_step": "adaptive"}), ""
+
+
 def _histories() -> Iterator[Pair]:
     scene = pulse(6.0, 6.0, 0.3)
-    slow: dict[str, Any] = {"time_step": 1e-3}
-    for name, settings in (
-        ("ebm", {}),
-        ("ebm-unilateral", {}),
-        ("cm", {}),
-        ("mujoco", slow),
-        ("mujoco", {"time_step": "adaptive"}),
-        ("pybullet", slow),
-        ("pybullet", {"time_step": "adaptive"}),
-    ):
-        if models.not_installed(name):
-            continue
-        model = models.build(name, settings)
-        label = f"{name} adaptive" if "adaptive" in settings.values() else name
-        remark = "a wall out of reach against none" + (
-            ", and with it another share of penetration removed" if label == "pybullet" else ""
-        )
+    for label, model, changes in _players():
+        remark = "a wall out of reach against none"
+        if changes:
+            remark += f", and with it {changes}"
         yield _of_histories(
             label, "wall", (model, scene.replace(walls=(FAR,))), (model, scene), remark
         )
-        if name in ("ebm", "ebm-unilateral"):
+        if label in ("ebm", "ebm-unilateral"):
             yield _of_histories(
                 label,
                 "dense output",

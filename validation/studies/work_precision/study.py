@@ -11,6 +11,8 @@ from typing import Any, Literal, get_args
 import numpy as np
 import pandas as pd
 
+from rockcheck.engines import registry
+from rockcheck.engines.engine import Engine
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.finding import (
     Axis,
@@ -114,7 +116,7 @@ class WorkPrecision(Study):
         """Interleaved, so that other load of the machine affects all models equally.
 
         An engine's smallest steps go to the workers; in a quick run one member plays those of 1e-4
-        s, and the adaptive ones of DART, which cost as much.
+        s, and adaptive ones that cost as much.
         """
         lines = [
             (line, value)
@@ -128,7 +130,8 @@ class WorkPrecision(Study):
             lines,
         ):
             step = value if line.knob == "time_step" else math.inf
-            if not (self.quick and member and (step <= 1e-4 or line.label == "dart adaptive")):
+            dear = step <= 1e-4 or (line.knob == "largest_step" and _steps_are_dear(line.family))
+            if not (self.quick and member and dear):
                 yield runs.Play(
                     family,
                     member,
@@ -151,7 +154,7 @@ class WorkPrecision(Study):
             runs.QUICK_WALLS if self.quick else runs.WALLS,
         ):
             bounces = runs.WALLS[name].walls[0].restitution > 0.0
-            if place < len(line.converge) and not (line.family == "drake" and bounces):
+            if place < len(line.converge) and not (bounces and _lacks_restitution(line)):
                 value = line.converge[place]
                 yield runs.Play(name, 0, line.label, value, 1, expected=_usual(line, value, 4.0))
 
@@ -190,6 +193,17 @@ class WorkPrecision(Study):
             _answer({block.name: block.records() for block in blocks if isinstance(block, Table)}),
             blocks,
         )
+
+
+def _steps_are_dear(engine: str) -> bool:
+    """Whether the engine's adaptive steps cost as much as a fixed one of 1e-4 s."""
+    return registry.facts_of(engine).dear_adaptive_steps
+
+
+def _lacks_restitution(line: runs.DiagramLine) -> bool:
+    """Whether the line is of an engine that cannot bounce, with the settings of the line."""
+    model = models.build(line.family, line.settings)
+    return isinstance(model, Engine) and "restitution" in model.lacks()
 
 
 def _usual(line: runs.DiagramLine, value: float, seconds: float) -> float:
