@@ -131,7 +131,15 @@ class _EachOnce(typer.core.TyperCommand):
                 option.opts[:0] = [other for other in MODEL_OPTIONS if other not in option.opts]
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        try:
+            _, _, order = self.make_parser(ctx).parse_args(args=list(args))
+        except typer.TyperException as error:
+            option_name = getattr(error, "option_name", "")
+            by_name = {name: option for option in self.params for name in option.opts}
+            if "requires an argument" not in error.format_message() or option_name not in by_name:
+                raise
+            without_value = cast(typer.core.TyperOption, by_name[option_name])
+            raise InputError(f"needs a value: {without_value.help}", option_name) from None
         for option in order:
             single = isinstance(option, typer.core.TyperOption) and not (
                 option.multiple or option.is_flag or option.count
@@ -214,7 +222,10 @@ def main(arguments: Sequence[str] | None = None, *, began: float | None = None) 
         )
     except (typer.TyperException, InputError) as error:
         return _told(
-            error.format_message() if isinstance(error, typer.TyperException) else str(error), 2
+            error.format_message().replace("Value error, ", "")
+            if isinstance(error, typer.TyperException)
+            else str(error),
+            2,
         )
     except ModelFailure as error:
         return _told(str(error), 3)

@@ -111,7 +111,7 @@ def run(
         Literal["worse", "both"] | None,
         typer.Option(
             "--strict",
-            help="Figures that left their drift band for the worse fail; with both, better ones,"
+            help="worse: figures that left their drift band for the worse fail; both: better ones,"
             " too.",
         ),
     ] = None,
