@@ -7,7 +7,6 @@ In: a scene, or a plot of a finding that has one. Out: a figure, or axes drawn i
 from typing import Any
 
 import numpy as np
-from matplotlib.patches import Polygon, Rectangle
 
 from rockcheck.reports.style import PAGE, Figure, new_figure
 from rockcheck.scenes import Scene
@@ -26,6 +25,8 @@ def block(plot: Plot) -> Figure:
 
 def draw_block(axes: Any, scene: Scene) -> None:
     """Draw block (at its initial position and rotation), floor and walls to scale, in m."""
+    from matplotlib.patches import Polygon, Rectangle
+
     block = scene.block
     x, y, theta = scene.initial_state[:3]
     turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])

@@ -1,7 +1,8 @@
-"""Which files a command has written into a folder, so that the next one removes what is left over.
+"""Which files a command has written into a folder: the next one removes what is left over.
 
-In: names of files, relative to the folder, with slashes. Out: their hashes, kept in a file, and
-later the names of those that nobody has changed since. Called by `document` and `site`.
+In: names of files, relative to the folder, with slashes. Out: their hashes, kept in a file with a
+hash of all that they were made of, and later the names of those that nobody has changed since.
+Called by `document` and `site`.
 """
 
 import hashlib
@@ -9,9 +10,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from rockcheck.scenes import InputError, reading, writing
+from rockcheck.validation.discrepancy.figures import Stored
 
 #: The files of a run's pages, in the folder of the run.
 MANIFEST = "pages/files.json"
@@ -19,25 +21,41 @@ MANIFEST = "pages/files.json"
 HASHES = TypeAdapter(dict[str, str])
 
 
+class Manifest(Stored):
+    """The files of pages by their names, each with its hash, and a hash of what they show."""
+
+    made_of: str = ""
+    files: dict[str, str] = Field(default_factory=dict)
+
+
 def hash_of(content: str | bytes) -> str:
     """SHA-256 of a file's content, by which the next run knows it for its own."""
     return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
-def read(folder: Path) -> dict[str, str]:
-    """The hashes of the files of the pages that are in a folder, by name; none without any."""
+def read(folder: Path) -> Manifest:
+    """What is known of the pages that are in a folder; nothing where there are none."""
     try:
-        return HASHES.validate_python(reading.read_json(_inside(folder, MANIFEST)))
+        return Manifest.model_validate(reading.read_json(_inside(folder, MANIFEST)))
     except (InputError, ValidationError):
-        return {}
+        return Manifest()
 
 
-def write(folder: Path, paths: Iterable[Path]) -> None:
-    """Keep the hashes of files that have been written into a folder."""
+def write(folder: Path, paths: Iterable[Path], made_of: str) -> None:
+    """Keep the hashes of files that have been written into a folder, and of what they show."""
     hashes = {
         path.relative_to(folder).as_posix(): hash_of(reading.read_bytes(path)) for path in paths
     }
-    writing.write_whole(folder / MANIFEST, writing.json_text(hashes) + "\n")
+    kept = Manifest(made_of=made_of, files=hashes)
+    writing.write_whole(folder / MANIFEST, writing.json_text(kept.model_dump()) + "\n")
+
+
+def is_whole(folder: Path, made_of: str) -> bool:
+    """Whether a folder has all pages that are made of this, and nobody has changed one."""
+    kept = read(folder)
+    if not kept.files or kept.made_of != made_of:
+        return False
+    return {name for name, _ in unchanged(folder, kept.files)} == set(kept.files)
 
 
 def unchanged(folder: Path, hashes: Mapping[str, str]) -> Iterator[tuple[str, bytes]]:

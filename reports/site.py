@@ -3,6 +3,7 @@
 The pages are one folder that opens from the file system and needs no other place.
 """
 
+import json
 import os
 import platform
 import re
@@ -18,7 +19,6 @@ from filelock import FileLock, Timeout
 
 from rockcheck.reports import (
     document,
-    drawers,
     manifest,
     overview,
     style,
@@ -26,6 +26,7 @@ from rockcheck.reports import (
     tables,
     templates,
 )
+from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.ensemble_page import EnsembleView
 from rockcheck.reports.histories_figure import histories_figure, thumbnail as thumbnail_of
 from rockcheck.reports.payload import payload_of, summary_of
@@ -44,7 +45,7 @@ from rockcheck.scenes import (
     writing,
 )
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, stated
-from rockcheck.validation.execute import models, pool
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.finding import Plot
 from rockcheck.validation.suite import results, verdict_scale
 from rockcheck.validation.suite.job_page import markdown
@@ -116,7 +117,7 @@ def keep(run: results.Run, folder: Path, *, pages: bool = True) -> Path:
     contents = {f"{table.name}.csv": table_text.csv(table) for table in files_of(run)}
     contents |= {"junit.xml": junit(run), "summary.md": markdown(run)}
     with _turn(folder):
-        earlier = manifest.read(folder)
+        earlier = manifest.read(folder).files
         if pages:
             index = {name: content_hash for name, content_hash in earlier.items() if name == INDEX}
             manifest.remove_left_over(folder, index)
@@ -141,7 +142,7 @@ def write_figure(folder: Path, name: str, path: Path) -> Path:
             f"{printable(name)}: no model has a history of it: {'; '.join(view.missing.values())}"
         )
     if isinstance(view, EnsembleView):
-        return style.save_as(drawers.figure_of(view.distributions()), path)
+        return style.save_as(figure_of(view.distributions()), path)
     return style.save_as(histories_figure(view), path)
 
 
@@ -166,14 +167,54 @@ def write_site(
     Raises `InputError` where a wanted scene is not of the run.
     """
     with _turn(folder):
-        earlier = manifest.read(folder)
+        earlier = manifest.read(folder).files
         pages = _Pages(folder, wanted, all_figures)
         templates.write_assets(folder)
         paths = _write_pages(pages, jobs, on_progress)
         written = {path.relative_to(folder).as_posix() for path in paths}
         manifest.remove_left_over(folder, earlier, written)
-        manifest.write(folder, paths)
+        manifest.write(folder, paths, _made_of(pages.run, folder, all_figures))
     return folder / INDEX
+
+
+def is_up_to_date(run: results.Run, folder: Path, *, all_figures: bool = False) -> bool:
+    """Whether a folder has this very run and its pages: nothing was played, judged or drawn anew.
+
+    The run that made them may have been another one: its date and its times are told.
+    """
+    if run.up_to_date < len(run.cells):
+        return False
+    try:
+        earlier = results.Run.load(folder)
+    except errors.InputError:
+        return False
+    is_same_run = _facts_of(earlier) == _facts_of(run)
+    return is_same_run and manifest.is_whole(folder, _made_of(run, folder, all_figures))
+
+
+def _facts_of(run: results.Run) -> dict[str, Any]:
+    """All of a run but when it was made, and what of it was read back."""
+    facts = run.model_dump(mode="json", exclude={"created", "wall_seconds"})
+    for cell in facts["cells"]:
+        del cell["read_back"]
+    return facts
+
+
+def _made_of(run: results.Run, folder: Path, all_figures: bool) -> str:
+    """Hash of all that the pages of a run depend on."""
+    return provenance.digest(
+        json.dumps(
+            [
+                _facts_of(run),
+                style.drawn_by(),
+                provenance.code_digest("rockcheck.validation.suite"),
+                templates.folder_argument(folder),
+                [page for _, page in STUDIES if (folder / page).exists()],
+                all_figures,
+            ],
+            sort_keys=True,
+        )
+    )
 
 
 class _Pages:
@@ -295,7 +336,7 @@ class _Pages:
         thumbnail = drawn / f"{view.slug}~small.svg"
         paths = [style.save_as(thumbnail_of(curves, step=True), thumbnail, named=False)]
         for plot in page.plots():
-            paths += style.save(drawers.figure_of(plot), drawn / plot.name, self.formats)
+            paths += style.save(figure_of(plot), drawn / plot.name, self.formats)
         for table in page.tables():
             *parts, name = table.name.split("/")
             path = writing.made(self.folder, templates.PAGES, *parts) / f"{name}.csv"
@@ -309,7 +350,7 @@ class _Pages:
         paths = []
         for block in blocks:
             if isinstance(block, Plot):
-                paths += style.save(drawers.figure_of(block), drawn / block.name, self.formats)
+                paths += style.save(figure_of(block), drawn / block.name, self.formats)
         context = {
             "scenes": self.scenes,
             "ensembles": self.ensembles,

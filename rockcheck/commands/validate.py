@@ -154,7 +154,15 @@ def run(
         force=force,
         strict="both" if strict == "both" else strict is not None,
     )
-    page = site.keep(finished, folder, pages=pages.report)
+    page = folder / site.INDEX
+    # with a history the trend's page is new, and the others lead to it
+    shown_already = (
+        pages.report
+        and history is None
+        and site.is_up_to_date(finished, folder, all_figures=pages.figures)
+    )
+    if not shown_already:
+        page = site.keep(finished, folder, pages=pages.report)
     terminal.show(run_tables.finding_of(finished), console())
     if finished.exit_code:
         better = reasons.improvements(finished) if strict == "both" else ()
@@ -162,7 +170,7 @@ def run(
     tell_faults(finished, folder)
     if history is not None:
         _show_trend(finished, suite, history, folder, published=pages.report)
-    if pages.report:
+    if pages.report and not shown_already:
         with progress("pages") as on_progress:
             page = site.write_site(
                 folder,

@@ -74,7 +74,7 @@ def test_no_file_outside_a_run_is_removed_for_its_list_of_pages(tmp_path, receiv
     victim = tmp_path / "victim"
     victim.write_text("mine")
     (received / MANIFEST).parent.mkdir()
-    (received / MANIFEST).write_text(json.dumps({"../victim": hash_of("mine")}), "utf-8")
+    (received / MANIFEST).write_text(json.dumps({"files": {"../victim": hash_of("mine")}}), "utf-8")
     published(received)
     assert victim.read_text() == "mine"
 
