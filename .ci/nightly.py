@@ -1,10 +1,10 @@
 """What is too long for each change, on a machine of any kind: `make nightly`, or `NIGHTLY_QUICK=1
 make nightly` for some minutes of it.
 
-The slow tests, the whole stress run, a fuzzer for each reader, hostile cases, and known weaknesses
-of what is depended on. Every part is run, whatever the others did. The result goes to
-docs/nightly.json, which the page "Reliability" shows. Exit 1 where a part failed. `NIGHTLY_SEED`
-(default: the day's number) seeds what is random.
+The slow tests, the whole stress run, what each command costs, a fuzzer for each reader, hostile
+cases, and known weaknesses of what is depended on. Every part is run, whatever the others did. The
+result goes to docs/nightly.json, which the page "Reliability" shows. Exit 1 where a part failed.
+`NIGHTLY_SEED` (default: the day's number) seeds what is random.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "nightly.json"
+#: What each command costs, a JSON line a night.
+COSTS = ROOT / "docs" / "runs" / "commands.jsonl"
 READERS = (
     "at2",
     "record_csv",
@@ -132,6 +134,18 @@ def parts(quick: bool, seed: int, folder: Path) -> Iterator[Part]:
         *(["--quick"] if quick else []),
     )
     yield Part("stress", (python, *stress), stress_line)
+    costs = (
+        "-m",
+        "rockcheck",
+        "benchmark",
+        "commands",
+        "--history",
+        str(COSTS),
+        "--out",
+        str(folder / "commands"),
+        *(["--quick"] if quick else []),
+    )
+    yield Part("costs of commands", (python, *costs), last_line)
     for reader in READERS[:2] if quick else READERS:
         options = (
             f"-runs={2000 if quick else 100000}",
@@ -194,7 +208,15 @@ def commit() -> str:
             ["git", *words], cwd=ROOT, capture_output=True, text=True, check=False
         ).stdout.strip()
 
-    changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!docs/nightly.json")
+    changed = git(
+        "status",
+        "--porcelain",
+        "--untracked-files=no",
+        "--",
+        ".",
+        ":!docs/nightly.json",
+        ":!docs/runs/commands.jsonl",
+    )
     return (git("rev-parse", "--short", "HEAD") or "unknown") + (" and changes" if changed else "")
 
 
