@@ -155,12 +155,7 @@ def run(
         strict="both" if strict == "both" else strict is not None,
     )
     page = folder / site.INDEX
-    # with a history the trend's page is new, and the others lead to it
-    shown_already = (
-        pages.report
-        and history is None
-        and site.is_up_to_date(finished, folder, all_figures=pages.figures)
-    )
+    shown_already = _is_shown(finished, folder, pages, history)
     if not shown_already:
         page = site.keep(finished, folder, pages=pages.report)
     terminal.show(run_tables.finding_of(finished), console())
@@ -194,6 +189,17 @@ def _refuse_judging(scene_name: str, options: Mapping[str, object]) -> None:
                 f"{printable(scene_name)} is a scene, and nothing of it is judged: give a suite",
                 option,
             )
+
+
+def _is_shown(finished: results.Run, folder: Path, pages: Pages, history: Path | None) -> bool:
+    """Whether pages are asked for, and those in `folder` show the run already."""
+    from rockcheck.reports import site
+
+    if not pages.report:
+        return False
+    if history is not None:  # the trend's page is new, and the others lead to it
+        return False
+    return site.is_up_to_date(finished, folder, all_figures=pages.figures)
 
 
 def _show_trend(
