@@ -5,6 +5,7 @@ In: a plot of a finding. Out: JSON, and files beside the page. Called by `docume
 
 import json
 import math
+from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from rockcheck.reports.line_plots import colours
 from rockcheck.reports.spectrum_plots import axis_labels, outcome_key
 from rockcheck.scenes import Floats, writing
 from rockcheck.validation.finding import Plot, Series
+
+#: Room above the largest value of an axis without limits, a share of it.
+MARGIN = 0.05
 
 
 def live_data(plot: Plot) -> dict[str, Any]:
@@ -34,10 +38,17 @@ def live_data(plot: Plot) -> dict[str, Any]:
             if series.style != "dots"
         ],
         "least": plot.y.limits[0] if plot.y.limits else 0.0,
-        "most": plot.y.limits[1] if plot.y.limits else None,
+        "most": plot.y.limits[1] if plot.y.limits else _top_of(panel.series),
         "single": any(series.style == "thin" for series in panel.series),
         **(plot.data or {"per_unit": 0.0, "other_unit": "", "other_label": ""}),
     }
+
+
+def _top_of(series: Sequence[Series]) -> float | None:
+    """The end of an axis without limits: a margin above the largest value, None without any."""
+    values = [value for curve in series for value in curve.y if value is not None]
+    largest = max((value for value in values if math.isfinite(value)), default=0.0)
+    return (1.0 + MARGIN) * largest if largest > 0.0 else None
 
 
 def _live_curve(

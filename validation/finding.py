@@ -64,6 +64,7 @@ def text(name: str, label: str = "", **more: Any) -> Column:
 class Table:
     """Rows of cells in the order of the columns; None and NaN are empty cells.
 
+    `note` is shown on the page and in Markdown, below the table; a terminal leaves it out.
     `on` says where it is shown besides its CSV: everywhere, on the page and in Markdown only, or in
     files only. `folded` tables are closed on the page until a reader opens them. A terminal shows
     the first `most` rows.

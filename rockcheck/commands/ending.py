@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import typer
 
 from rockcheck.commands.checks import usable_folder
-from rockcheck.commands.console import answer, console
+from rockcheck.commands.console import answer, console, tell_wrong
 from rockcheck.commands.options import Played
 from rockcheck.commands.progress_bar import progress
 from rockcheck.validation.finding import Finding
@@ -48,6 +48,7 @@ def finish_command(
     Its page is written first if it has a `folder`; else `said` has the files, each with its kind.
     As JSON it is its `value`, by default all that it holds.
     """
+    from rockcheck.reports.table_text import failure_lines
     from rockcheck.reports.terminal import show
 
     page = None
@@ -56,6 +57,12 @@ def finish_command(
 
         page = publish(found, folder)
     show(found, console())
+    tell_wrong(
+        [
+            *([found.answer] if found.exit_code and found.answer else []),
+            *(f"failed: {line}" for line in failure_lines(found.failures)),
+        ]
+    )
     for kind, path in [("report", page)] if page else said:
         console().print(f"{kind}: {path}", soft_wrap=True)
     answer(value or found.as_dict() | {"report": page})

@@ -1,7 +1,6 @@
-"""`rockcheck assess`, `spectrum`, `benchmark`, `stress` and `conformance`: studies.
+"""`rockcheck spectrum`, `benchmark`, `stress` and `conformance`: the studies of models.
 
-`assess` is of one scene: does it fall, how far does it move, how sure is that. The others are of
-models.
+That of one scene is in `assess`.
 """
 
 import itertools

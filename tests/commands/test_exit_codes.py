@@ -7,11 +7,14 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 from filelock import FileLock
 
 from rockcheck import InputError
-from rockcheck.commands import cli
+from rockcheck.commands import cli, console
+from rockcheck.commands.ending import finish_command
 from rockcheck.reports import site
+from rockcheck.validation.finding import Finding
 from rockcheck.validation.suite import results
 
 ROCKCHECK = [sys.executable, "-m", "rockcheck"]
@@ -54,6 +57,16 @@ def test_the_exit_codes_are_told_by_the_help_and_by_the_documentation(typed):
     told = dict(re.findall(r"^ +(\d+) +(\S.*)$", typed("--help")[0], re.MULTILINE))
     assert told == {str(code): meaning for code, meaning in cli.EXIT_CODES.items()}
     assert {int(code) for code in re.findall(r"\n\| (\d+) \| ", page)} >= {*cli.EXIT_CODES}
+
+
+@pytest.mark.parametrize(("mode", "lines"), [("quiet", 2), ("tables", 0)])
+def test_quiet_says_what_failed_in_a_study(mode, lines, capsys):
+    finding = Finding("mine", "", "1 of 2 broke", failures={"b": "no step"}, exit_code=3)
+    with console.output_mode(mode), pytest.raises(typer.Exit) as ended:
+        finish_command(finding)
+    assert ended.value.exit_code == 3
+    errors = capsys.readouterr().err.splitlines()
+    assert errors == ["rockcheck: 1 of 2 broke", "rockcheck: failed: b: no step"][:lines]
 
 
 def test_a_benchmark_whose_time_is_over_is_not_called_interrupted(tmp_path, monkeypatch, typed):
