@@ -50,7 +50,7 @@ from rockcheck.validation.studies.conformance.cards import Conformance
 from rockcheck.validation.studies.conformance.players import named
 from rockcheck.validation.studies.spectrum import agreement, tiles
 from rockcheck.validation.studies.stress import maps, players
-from rockcheck.validation.studies.work_precision import runs
+from rockcheck.validation.studies.work_precision import lines
 
 scene = load_scene("fig5a").replace(duration=0.1)
 work = models.Work(label="abacus", family="abacus", settings={"time_step": 1e-3, "beads": 3})
@@ -69,8 +69,8 @@ print(json.dumps({
     "candidates": agreement.CANDIDATES,
     "share": agreement.PLAYED_SHARE["abacus"],
     "spectrum": dict(tiles.Request(model="abacus").settings),
-    "lines": {label: line.values for label, line in runs.LINES.items() if "abacus" in label},
-    "converge": runs.LINES["abacus"].converge,
+    "lines": {label: line.values for label, line in lines.LINES.items() if "abacus" in label},
+    "converge": lines.LINES["abacus"].converge,
     "setups": [label for label in maps.SETUPS if "abacus" in label],
     "player": players.PLAYERS["abacus"].words,
 }))

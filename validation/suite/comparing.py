@@ -1,7 +1,7 @@
 """A cell's history compared with its references: the figures of each measure and window.
 
 In: a history, the references' histories, and a `Request`. Out: a `ComparisonRecord`. Nothing here
-knows a store; `playing` calls `compare_cell`, and keeps what it returns.
+knows a store; `runs` calls `compare_cell`, and keeps what it returns.
 """
 
 import math

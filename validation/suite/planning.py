@@ -1,7 +1,7 @@
 """What a suite plays and compares, and what each result depends on.
 
 In: a `Suite`. Out: its cells and batches as tasks, each with the name of its kept result; for a
-finished cell, the measures that are wanted and the key of its comparisons. `playing` calls it.
+finished cell, the measures that are wanted and the key of its comparisons. `runs` calls it.
 """
 
 import json

@@ -1,7 +1,7 @@
 """Results on a scene that serve all its cells: computed once, and kept in the store.
 
 In: a store and a scene. Out: its landing at which the laws of impacts part, its horizon of
-predictability, and the effect of uncertain inputs on its figures. `playing` calls
+predictability, and the effect of uncertain inputs on its figures. `runs` calls
 the first two, `runner` the last.
 """
 

@@ -11,30 +11,30 @@ import pytest
 from rockcheck.reports.document import publish
 from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.studies.stress import maps, runs
-from rockcheck.validation.studies.work_precision.runs import (
+from rockcheck.validation.studies.work_precision.benchmark_scenes import (
     DURATION,
     FAMILIES,
-    FITTED,
     GAPS,
-    LINES,
     MEMBERS,
     PULSES,
     RESTITUTIONS,
     WALLS,
-    BenchmarkRun,
-    Play,
-    at_the_cost,
-    cost_at,
-    error_at,
+    prepared,
+)
+from rockcheck.validation.studies.work_precision.convergence import (
     exceptions_of,
-    frame_of,
     levels_of,
     orders_of,
+)
+from rockcheck.validation.studies.work_precision.curves import FITTED, cost_at, error_at, slope
+from rockcheck.validation.studies.work_precision.lines import LINES
+from rockcheck.validation.studies.work_precision.points import (
+    at_the_cost,
+    frame_of,
     points_of,
     pooled,
-    prepared,
-    slope,
 )
+from rockcheck.validation.studies.work_precision.runs import BenchmarkRun, Play
 from rockcheck.validation.studies.work_precision.savings import KINDS, Saving, measured
 from rockcheck.validation.studies.work_precision.study import Measure, WorkPrecision
 from rockcheck.validation.studies.work_precision.timings import (

@@ -28,7 +28,7 @@ from rockcheck.scenes import (
     Wall,
 )
 from rockcheck.validation.execute import models
-from rockcheck.validation.studies.work_precision.runs import pulse
+from rockcheck.validation.studies.work_precision.benchmark_scenes import pulse
 from rockcheck.validation.studies.work_precision.timings import PLAIN, grid, timed
 
 #: A wall that the block cannot reach, m.

@@ -30,7 +30,7 @@ from rockcheck.scenes import (
     load_scene,
 )
 from rockcheck.scenes.compiled import kernel
-from rockcheck.validation.studies.work_precision.runs import pulse
+from rockcheck.validation.studies.work_precision.benchmark_scenes import pulse
 
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
 FREQUENCY_RATIOS, AMPLITUDE_RATIOS, NODES = (0.5, 8.0), (1.0, 12.0), 100
