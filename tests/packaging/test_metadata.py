@@ -8,7 +8,7 @@ import subprocess
 import sys
 import tomllib
 from functools import cache
-from importlib.metadata import packages_distributions
+from importlib.metadata import EntryPoint, packages_distributions
 from pathlib import Path
 
 import pytest
@@ -52,6 +52,20 @@ def test_every_data_file_is_in_the_wheel():
                 assert "data/**/*" in named, path
             elif len(within.parts) == 1:
                 assert any(path.match(pattern) for pattern in named), path
+
+
+@pytest.mark.parametrize(
+    ("group", "value"),
+    [
+        ("console_scripts", PROJECT["project"]["scripts"]["rockcheck"]),
+        *(
+            (group, points["rockcheck"])
+            for group, points in PROJECT["project"]["entry-points"].items()
+        ),
+    ],
+)
+def test_the_command_the_plugin_and_the_views_are_there(group, value):
+    assert EntryPoint("rockcheck", value, group).load()
 
 
 def imported(nodes):
@@ -171,7 +185,8 @@ def test_the_facade_has_every_public_name():
         for name in part.__all__
         if getattr(rockcheck, name) is not getattr(part, name)
     ]
-    assert (other, rockcheck.__version__) == ([], PROJECT["project"]["version"])
+    assert other == []
+    assert rockcheck.__version__ == PROJECT["project"]["version"]
     with pytest.raises(AttributeError, match="Blok"):
         rockcheck.Blok  # noqa: B018
 
