@@ -2,6 +2,12 @@
 
 Every excitation counts time from its own start (t = 0) and gives the acceleration of the base in
 m/s^2, horizontal motion positive to the right, vertical motion positive upward.
+
+A new pulse is a class here, as `Wavelet` is (`Wave` is a piece of a sine), a member of the union
+`Excitation`, and a name in `scenes/__init__`, its stub, `rockcheck/__init__.pyi`, docs/api.md.
+The event-based models need a shape of it: see the head of `ebm.core.ground`. Solvers that take
+samples, pages, spectra and files need no more. Random scenes (`stress.generator`) draw it where a
+row says so; a row in `PULSES` of tests/ebm/test_pulses.py tests it in all models.
 """
 
 import math
@@ -285,9 +291,29 @@ class Wavelet(Pulse):
 
 
 def extremes_by_samples(pulse: Ricker | Wavelet) -> tuple[float, float]:
-    """The least and the largest acceleration of a pulse (m/s^2), to 1e-6 of its amplitude."""
-    values = pulse.acceleration(np.linspace(0.0, pulse.quiet_after, 20_001))
-    return float(np.min(values)), float(np.max(values))
+    """The least and the largest acceleration of a pulse (m/s^2), to rounding."""
+    times = np.linspace(0.0, pulse.quiet_after, 20_001)
+    values = pulse.acceleration(times)
+    least, largest = times[np.argmin(values)], times[np.argmax(values)]
+    step = float(times[1])
+    return -_largest_near(pulse, largest_of=-1.0, t=least, step=step), _largest_near(
+        pulse, largest_of=1.0, t=largest, step=step
+    )
+
+
+def _largest_near(pulse: Ricker | Wavelet, *, largest_of: float, t: float, step: float) -> float:
+    """The largest of `largest_of` (1 or -1) times the acceleration within a step of a time.
+
+    Each look is a hundred times as fine as the one before. An extremum is flat: its value errs by
+    the square of the distance.
+    """
+    largest = -math.inf
+    for _ in range(4):
+        times = t + np.linspace(-step, step, 201)
+        values = largest_of * pulse.acceleration(times)
+        index = int(np.argmax(values))
+        largest, t, step = max(largest, float(values[index])), float(times[index]), 0.01 * step
+    return largest
 
 
 class Record(Motion):

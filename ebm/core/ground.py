@@ -1,6 +1,21 @@
 """Ground motion for compiled code: value, Taylor series, kinks, next passage of a level.
 
 Natural units throughout: acceleration in g, time in sqrt(R/g).
+
+A new kind of excitation is a member of `Shape` (`core.names`) and a branch in each of these:
+
+| function | what it says of the shape |
+|---|---|
+| `ground_of` | its numbers, in natural units |
+| `_with_rate` | the acceleration and its rate |
+| `fill_series` | the Taylor series of the acceleration |
+| `next_kink` | when the acceleration or its rate jumps next |
+| `_next_extremum` | when the acceleration is largest or least next |
+| `largest_ahead` | a bound of the acceleration from a time on |
+
+A branch that is forgotten leaves the base at rest, or the bound infinite. The numbers c0 to c3 go
+with that power of 1/time, `rate` with 1/time (of GAUSSIAN with 1/time^2): `packing` and `natural`
+change units by this rule.
 """
 
 import math
@@ -10,7 +25,7 @@ import numpy as np
 
 from rockcheck.ebm.core.names import Shape
 from rockcheck.ebm.core.series import RECIPROCAL
-from rockcheck.scenes import Excitation, Floats, Record, Ricker, Wave, Wavelet
+from rockcheck.scenes import Excitation, Floats, Record, Rest, Ricker, Wave, Wavelet
 from rockcheck.scenes.compiled import inner_kernel
 from rockcheck.scenes.named_record import filled, record
 
@@ -92,6 +107,8 @@ def ground_of(excitation: Excitation, gravity: float, time_unit: float) -> Groun
                 "step": excitation.time_step / time_unit,
                 "scale": 1.0,
             }
+    elif not isinstance(excitation, Rest):
+        raise NotImplementedError(f"{excitation.kind}: no shape of `ebm.core.ground` is its")
     quiet = {"quiet": excitation.quiet_after / time_unit}
     return Ground(filled(FORM, **quiet | given, count=len(samples)), samples)
 

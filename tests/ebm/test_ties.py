@@ -94,6 +94,10 @@ def test_an_acceleration_that_just_reaches_what_uplifts_is_an_edge():
     limit = 9.81 * 0.3
     edges = [edge.what for edge in edges_of(standing(Sine(amplitude=limit, period=1.0)))]
     assert "acceleration equals g tan(alpha)" in edges
+    symmetric = Ricker(amplitude=limit, period=0.9, symmetric=True)
+    assert "acceleration equals g tan(alpha)" in [
+        edge.what for edge in edges_of(standing(symmetric))
+    ]
 
 
 @pytest.mark.parametrize("scene", [cube(), tall()], ids=["cube", "sine"])

@@ -190,3 +190,14 @@ def test_periods_of_a_spectrum_leave_no_wide_gap():
     for one, other in pairwise(intensity.PERIODS):
         assert one < other <= 2.0 * one
     assert intensity.PERIODS[0] <= 0.1 < 4.0 <= intensity.PERIODS[-1]
+
+
+@pytest.mark.parametrize("amplitude", [2.0, 0.731])
+def test_the_largest_acceleration_of_a_symmetric_pulse_is_its_amplitude(amplitude):
+    _, largest = Ricker(amplitude=amplitude, period=0.7, symmetric=True).extremes
+    assert largest == amplitude
+
+
+def test_the_extremes_of_an_antisymmetric_pulse_are_equal_and_opposite():
+    least, largest = Ricker(amplitude=1.3, period=0.7).extremes
+    assert largest == pytest.approx(-least, rel=1e-15)

@@ -416,7 +416,7 @@ def _exact_walls(r: np.random.Generator, block: Block) -> list[Wall]:
 
 
 def _exact_excitation(r: np.random.Generator, levels: tuple[float, ...]) -> Excitation:
-    """Rest, a pulse whose peak is one of the levels, or a record of few of them.
+    """Rest, a pulse of one of the levels, or a record of few of them; a sine peaks at its level.
 
     The record jumps, ramps or stays at a level.
     """
