@@ -1,18 +1,18 @@
-"""The event core stays small: few numbers, one zero of a kind, few modelling choices with a home
-and a paragraph each; short functions."""
+"""The event core stays small: few numbers, a name for each, few modelling choices; its stages are
+those of the page of theory."""
 
 import ast
 import collections
 import enum
 import importlib
-import inspect
+import itertools
 import re
 from pathlib import Path
 
-import pytest
-
 import rockcheck.ebm
-from rockcheck.ebm.core import march, names
+from rockcheck.ebm import EventBasedModel, natural
+from rockcheck.ebm.core import names
+from rockcheck.scenes import PAPER_BLOCK, Floor, Scene, compiled, progress
 
 ROOT = Path(__file__).parents[3]
 FOLDER = Path(rockcheck.ebm.__file__).parent
@@ -22,8 +22,6 @@ NODES = [
     for path in sorted(FOLDER.rglob("*.py"))
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
 ]
-#: The zeros of position, velocity and time: where each is defined.
-ZEROS = {"CLOSED": "core/contacts.py", "SLOW": "core/contacts.py", "INSTANT": "core/series.py"}
 
 
 def test_small_numbers_are_few():
@@ -31,49 +29,53 @@ def test_small_numbers_are_few():
     assert sum(isinstance(one, float) and 0.0 < abs(one) < 2e-3 for one in values) <= 20
 
 
-@pytest.mark.parametrize("name", ZEROS)
-def test_there_is_one_zero_of_a_kind(name):
-    assert (FOLDER / ZEROS[name]).read_text(encoding="utf-8").count(f"\n{name} = ") == 1
-
-
 def test_modelling_choices_are_few():
     assert len(names.Rule) == names.RULES == len(names.RULE_NAMES) <= 15
 
 
-@pytest.mark.parametrize("rule", names.Rule, ids=lambda rule: rule.name)
-def test_a_modelling_choice_is_counted_and_explained(rule):
-    homes = {
-        name
-        for name, node in NODES
-        if isinstance(node, ast.AugAssign)
-        and isinstance(node.target, ast.Subscript)
-        and f".{rule.name}" in ast.unparse(node.target.slice)
-    }
-    assert len(homes) in (1, 2, 3)
-    assert names.RULE_NAMES[rule] in (ROOT / "docs" / "limits.md").read_text(encoding="utf-8")
+def stages_of_the_theory_page():
+    """Each stage of an event, with the module and the name of its function."""
+    page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    page = page[page.index("## How an event is handled") :]
+    return re.findall(r"^\d\. \*\*(\w+)\.?\*\* \(`(\w+)\.(\w+)`\)", page, re.MULTILINE)
 
 
 def test_the_theory_page_links_each_stage_to_its_function():
-    page = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
-    page = page[page.index("## How an event is handled") :]
-    stages = re.findall(r"^\d\. \*\*(\w+)\.?\*\* \(`(\w+)\.(\w+)`\)", page, re.MULTILINE)
-    assert [stage for stage, _, _ in stages] == [
-        "Expand",
-        "Locate",
-        "Sample",
-        "Advance",
-        "Resolve",
-        "Select",
-    ]
-    loop = inspect.getsource(march)
-    places = []
+    stages = stages_of_the_theory_page()
+    names_of_stages = [stage for stage, _, _ in stages]
+    assert names_of_stages == ["Expand", "Locate", "Sample", "Advance", "Resolve", "Select"]
     for _, module, name in stages:
         assert callable(getattr(importlib.import_module(f"rockcheck.ebm.core.{module}"), name))
-        call = re.search(rf"\b{name}\(block", loop)
-        assert call, name
-        places.append(call.start())
-    # A mode that has ended is followed at the head of the loop.
-    assert [places[-1], *places[:-1]] == sorted(places)
+
+
+def test_stages_follow_each_other_as_the_theory_page_says(monkeypatch):
+    """From one expansion to the next, in a run that is interpreted."""
+    order = [name for _, _, name in stages_of_the_theory_page()]
+    called = []
+    monkeypatch.setattr(
+        compiled._Inner,
+        "__call__",
+        lambda kernel, *given: called.append(kernel.__name__) or kernel.py_func(*given),
+    )
+    monkeypatch.setattr(natural, "is_ready", lambda *given: False)
+    tilted = Scene(
+        name="tilted",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.3),
+        initial_rotation=0.1 * PAPER_BLOCK.alpha,
+        duration=0.5,
+        output_step=0.1,
+    )
+    with progress.within(progress.ONE_RUN, True):
+        EventBasedModel(tolerance=1e-6).simulate(tilted)
+    rounds = []
+    for name in called:
+        if name == order[0]:
+            rounds.append([])
+        if name in order and rounds:
+            rounds[-1].append(order.index(name))
+    assert [places for places in rounds if places != sorted(places)] == []
+    assert set(itertools.chain(*rounds)) == set(range(len(order)))
 
 
 def test_a_name_has_one_value():
