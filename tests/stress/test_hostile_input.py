@@ -90,7 +90,7 @@ def feed_file(
 def check_record(found: list[Any]) -> None:
     for one in found:
         assert len(one.samples) >= 1
-        assert all(map(math.isfinite, one.samples))
+        assert [value for value in one.samples if not math.isfinite(value)] == []
         assert 0.0 < one.time_step < math.inf
 
 
@@ -100,7 +100,7 @@ def check_scene(scene: Scene) -> None:
 
 
 def check_history(history: History) -> None:
-    assert all(map(math.isfinite, history.channels["theta"]))
+    assert [value for value in history.channels["theta"] if not math.isfinite(value)] == []
 
 
 @functools.cache
@@ -286,8 +286,10 @@ def test_bombs_stay_below_a_gigabyte_and_a_minute(tmp_path):
         (tmp_path / "in" / name).write_text(text)
     script = [sys.executable, "-c", _PLAY_BOMBS, str(tmp_path / "in"), str(tmp_path / "out")]
     done = subprocess.run(script, capture_output=True, text=True, timeout=300, check=False)
-    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr[-2000:]
-    assert all(len(line) < 600 for line in done.stderr.splitlines())
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "Traceback" not in done.stderr, done.stderr[-2000:]
+    for line in done.stderr.splitlines():
+        assert len(line) < 600
 
 
 @pytest.mark.parametrize("name", nasty.HOSTILE_NAMES)

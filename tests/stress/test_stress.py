@@ -3,6 +3,7 @@ maps."""
 
 import dataclasses
 from collections import Counter
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -60,13 +61,13 @@ def test_shrinking_drops_all_that_does_not_matter(tmp_path):
     assert shrink(scene, shows, 0) == (scene, False)
     for trials, whole in ((3, False), (2000, True)):
         small, complete = shrink(scene, shows, trials)
-        assert (shows(small), complete) == (True, whole)
+        assert shows(small)
+        assert complete == whole
     assert 0.5 < small.block.radius < 2.0
-    left = (small.block.homogeneous, small.walls, small.vertical)
-    assert (len(small.excitation.unscaled) < 20, *left) == (
-        *(True, True),
-        *((Wall(side="right", gap=0.0, restitution=0.0),), Rest()),
-    )
+    assert len(small.excitation.unscaled) < 20
+    assert small.block.homogeneous
+    assert small.walls == (Wall(side="right", gap=0.0, restitution=0.0),)
+    assert small.vertical == Rest()
     assert small.floor.restitution == small.initial_height == small.initial_angular_velocity == 0.0
     file = writing.write_whole(
         tmp_path / "small.toml", files.scene_text(files.tables_of(small), "a remark\nanother")
@@ -119,16 +120,18 @@ def test_a_failure_is_shown_with_its_smallest_scene(tmp_path, monkeypatch, label
     found = run(study, tmp_path, jobs=0)
     page = publish(found, tmp_path).read_text()
     failures, scenes = found.table("failures").records(), found.table("scenes").records()
-    assert (found.exit_code, found.verdict, found.complete) == (1, "fail", True)
+    assert found.exit_code == 1
+    assert found.verdict == "fail"
+    assert found.complete is True
     assert 0 < len(failures) == len(scenes) < 12
     (mirror,) = (row for row in found.table("invariants").records() if row["invariant"] == "mirror")
-    assert (mirror["worst"], mirror["failures"]) == (3.0, len(failures))
-    assert (found.table("models").records()[0]["gaining"], found.table("choices").records()) == (
-        12,
-        [{"model": label, "choices": "settles 24"}],
-    )
+    assert mirror["worst"] == 3.0
+    assert mirror["failures"] == len(failures)
+    assert found.table("models").records()[0]["gaining"] == 12
+    assert found.table("choices").records() == [{"model": label, "choices": "settles 24"}]
     file = tmp_path / "failures" / scenes[0]["scene"]
-    assert (len(files.load_scene(file).walls), len(list(file.parent.iterdir()))) == (1, len(scenes))
+    assert len(files.load_scene(file).walls) == 1
+    assert len(list(file.parent.iterdir())) == len(scenes)
     assert f'href="failures/{file.name}"' in page
     monkeypatch.chdir(file.parent)
     line = next(line for line in file.read_text("utf-8").splitlines() if file.name in line)
@@ -147,11 +150,25 @@ def test_failures_of_the_program_and_of_engines():
         other: RunTotals(model="cm", failures=failures, counts=Counter(runs=30))
     }
     done = {task: one for task, one in done.items() if one.model == task.model}
-    assert (study.gather(done).exit_code, len(study.gather(done).files)) == (0, MOST_FILES)
+    assert study.gather(done).exit_code == 0
+    assert len(study.gather(done).files) == MOST_FILES
     done[lost] = pool.Failure("it hangs")
     found = study.gather(done)
-    assert (found.exit_code, found.table("failures").records()[0]["words"]) == (1, "it hangs")
+    assert found.exit_code == 1
+    assert found.table("failures").records()[0]["words"] == "it hangs"
     assert "not shrunk" in found.files["failures/ebm-ends-1-7.toml"]
+
+
+def test_of_an_interrupted_search_for_smaller_scenes_all_failures_are_told(tmp_path, monkeypatch):
+    """The first ones with their scenes, as they were found."""
+    broken = CheckedRun(figures={"ends": 0.0, "mirror": 1.0}, outcome="at rest")
+    monkeypatch.setattr(type(PLAYERS["ebm"]), "check", lambda *_: broken)
+    monkeypatch.setattr(Shrinking, "play", Mock(side_effect=KeyboardInterrupt))
+    found = run(Stress("runs", models=("ebm",), runs=30), tmp_path, jobs=0)
+    assert not found.complete
+    assert len(found.table("failures").rows) == 30
+    assert len(found.files) == MOST_FILES
+    assert [name for name, text in found.files.items() if "not shrunk" not in text] == []
 
 
 def test_where_an_engine_breaks_is_found():
@@ -162,7 +179,8 @@ def test_where_an_engine_breaks_is_found():
         for setup in ("mujoco default", "mujoco")
     ] == ["sinks", ""]
     found = MapPoint("mujoco default", "size", 1e-3, quick=True).play()
-    assert (found.step, found.fault) == (0.0, "sinks")
+    assert found.step == 0.0
+    assert found.fault == "sinks"
     assert stand_still("mujoco default", "pushed", 5.0).moves["creep"] > 1e-4
     assert stand_still("mujoco adaptive", "pushed", 5.0).moves["creep"] < 1e-6
     assert stand_still("cm", "left alone", 5.0).moves["jitter"] < 1e-9
@@ -172,7 +190,8 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
     """Of what was played; where a process was lost there is no cell."""
     study = Stress("maps", quick=True)
     work = study.tasks({})
-    assert (work, study.gather({}).verdict) == (map_points(quick=True), "")
+    assert work == map_points(quick=True)
+    assert study.gather({}).verdict == ""
     only = Stress("all", quick=True, runs=1, models=("ebm", "cm")).tasks({})
     assert {one.line for one in only if isinstance(one, MapPoint)} == {"cm", "cm paper"}
     done: dict = {
@@ -200,8 +219,7 @@ def test_the_maps_are_tables_and_a_picture(tmp_path):
 def test_the_command(tmp_path, told):
     words = ["--runs", "6", "--jobs", "1", "--out", str(tmp_path), "--seed", "4"]
     found = told("stress", "runs", "--model", "ebm", *words)
-    assert (
-        (found["seed"], found["batches"]["ebm"]["counts"]["runs"]),
-        [row["invariant"] for row in found["tables"]["invariants"]],
-    ) == ((4, 6), list(INVARIANTS))
+    assert found["seed"] == 4
+    assert found["batches"]["ebm"]["counts"]["runs"] == 6
+    assert [row["invariant"] for row in found["tables"]["invariants"]] == list(INVARIANTS)
     assert "| ebm | " in (tmp_path / "summary.md").read_text()
