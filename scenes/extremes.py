@@ -1,6 +1,7 @@
 """What an engineer asks of a run: how far the block turns, slides, reaches, how it strikes a wall.
 
-A run lasts from its start to its end: the scene's duration, or where the block overturned.
+A history lasts from its start to its end: the scene's duration, or where the block overturned. A
+run of `ebm.fates` lasts until its fate is decided.
 """
 
 from collections.abc import Mapping

@@ -270,3 +270,13 @@ def test_bouc_wen_friction_has_no_fates():
 def test_a_fall_to_the_left_is_told_from_one_to_the_right():
     scene = resting(initial_rotation=1.2 * PAPER_BLOCK.alpha)
     assert fates_of(scene, scene.mirrored()).outcome.tolist() == [OVERTURNED_LEFT, 3]
+
+
+@pytest.mark.parametrize("keeps", [Keep.STRIKES, Keep.EXTREMES])
+def test_what_is_kept_of_a_run_changes_no_fate_and_no_peak(keeps):
+    rng = np.random.default_rng(20261129)
+    scenes = [*pulses_beside_walls(40, 20261129), *(random_scene(rng) for _ in range(40))]
+    lean = play_fates(table_of(scenes), MODEL, keeps=Keep.NOTHING)
+    rich = play_fates(table_of(scenes), MODEL, keeps=keeps)
+    assert rich.outcome.tolist() == lean.outcome.tolist()
+    assert rich.peak.tolist() == pytest.approx(lean.peak.tolist(), rel=0.0, abs=0.0, nan_ok=True)

@@ -54,11 +54,11 @@ def test_steps_that_cannot_vary_are_refused_with_the_reason(engine, fault_of):
 
 def test_a_run_prints_nothing():
     code = """
-from rockcheck import engines
+from rockcheck.engines import registry
 from rockcheck.scenes import Block, Floor, Scene
 scene = Scene(name="quiet", block=Block(half_width=0.4, half_height=1.5), \
 floor=Floor(friction=0.3), duration=0.01)
-for engine in (getattr(engines, name) for name in engines.__all__):
+for engine in (facts.engine for facts in registry.every()):
     if engine.installed():
         for settings in ("best", "default"):
             engine(time_step=1e-3, settings=settings).simulate(scene)

@@ -17,9 +17,8 @@ from rockcheck import (
     Scene,
     Sine,
     Wall,
-    engines,
 )
-from rockcheck.engines import base_motion
+from rockcheck.engines import base_motion, registry
 from rockcheck.scenes import PAPER_BLOCK
 
 SQUAT = Block(half_width=1.0, half_height=0.5)
@@ -366,9 +365,9 @@ SCENES = {
     },
 }
 ALL = [
-    engine
-    for engine in (getattr(engines, name) for name in engines.__all__)
-    if engine.installed() and not engine.fixed_because
+    facts.engine
+    for facts in registry.every()
+    if facts.engine.installed() and not facts.engine.fixed_because
 ]
 #: Models at their best, and engines as they come; how far from the unilateral model they may be,
 #: RMS in alpha.

@@ -13,9 +13,10 @@ import pandas as pd
 import pytest
 from junitparser import JUnitXml
 
-from rockcheck import EventBasedModel, InputError, ModelFailure, MuJoCo, engines, load_scene
+from rockcheck import EventBasedModel, InputError, ModelFailure, MuJoCo, load_scene
 from rockcheck.commands.cli import main
 from rockcheck.ebm.ties import ties_of
+from rockcheck.engines import registry
 from rockcheck.scenes import writing
 from rockcheck.validation.execute import models, pool
 from rockcheck.validation.studies.conformance import cards
@@ -134,7 +135,7 @@ def test_a_wrong_value_is_not_shown_as_the_right_one(id, value, said):
 
 def test_the_engines_here_are_those_that_are_installed():
     # `ROCKCHECK_ENGINES` names those that must be, so that none is skipped unseen.
-    known = map(engines.__dict__.get, engines.__all__)
+    known = [facts.engine for facts in registry.every()]
     assert set(HERE) == {one.name for one in known if not one.module or find_spec(one.module)}
     assert set(os.environ.get("ROCKCHECK_ENGINES", "mujoco").split()) <= set(HERE)
 

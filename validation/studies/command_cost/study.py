@@ -32,8 +32,9 @@ from rockcheck.validation.finding import (
 from rockcheck.validation.studies.command_cost.measuring import Cost, cost_of
 from rockcheck.validation.study import Study, Task
 
-#: How often each command runs, and in a quick study: the median counts.
-REPEATS, QUICK_REPEATS = 3, 1
+#: How often a command of some seconds runs: the median counts. Others, and all of a quick study,
+#: run once.
+REPEATS = 3
 MEGABYTE = 1e6
 
 
@@ -41,8 +42,8 @@ MEGABYTE = 1e6
 class Command:
     """A command that is measured: its words, what it does, and what runs before, unmeasured.
 
-    `long` ones take more than some seconds: a quick study leaves them out. One that `compiles`
-    finds no compiled code the first time.
+    `long` ones take more than some seconds: they run once, and a quick study leaves them out. One
+    that `compiles` finds no compiled code the first time.
     """
 
     words: str
@@ -136,9 +137,8 @@ class CommandCost(Study):
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
         """A task a command."""
-        repeats = QUICK_REPEATS if self.quick else REPEATS
         return [
-            CommandTask(command.words, repeats, where="timed")
+            CommandTask(command.words, 1 if self.quick or command.long else REPEATS, where="timed")
             for command in COMMANDS.values()
             if not (self.quick and command.long)
         ]
@@ -203,7 +203,10 @@ def cost_table(costs: Mapping[str, CommandCosts]) -> Table:
                 max(first.peak, again.peak) / MEGABYTE,
             ]
         )
-    note = "Medians. Compiled code is there beforehand, but for `rockcheck warm`."
+    note = (
+        "Medians of three runs; what takes long runs once. Compiled code is there beforehand, but"
+        " for `rockcheck warm`."
+    )
     return Table("commands", columns, rows, "Commands", note=note)
 
 
