@@ -16,6 +16,7 @@ from rockcheck.reports.document import FIGURES, publish
 from rockcheck.reports.drawers import figure_of
 from rockcheck.reports.manifest import hash_of
 from rockcheck.reports.spectrum_plots import LAW_MARK, OUTCOMES, draw_spectrum, own_label
+from rockcheck.reports.style import power_of_ten
 from rockcheck.scenes import reading
 from rockcheck.validation.finding import (
     Axis,
@@ -76,14 +77,12 @@ def test_a_figure_has_the_papers_panels():
     assert [axes.get_title(loc="left") for axes in figure.axes] == [
         panel.title for panel in paper_panels(9)
     ]
-    assert (figure.get_suptitle(), labels(figure)) == (
-        "Fig. 9: Wall on the right, μ = 0.6",
-        [
-            "safe",
-            "no wall: overturned clockwise",
-            "overturned; no wall: counterclockwise",
-        ],
-    )
+    assert figure.get_suptitle() == "Fig. 9: Wall on the right, μ = 0.6"
+    assert labels(figure) == [
+        "safe",
+        "no wall: overturned clockwise",
+        "overturned; no wall: counterclockwise",
+    ]
 
 
 def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
@@ -92,10 +91,8 @@ def test_what_is_undecided_or_depends_on_the_law_is_in_the_legend():
     figure = figure_of(plot)
     assert {"undecided", "depends on the impact law"} <= {*labels(figure)}
     (ring,) = figure.axes[1].lines
-    assert (ring.get_marker(), ring.get_xydata().tolist()) == (
-        LAW_MARK["marker"],
-        [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]],
-    )
+    assert ring.get_marker() == LAW_MARK["marker"]
+    assert ring.get_xydata().tolist() == [[plot.data["frequencies"][3], plot.data["amplitudes"][2]]]
 
 
 def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
@@ -108,7 +105,7 @@ def test_the_pulse_of_ones_own_scene_is_marked_and_none_in_the_papers_figures():
     (star,) = figure.axes[0].lines
     np.testing.assert_allclose(star.get_xydata(), [own])
     assert own_label(record=False) in labels(figure)
-    assert not any(axes.lines for axes in figure_of(plot_of(*paper_panels(8))).axes)
+    assert [axes for axes in figure_of(plot_of(*paper_panels(8))).axes if axes.lines] == []
 
 
 def test_the_documentation_shows_the_kept_study():
@@ -119,9 +116,11 @@ def test_the_documentation_shows_the_kept_study():
         list(map(plain, row)) for row in whole_runs.load("spectrum").table("agreement").rows
     ]
     assert len({row[0] for row in by_spectrum.rows}) == 28
-    assert all(
-        share["nodes"] == 100 for share in found["shares"] if share["model"] not in PLAYED_SHARE
-    )
+    assert [
+        share
+        for share in found["shares"]
+        if share["model"] not in PLAYED_SHARE and share["nodes"] != 100
+    ] == []
     assert {share["model"] for share in found["shares"]} == set(CANDIDATES)
     assert len(figure_of(plot).axes) == len(panels) * len(found["maps"])
 
@@ -197,6 +196,13 @@ def test_what_is_no_figure_is_refused_in_one_line(study, refused, data, words, s
     assert said in refused("report", str(study), *words.split(), "-o", "a.svg")
 
 
+@pytest.mark.parametrize(
+    ("exponent", "label"), [(-12, "10⁻¹²"), (-1, "0.1"), (0, "1"), (3, "1000"), (4, "10⁴")]
+)
+def test_a_power_of_ten_is_plain_near_one(exponent, label):
+    assert power_of_ten(10.0**exponent) == label
+
+
 def test_a_figure_that_takes_too_long_is_ended(study, refused, monkeypatch):
     monkeypatch.setattr("rockcheck.reports.document.DRAWING", 1e-3)
     assert "did not end within 0.001 s" in refused(
@@ -232,4 +238,5 @@ def test_no_other_file_is_taken_for_one_of_the_run_before(tmp_path):
         path.write_text("a\n", "utf-8")
     (folder / "own.csv").write_text("b,a\n", "utf-8")
     publish(Finding("made", "Made up", ""), folder)
-    assert all(path.exists() for path in (*mine, folder / "own.csv"))
+    for path in (*mine, folder / "own.csv"):
+        assert path.exists()

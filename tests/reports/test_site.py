@@ -20,6 +20,7 @@ from rockcheck.reports.tables import worst_first
 from rockcheck.reports.templates import PAGES, folder_argument
 from rockcheck.reports.view import slugs_of
 from rockcheck.scenes import History, reading, writing
+from rockcheck.validation.execute.models import FAMILIES
 from rockcheck.validation.suite import limits_used, results
 from rockcheck.validation.uncertainty import input_spread
 
@@ -47,6 +48,25 @@ def test_every_scene_has_a_page_and_every_address_is_a_file_of_the_folder(site):
     }
     assert [place for place, target in targets.items() if not target.is_file()] == []
     assert [place for place, to in targets.items() if not to.is_relative_to(site.resolve())] == []
+
+
+def test_pages_of_scenes_with_walls_say_what_the_papers_pivot_forbids(site):
+    forbidding = [page for page in pages_of(site) if "forbids the hop" in page.read_text("utf-8")]
+    assert [page.stem for page in forbidding] == ["beside-a-wall"]
+    said = text_of(forbidding[0].read_text("utf-8"))
+    assert "here 4 mm high" in said
+    assert "model form, not numerical error" in said
+
+
+@pytest.mark.parametrize(
+    ("model", "role"),
+    [
+        ("ebm-unilateral", "The reference"),
+        ("ebm", "What separates it from the reference is model form"),
+    ],
+)
+def test_the_index_says_what_a_model_is(index, model, role):
+    assert f"{FAMILIES[model].summary}. {role}" in text_of(index)
 
 
 def test_hostile_text_stays_text(site):
@@ -97,14 +117,16 @@ def test_index_says_how_far_each_model_is(run, index):
 def test_index_answers_three_questions_first(run, index):
     found = glance(run, matrix(run))
     farthest = found.farthest.cell
-    assert (farthest.scene, farthest.model) == ("beside a wall", "mine:Model")
+    assert farthest.scene == "beside a wall"
+    assert farthest.model == "mine:Model"
     assert [scene for scene, _ in found.apart] == [
         scene for scene, row in matrix(run).items() if any(entry.apart for entry in row.values())
     ]
     verdicts = [check.verdict for _, check in run.checks() if check.expected is not None]
     shares = [limits_used.used(check) for _, check in found.changed]
     assert shares == sorted(shares, reverse=True)
-    assert (found.judged, len(shares)) == (len(verdicts), len(verdicts) - verdicts.count("pass"))
+    assert found.judged == len(verdicts)
+    assert len(shares) == len(verdicts) - verdicts.count("pass")
     at_a_glance, after = re.search('<dl class="glance"(.*?)</dl>(.*)', index, re.DOTALL).groups()
     said = (
         "mine:Model in beside a wall : 0.006 α RMS (first 8 s), convergence not looked at",
