@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rockcheck.scenes import ModelFailure
+from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.command_cost import study
 from rockcheck.validation.studies.command_cost.measuring import Cost, cost_of
 from rockcheck.validation.studies.command_cost.study import (
@@ -78,6 +79,7 @@ def test_the_table_has_medians_and_the_slowest():
     assert row["slowest"] == 9.0
     assert row["cpu"] == 4.0
     assert row["peak"] == 3.0
+    assert finding.exit_code == 0
 
 
 def test_over_a_history_each_command_has_a_panel_and_each_run_a_row():
@@ -110,3 +112,8 @@ def test_a_line_that_is_no_run_is_refused_before_anything_runs(refused, in_an_em
 
 def test_a_history_is_of_commands_alone(refused):
     assert "--history: is of commands" in refused("benchmark", "ebm", "--history", "costs.jsonl")
+
+
+def test_a_command_that_failed_is_a_model_that_failed():
+    finding = CommandCost().gather({CommandTask("--version", 3): Failure("exit 2")})
+    assert finding.exit_code == 3

@@ -101,6 +101,11 @@ class CommandTask(Task):
     command: str
     repeats: int
 
+    @property
+    def label(self) -> str:
+        """The command."""
+        return self.command
+
     def play(self) -> CommandCosts:
         """Runs it; raises `ModelFailure` where it fails."""
         first, again = zip(*(self._pair() for _ in range(self.repeats)), strict=True)
@@ -165,6 +170,7 @@ class CommandCost(Study):
             f"{len(costs)} commands, one after the other, in an empty folder and again in it.",
             blocks,
             data=now.model_dump(),
+            exit_code=3 if len(costs) < len(done) else 0,
         )
 
 
@@ -205,7 +211,7 @@ def cost_table(costs: Mapping[str, CommandCosts]) -> Table:
         )
     note = (
         "Medians of three runs; what takes long runs once. Compiled code is there beforehand, but"
-        " for `rockcheck warm`."
+        " for rockcheck warm."
     )
     return Table("commands", columns, rows, "Commands", note=note)
 
