@@ -97,10 +97,8 @@ def test_impact_on_floor_and_wall_at_once(pivot, e, side, sign):
         initial_angular_velocity=0.01 * sign,
         initial_velocity=-sign,
     )
-    assert (np.max(sign * motion["theta"]) < 1e-9, kinds(play(slides, pivot))[0]) == (
-        True,
-        "wall impact",
-    )
+    assert np.max(sign * motion["theta"]) < 1e-9
+    assert kinds(play(slides, pivot))[0] == "wall impact"
     assert np.max(np.diff(energy)) < 1e-8
     if e == 0.0:
         assert history.outcome == "at rest"
@@ -128,7 +126,9 @@ def test_motion_begins_beyond_exactly_the_slope_or_the_friction(
         play(scene_of(floor=Floor(friction=friction), excitation=constant(u * G * limit)), pivot)
         for u in (1.0 - 1e-12, 1.0, 1.0 + 1e-12, 1.0 + 1e-7)
     )
-    assert (kinds(below), below.channels[column].any(), kinds(above)[0]) == ([], False, kind)
+    assert kinds(below) == []
+    assert not below.channels[column].any()
+    assert kinds(above)[0] == kind
     assert np.max(np.abs([at.channels[column], barely.channels[column]])) < 1e-9
     if kind == "slip":
         assert above.channels["x"][-1] == pytest.approx(-0.5 * 1e-7 * G * limit * 9.0, rel=1e-5)
@@ -189,7 +189,8 @@ def test_walls_and_floor_are_not_entered(pivot, name, e):
     )
     history = play(scene, pivot)
     assert_contacts_hold(scene, history)
-    assert (events - set(kinds(history)), len(history.event_list) < 20_000) == (set(), True)
+    assert events - set(kinds(history)) == set()
+    assert len(history.event_list) < 20_000
     lift = kinematics.pivot_height(
         PAPER_BLOCK, history.channels["y"], history.channels["theta"]
     ).max()
@@ -255,7 +256,8 @@ def test_record_of_one_sample_and_a_pulse_on_ice(pivot, excitation, friction):
     consistent at t = 0. A pulse whose integral is 0 leaves a block on ice where it was, with no
     more speed than rounding gives."""
     shaken = play(scene_of(excitation=excitation, floor=Floor(friction=friction)), pivot)
-    assert (shaken.outcome, shaken.channels["theta"].any()) == ("at rest", False)
+    assert shaken.outcome == "at rest"
+    assert not shaken.channels["theta"].any()
 
 
 @pivots
@@ -268,11 +270,9 @@ def test_record_that_ends_with_a_jump(pivot):
     )
     np.testing.assert_allclose(ends[:40], falls[:40], rtol=0.0, atol=1e-12)
     # The outcome is that at the end, even where the last row comes before it. What falls moves.
-    assert (
-        ends[45] < falls[45],
-        play(scene.replace(duration=0.5, output_step=1.0), pivot).outcome,
-        play(scene_of(initial_height=1.0, duration=0.2), "unilateral").outcome,
-    ) == (True, "moving", "moving")
+    assert ends[45] < falls[45]
+    assert play(scene.replace(duration=0.5, output_step=1.0), pivot).outcome == "moving"
+    assert play(scene_of(initial_height=1.0, duration=0.2), "unilateral").outcome == "moving"
 
 
 @pytest.mark.parametrize("tilt", [0.0, 0.3])

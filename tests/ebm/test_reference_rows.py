@@ -82,7 +82,8 @@ def test_bilateral_row(line, row):
     rattles = row["e_w"] == "1" and int(row["n_wall"]) > 20
     if line == GRAZING_ROW:
         events = EventBasedModel(tolerance=1e-12).simulate(scene).event_list
-        assert (sum(one.kind == "wall impact" for one in events), row["n_wall"]) == (5, "4")
+        assert sum(one.kind == "wall impact" for one in events) == 5
+        assert row["n_wall"] == "4"
         assert run.peak == pytest.approx(float(row["peak_theta_over_alpha"]), abs=6e-3)
         assert run.x == pytest.approx(float(row["x_final"]), abs=3e-3)
         return

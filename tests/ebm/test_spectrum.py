@@ -225,10 +225,8 @@ def test_a_block_past_its_balance_is_not_taken_for_fallen_while_it_may_turn_back
 def test_a_record_is_scaled_and_the_block_resized():
     start = scene(excitation=RECORD)
     node = node_scene(start, 2.0, 0.5)
-    assert (node.block.half_width, node.block.half_height) == (
-        0.5 * PAPER_BLOCK.half_width,
-        0.5 * PAPER_BLOCK.half_height,
-    )
+    assert node.block.half_width == 0.5 * PAPER_BLOCK.half_width
+    assert node.block.half_height == 0.5 * PAPER_BLOCK.half_height
     np.testing.assert_allclose(node.excitation.samples, 2.0 * RECORD.samples)
     sizes, scales = np.array([0.3, 0.6, 1.2]), np.array([0.5, 1.0, 2.0, 4.0])
     spectrum = overturning_spectrum(start, sizes, scales)
@@ -250,7 +248,8 @@ def test_motions_at_nodes_are_those_that_the_model_simulates():
             history = model.simulate(one.replace(output_step=one.duration / 50))
             expected = [history.channels[name] for name in ("t", "theta", "x", "y")]
             np.testing.assert_allclose(motion.rows.T, expected, atol=1e-8)
-            assert (motion.outcome, motion.block) == (history.outcome, one.block)
+            assert motion.outcome == history.outcome
+            assert motion.block == one.block
             seen.add(motion.outcome)
     assert len(seen) >= 2
 
@@ -267,7 +266,8 @@ def test_a_motion_that_fails_is_none():
 
 def test_least_overturning_amplitude_and_area():
     spectrum = overturning_spectrum(scene(), [2.0, 8.0], [1.0, 3.0, 6.0, 9.0])
-    assert (spectrum.outcomes.shape, spectrum in {spectrum}) == ((4, 2), True)
+    assert spectrum.outcomes.shape == (4, 2)
+    assert spectrum in {spectrum}
     assert spectrum.safe_area == np.mean(spectrum.outcomes == 0)
     np.testing.assert_array_equal(spectrum.least_overturning_amplitude(), [3.0, np.nan])
 

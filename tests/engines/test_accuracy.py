@@ -63,6 +63,12 @@ def test_adaptive_steps_are_of_third_order(varying_engine):
         assert errors[step] < most
 
 
+def test_short_steps_at_impacts_are_few(varying_engine):
+    scene, longest = free_rocking(0.7), 4e-3
+    history = varying_engine(time_step="adaptive", largest_step=longest).simulate(scene)
+    assert history.cost.steps < 1.1 * scene.duration / longest
+
+
 @pytest.mark.slow_for("dart")
 def test_no_error_is_left_that_no_step_changes(varying_engine):
     """With impacts a hundred times as long, the error grows: neither the corners' size nor the
@@ -107,7 +113,8 @@ def test_walls_and_slip(varying_engine, every, least, bounds):
     )
     assert missed == []
     assert len(errors) >= least
-    assert all(np.quantile(errors, share) < bound for share, bound in bounds.items())
+    for share, bound in bounds.items():
+        assert np.quantile(errors, share) < bound
 
 
 @pytest.mark.parametrize("step", [1e-4, "adaptive"])
@@ -119,7 +126,8 @@ def test_cone_correction(step):
         MuJoCo(time_step=step, **settings).simulate(scene).peak_rotation / scene.block.alpha
         for settings in ({}, {"cone_correction": False})
     )
-    assert (mended, plain) == (pytest.approx(0.3162, abs=3e-4), pytest.approx(0.400, abs=3e-3))
+    assert mended == pytest.approx(0.3162, abs=3e-4)
+    assert plain == pytest.approx(0.400, abs=3e-3)
 
 
 def theta_rms(one, other) -> float:
@@ -143,10 +151,9 @@ def test_what_lies_on_its_side_ends_the_run(single_engine, settings):
     history = single_engine(time_step=1e-3, settings=settings).simulate(
         free_rocking(0.5, initial_angular_velocity=2.0, duration=9.0)
     )
-    assert (history.event_list[-1].kind, history.outcome, history.channels["t"][-1] < 5.0) == (
-        *["overturned left"] * 2,
-        True,
-    )
+    assert history.outcome == "overturned left"
+    assert history.event_list[-1].kind == "overturned left"
+    assert history.channels["t"][-1] < 5.0
 
 
 @pytest.mark.parametrize("settings", ["best", "default"])

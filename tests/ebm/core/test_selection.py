@@ -110,7 +110,10 @@ def test_selection_of_a_flat_block_at_a_wall(pivot, side):
     ):
         at = dataclasses.replace(upright(side * u, 1.0, 0.4, 0.0, 0.0), walls=walls)
         found = Core(at, pivot).select(at.state)
-        assert (found.name, found.slip, found.tip, found.far) == (name, slip, tip, far)
+        assert found.name == name
+        assert found.slip == slip
+        assert found.tip == tip
+        assert found.far == far
 
 
 def test_a_block_whose_floor_falls_away():
@@ -127,7 +130,9 @@ def test_a_block_whose_floor_falls_away():
         mode = Core(upright(u, -0.2, 0.3, 0.5, 0.5), pivot).select(
             (0.0, math.cos(0.3), 0.0, slip, 0.0, 0.0)
         )
-        assert (mode.name, mode.tilted, mode.side) == (name, tilted, side)
+        assert mode.name == name
+        assert mode.tilted == tilted
+        assert mode.side == side
     flat = {"family": Family.FLAT, "pivot": Pivot.STICK, "pull": -1}
     for wall in ("tip", "far"):
         assert not modes.hangs_flat(run_at(**flat, **{wall: 1}).state.mode)
@@ -139,7 +144,8 @@ def test_what_was_tried_at_an_instant():
     state = run_at(t=3.0, **TILTED, sense=1).state
     state.tried[:], state.slack, state.least_slack = 1, 7.0, 7.0
     modes.reset_tried_modes(state)
-    assert (state.tried.any(), state.slack) == (False, 1.0)
+    assert not state.tried.any()
+    assert state.slack == 1.0
     for slack in (1.0, 2.0):  # the least one is one noise
         modes.relax_tolerance(state)
         assert state.slack == slack
@@ -166,8 +172,11 @@ def test_a_mode_that_must_go_on_has_twice_the_slack_each_time():
     state.tried[:] = 1
     for count, slack in enumerate((1.0, 2.0, 4.0), 1):
         assert modes.select(core.setting, core.base, run)
-        assert (mode.family, mode.pivot, state.slack) == (Family.FLAT, Pivot.STICK, slack)
-        assert (state.rules[Rule.MODE_AGAIN], state.rules.sum()) == (count, count)
+        assert mode.family == Family.FLAT
+        assert mode.pivot == Pivot.STICK
+        assert state.slack == slack
+        assert state.rules[Rule.MODE_AGAIN] == count
+        assert state.rules.sum() == count
 
 
 def name_of(before: str, after: str) -> str:

@@ -49,10 +49,10 @@ def test_units_of_columns(tmp_path):
     t, head = np.arange(5.0), "time_ms, theta_deg, x_mm, slip_rate_cm_s, y, strain"
     history = History.load(write(tmp_path / "a.csv", head, *[t] * 6))
     expected = {"t": 1e-3 * t, "theta": np.deg2rad(t), "x": 1e-3 * t, "slip_rate": 1e-2 * t, "y": t}
-    assert (history.model, history.channels) == (
-        "measured",
-        {name: pytest.approx(values, rel=1e-7, abs=0.0) for name, values in expected.items()},
-    )
+    assert history.model == "measured"
+    assert history.channels == {
+        name: pytest.approx(values, rel=1e-7, abs=0.0) for name, values in expected.items()
+    }
 
 
 ROWS = "\n0,0,0\n1,1,1\n2,2,2\n"
@@ -148,13 +148,11 @@ def test_events_move_with_the_offset_and_end_with_the_scene(
     history = measured.Measured(
         files={scene.name: [str(tmp_path / f"{name}.csv") for name in "ab"[:repeats]]}, offset=-0.5
     ).simulate(scene.replace(duration=duration))
-    assert (
-        history.outcome,
-        history.overturned_at,
-        [e.t for e in history.event_list],
-        history.cost,  # playing a file back costs nothing, whoever wrote it
-        any(history.uncertainty.values()),
-    ) == (outcome, fell, events, Cost(), (repeats, duration) == (2, 3.0))
+    assert history.outcome == outcome
+    assert history.overturned_at == fell
+    assert [e.t for e in history.event_list] == events
+    assert history.cost == Cost()  # playing a file back costs nothing, whoever wrote it
+    assert any(history.uncertainty.values()) == ((repeats, duration) == (2, 3.0))
 
 
 # Repeats of a test

@@ -157,9 +157,7 @@ def test_the_command_compares_models(tmp_path, monkeypatch, told):
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)
     said = told("spectrum", "fig8", "--size", "12", "--agreement", "6", "--out", str(tmp_path))
     (row,) = said["tables"]["agreement"]
-    assert (row["model"], row["nodes"], [one["model"] for one in said["agreement"]["maps"]]) == (
-        "ebm-unilateral",
-        7 * 6,
-        ["ebm", "ebm-unilateral"],
-    )
+    assert row["model"] == "ebm-unilateral"
+    assert row["nodes"] == 7 * 6
+    assert [one["model"] for one in said["agreement"]["maps"]] == ["ebm", "ebm-unilateral"]
     assert (tmp_path / "figures" / "models.svg").exists()

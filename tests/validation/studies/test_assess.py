@@ -212,7 +212,7 @@ def test_the_least_intensity_is_that_of_a_loop_over_factors(assess, folder):
         return model.simulate(shaken).outcome.startswith("overturned")
 
     assert falls(factor)
-    assert not any(falls(factor * below) for below in (0.995, 0.98, 0.9, 0.7, 0.5))
+    assert [below for below in (0.995, 0.98, 0.9, 0.7, 0.5) if falls(factor * below)] == []
 
 
 LATE = """
@@ -405,11 +405,9 @@ def test_it_ends_with_3_only_where_a_model_does_not_know_the_floor(assess, words
 
 def test_a_peak_acceleration_scales_the_record_of_a_scene(folder):
     scaled = load_scene(folder / "pga.toml").excitation
-    assert (scaled, scaled.peak, scaled.unscaled) == (
-        Record.from_file(folder / "records" / "R01.csv", pga=0.5),
-        pytest.approx(0.5, rel=1e-12),
-        noise(1).unscaled,
-    )
+    assert scaled == Record.from_file(folder / "records" / "R01.csv", pga=0.5)
+    assert scaled.peak == pytest.approx(0.5, rel=1e-12)
+    assert scaled.unscaled == noise(1).unscaled
 
 
 def test_a_scaled_record_moves_the_base_upward_as_much_more(folder, assess):

@@ -65,7 +65,8 @@ def on_grid(frequencies, amplitudes, **how):
 )
 def test_the_papers_28_spectra(figure, side, friction):
     free, *panels = paper_panels(figure)
-    assert (free.wall, free.scene.floor.friction) == (None, friction)
+    assert free.wall is None
+    assert free.scene.floor.friction == friction
     assert {
         (p.scene.floor.friction, p.wall.side, p.wall.gap, p.wall.restitution) for p in panels
     } == {*itertools.product([friction], [side], (0.003, 0.053, 0.103), (0.0, 1.0))}
@@ -90,12 +91,12 @@ def test_a_task_that_failed_leaves_its_nodes_undecided():
     study = Spectra((PANELS["figure-8-gap-3-e-0"],), Request(4))
     done = {study.tasks({})[0]: pool.Failure("crashed")}
     spectrum = Book(done).spectrum(study.panels[0], study.request)
-    assert (
-        len(spectrum.undecided),
-        spectrum.safe_area,
-        study.gather(done).exit_code,
-        [row[-3:] for row in study.gather(done).files["figure-8-gap-3-e-0.csv"].split()[-4:]],
-    ) == (16, 0.0, 3, [b",,,"] * 4)
+    assert len(spectrum.undecided) == 16
+    assert spectrum.safe_area == 0.0
+    assert study.gather(done).exit_code == 3
+    assert [
+        row[-3:] for row in study.gather(done).files["figure-8-gap-3-e-0.csv"].split()[-4:]
+    ] == [b",,,"] * 4
 
 
 def test_a_tile_depends_on_all_that_its_outcomes_do():
@@ -170,7 +171,9 @@ def test_motions_are_the_model_s_own_and_good_enough_to_be_looked_at(tmp_path):
     plot = next(run(study, tmp_path, jobs=1).plots())
     ((panel,), (played,)) = plot.data["panels"], plot.played
     nodes = panel["nodes"]
-    assert (len(nodes), nodes[0], nodes[-1]) == (KEPT_AN_AXIS**2, [0, 0], [19, 19])
+    assert len(nodes) == KEPT_AN_AXIS**2
+    assert nodes[0] == [0, 0]
+    assert nodes[-1] == [19, 19]
     rows = np.frombuffer(base64.b64decode(played["rows"]), "<f4").reshape(-1, 4)
     parts = np.split(rows.astype(float), played["ends"][:-1])
     model = models.build("ebm", study.request.settings)
@@ -247,7 +250,8 @@ def test_nodes_whose_block_lands_flat_depend_on_the_law(tmp_path, restitutions, 
     study = Spectra((Panel("dropped", "Dropped", scene),), grid)
     assert Counter(task.what for task in study.tasks({})) == {"outcomes": laws, "motions": 1}
     (found,) = outcomes(run(study, tmp_path, jobs=1)).values()
-    assert (found["outcomes"].tolist(), len(found["depends_on_law"])) == ([[0, 0], [0, 0]], 4)
+    assert found["outcomes"].tolist() == [[0, 0], [0, 0]]
+    assert len(found["depends_on_law"]) == 4
 
 
 def test_an_undecided_node_does_not_depend_on_the_law():

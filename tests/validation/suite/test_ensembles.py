@@ -119,11 +119,13 @@ def test_statistics_of_known_outcomes():
     lost = ensemble.Sample(
         np.array([1.0, math.nan, math.inf, 1.0]), ("moving", "", *reference.outcomes[:2])
     )
-    assert (lost.failures, list(lost.fallen)) == (2, [False, False, True, False])
+    assert lost.failures == 2
+    assert list(lost.fallen) == [False, False, True, False]
     unknown = evaluate(
         measures.STATISTICS["ks_distance"], ensemble.Samples(reference, lost), "alpha"
     )
-    assert (unknown.value, unknown.note) == (None, "a model failed in some of the scenes")
+    assert unknown.value is None
+    assert unknown.note == "a model failed in some of the scenes"
 
 
 def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
@@ -147,11 +149,9 @@ def test_an_ensemble_is_judged_and_read_back(loaded, tmp_path):
 def test_a_model_without_results_is_no_yardstick_and_is_not_drawn(loaded, tmp_path):
     text = SUITE.partition("[tolerances")[0].replace('"still"', '"broken"', 1)
     run = run_suite(loaded(text), tmp_path / "out", jobs=0)
-    assert (
-        [check.figure.value for check in run.by_scene["crowd"]["near"].checks],
-        run.without_tolerance,
-        list(EnsembleView(run, "crowd", "crowd", *run.ensembles).curves),
-    ) == ([None, None], 0, ["still", "near"])
+    assert [check.figure.value for check in run.by_scene["crowd"]["near"].checks] == [None, None]
+    assert run.without_tolerance == 0
+    assert list(EnsembleView(run, "crowd", "crowd", *run.ensembles).curves) == ["still", "near"]
 
 
 def test_a_measured_history_takes_no_part_in_an_ensemble(loaded, written):
@@ -166,10 +166,11 @@ def test_accept_writes_what_an_ensemble_is_judged_by(loaded, tmp_path):
     first = run_suite(suite, tmp_path / "out", jobs=0)
     assert first.by_scene["crowd"]["near"].verdict == "fail"
     changes, refused = accepting.accept(suite, first, None)
-    assert ([change.partition(":")[0] for change in changes], refused) == (
-        ["[crowd.near.still] ks_distance", "[crowd.near.still] overturning_accuracy"],
-        [],
-    )
+    assert [change.partition(":")[0] for change in changes] == [
+        "[crowd.near.still] ks_distance",
+        "[crowd.near.still] overturning_accuracy",
+    ]
+    assert refused == []
     accepted = suites.load_suite(tmp_path / "mine.toml", allow_code=OWN)
     assert run_suite(accepted, tmp_path / "out", jobs=0).by_scene["crowd"]["near"].verdict == "pass"
 
@@ -253,10 +254,8 @@ def test_only_scenes_in_which_both_rock_have_a_ratio():
 @pytest.mark.parametrize("name", ["peak_bias", "peak_scatter"])
 def test_of_fewer_than_two_ratios_there_is_no_bias_and_no_scatter(name):
     found = evaluate(measures.STATISTICS[name], samples([0.1, 0.2], [0.1, 1e-4]), "alpha")
-    assert (found.value, found.note) == (
-        None,
-        "fewer than two scenes in which both rock and neither falls",
-    )
+    assert found.value is None
+    assert found.note == "fewer than two scenes in which both rock and neither falls"
 
 
 def test_shares_have_wilsons_interval():

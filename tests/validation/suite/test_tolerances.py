@@ -36,11 +36,9 @@ def check(value, line=LINE, measure="theta_rms", note="", **more):
     ],
 )
 def test_what_is_no_number_or_has_no_tolerance_or_a_gap_fails_and_says_why(one, reason):
-    assert (
-        one.verdict,
-        one.reason,
-        one.figure.value is None and one.figure.of_a_fall,
-    ) == ("fail", reason, False)
+    assert one.verdict == "fail"
+    assert one.reason == reason
+    assert (one.figure.value is None and one.figure.of_a_fall) is False
 
 
 @pytest.mark.parametrize(
@@ -179,11 +177,9 @@ def test_accept_leaves_what_passes_and_refuses_what_it_may_not_write(
     accepted, one, reason, refusals
 ):
     changes, refused, text = accepted(FILE, one, reason=reason)
-    assert (
-        changes,
-        text,
-        [said for said, line in zip(refusals, refused, strict=True) if said in line],
-    ) == ([], FILE, refusals)
+    assert changes == []
+    assert text == FILE
+    assert [said for said, line in zip(refusals, refused, strict=True) if said in line] == refusals
 
 
 @pytest.mark.parametrize("text", ["s.m.q.x = { a = 1 }\ns.m.p.x = { a = 1 }\n", "s = { m = {} }\n"])
@@ -252,10 +248,8 @@ def test_accept_writes_a_scene_s_own_line_beside_one_for_every_scene(accepted):
     same, other = (check(value, ALIKE, "outcome_agrees") for value in (1.0, 0.0))
     assert accepted(text, same) == ([], [], text)
     written = tomllib.loads(accepted(text, other, reason="one falls now")[2])
-    assert (written["s"]["m"]["r"]["outcome_agrees"], written["*"]) == (
-        line_of(0.0, 1.0, 0.0, "one falls now"),
-        tomllib.loads(EVERYWHERE)["*"],
-    )
+    assert written["s"]["m"]["r"]["outcome_agrees"] == line_of(0.0, 1.0, 0.0, "one falls now")
+    assert written["*"] == tomllib.loads(EVERYWHERE)["*"]
 
 
 def test_a_better_figure_keeps_its_why_though_a_reason_is_given_for_others(accepted):

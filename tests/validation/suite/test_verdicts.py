@@ -124,10 +124,8 @@ def test_a_cell_that_has_not_converged_is_skipped_with_its_reason(quantities, ma
     numerical = quantities and Numerical(method="steps h, 2h, 3h and 4h", quantities=quantities)
     root = ET.fromstring(junit.junit(run_of(cell("a", "m", check(0.25), numerical=numerical))))
     cases = [case for case in root.iter("testcase") if case.get("name") == "converged"]
-    assert ([[(one.tag, one.get("message")) for one in case] for case in cases], totals(root)) == (
-        marks,
-        {"tests": 2 + len(cases), "failures": 0, "errors": 0},
-    )
+    assert [[(one.tag, one.get("message")) for one in case] for case in cases] == marks
+    assert totals(root) == {"tests": 2 + len(cases), "failures": 0, "errors": 0}
 
 
 def test_the_table_of_laws_has_the_models_that_met_a_landing():
@@ -169,12 +167,11 @@ def test_a_large_run_shows_its_worst_scenes_in_the_suites_order():
     found = run_tables.finding_of(run)
     rows, (wrong, better) = found.table("verdicts").rows, found.blocks[2:4]
     # what fails is worse than what waits for a tolerance
-    assert (len(rows), rows[0][2], rows[-1][3]) == (
-        shown_scenes.MOST_SHOWN + 1,
-        worst[0].checks[0].figure.windowed,
-        1.5,
-    )
-    assert (wrong.verdict, bool(better.text)) == ("fail", True)
+    assert len(rows) == shown_scenes.MOST_SHOWN + 1
+    assert rows[0][2] == worst[0].checks[0].figure.windowed
+    assert rows[-1][3] == 1.5
+    assert wrong.verdict == "fail"
+    assert better.text
     text = job_page.markdown(run)
     # the number of the others is not a row of the table
     assert [words in text for words in ("| out |", "|\n\nand 30 more scenes", "| far 3 |")] == [
