@@ -270,6 +270,26 @@ def test_extremes_of_fates_are_those_of_long_histories(name):
                 assert figure == pytest.approx(getattr(wall, key), abs=1e-9)
 
 
+def test_extremes_of_a_block_that_bounces_are_those_of_its_whole_motion():
+    """Each bounce may slip on: no energy says how far."""
+    scenes = [
+        free_rocking(tilt, floor=Floor(friction=friction, restitution=restitution))
+        for tilt in (0.3, 0.6, 0.9)
+        for friction in (0.15, 0.3, 0.6)
+        for restitution in (0.3, 0.6, 0.8)
+    ]
+    model = MODELS["unilateral"]
+    fates = play_fates(table_of(scenes), model, keeps=Keep.EXTREMES)
+    assert fates.extremes is not None
+    wholes = [
+        model.simulate(scene.replace(duration=60.0, output_step=1.0)).extremes for scene in scenes
+    ]
+    slips = [whole.slip for whole in wholes]
+    assert fates.extremes["slip"].tolist() == pytest.approx(slips, abs=1e-9)
+    hops = [whole.hop for whole in wholes]
+    assert fates.extremes["hop"].tolist() == pytest.approx(hops, abs=1e-9)
+
+
 @pytest.mark.parametrize("name", ["bilateral", "unilateral", "no-slip"])
 def test_strikes_kept_alone_are_those_among_the_extremes(name):
     model, scenes = MODELS[name], [*pulses_beside_walls(60, 37)]
