@@ -190,8 +190,8 @@ def cost_table(costs: Mapping[str, CommandCosts]) -> Table:
         Column("first", "wall clock", "s", digits=2, help="in an empty folder"),
         Column("again", "again", "s", digits=2, help="once more in the same folder"),
         Column("slowest", "slowest first", "s", digits=2, brief=False),
-        Column("cpu", "CPU", "s", digits=2, help="in an empty folder, of all processes"),
-        Column("cpu_again", "CPU again", "s", digits=2, brief=False),
+        Column("cpu", "CPU", "s", help="in an empty folder, of all processes"),
+        Column("cpu_again", "CPU again", "s", brief=False),
         Column("peak", "peak memory", "MB", digits=3, help="of the largest process"),
     ]
     rows = []
