@@ -30,7 +30,9 @@ def names() -> tuple[str, ...]:
 
 @cache
 def facts_of(name: str) -> "EngineFacts":
-    """The record of the engine of that name, one of `names`."""
+    """The record of the engine of that name; raises `KeyError` for one that is not of `names`."""
+    if name not in names():
+        raise KeyError(name)
     facts: EngineFacts = importlib.import_module(f"{__package__}.{name}{ENDING}").FACTS
     return facts
 

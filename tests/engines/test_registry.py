@@ -169,6 +169,12 @@ def loaded_after(code: str) -> set[str]:
     return set(done.stdout.split())
 
 
+@pytest.mark.parametrize("name", ["", "engine", "../scenes/files", "mujoco_engine"])
+def test_no_other_module_is_imported_for_a_name(name):
+    with pytest.raises(KeyError):
+        registry.facts_of(name)
+
+
 def test_records_are_read_without_the_engines_libraries():
     loaded = loaded_after("from rockcheck.engines import registry; registry.every()")
     libraries = {facts.engine.module or facts.name for facts in registry.every()}

@@ -4,20 +4,21 @@ In: the words of a command and the folder that it runs in. Out: a `Cost`. The ta
 call it.
 """
 
+import json
 import os
-import resource
 import subprocess
 import sys
-import tempfile
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
 from rockcheck.scenes import ModelFailure, printable
 from rockcheck.validation.discrepancy.figures import Stored
+from rockcheck.validation.studies.command_cost import launch
 
 #: Bytes of a unit of `ru_maxrss`: macOS counts bytes, other systems kilobytes.
 UNIT = 1 if sys.platform == "darwin" else 1024
+#: The launcher without the user's site and environment: the smallest process that Python makes.
+LAUNCHER = (sys.executable, "-I", "-S", launch.__file__)
 
 
 class Cost(Stored):
@@ -37,29 +38,20 @@ def cost_of(words: Sequence[str], folder: Path, environment: dict[str, str]) -> 
 
     A suite out of tolerance (exit 1) costs what it costs.
     """
-    began = time.perf_counter()
-    with tempfile.TemporaryFile() as errors:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rockcheck", *words],
-            cwd=folder,
-            env=os.environ | environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=errors,
+    launched = subprocess.run(
+        [*LAUNCHER, sys.executable, "-m", "rockcheck", *words],
+        cwd=folder,
+        env=os.environ | environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    if launched.returncode not in (0, 1):
+        raise ModelFailure(
+            f"rockcheck {' '.join(words)}: exit {launched.returncode}:"
+            f" {printable(launched.stderr, 500)}"
         )
-        used = _wait(process)
-        wall = time.perf_counter() - began
-        if process.returncode not in (0, 1):
-            errors.seek(0)
-            message = errors.read().decode(errors="replace")
-            raise ModelFailure(
-                f"rockcheck {' '.join(words)}: exit {process.returncode}: {printable(message, 500)}"
-            )
-    return Cost(wall=wall, cpu=used.ru_utime + used.ru_stime, peak=float(used.ru_maxrss * UNIT))
-
-
-def _wait(process: "subprocess.Popen[bytes]") -> resource.struct_rusage:
-    """Wait for a process; what it and the processes that it waited for have used."""
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    return used
+    used = json.loads(launched.stdout)
+    return Cost(wall=used["wall"], cpu=used["cpu"], peak=float(used["peak"] * UNIT))
