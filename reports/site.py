@@ -186,10 +186,20 @@ def is_up_to_date(run: results.Run, folder: Path, *, all_figures: bool = False) 
         return False
     try:
         earlier = results.Run.load(folder)
+        tables_are_whole = all(
+            reading.read_text(folder / f"{table.name}.csv") == table_text.csv(table)
+            for table in files_of(run)
+        )
     except errors.InputError:
         return False
+    if not (folder / "junit.xml").is_file() or not (folder / "summary.md").is_file():
+        return False
     is_same_run = _facts_of(earlier) == _facts_of(run)
-    return is_same_run and manifest.is_whole(folder, _made_of(run, folder, all_figures))
+    return (
+        is_same_run
+        and tables_are_whole
+        and manifest.is_whole(folder, _made_of(run, folder, all_figures))
+    )
 
 
 def _facts_of(run: results.Run) -> dict[str, Any]:

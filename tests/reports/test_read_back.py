@@ -89,6 +89,20 @@ def test_a_page_that_is_gone_is_written_again(pages, typed):
     assert page.is_file()
 
 
+@pytest.mark.parametrize("name", ["figures.csv", "checks.csv", "junit.xml", "summary.md"])
+def test_a_file_for_machines_that_is_gone_is_written_again(pages, typed, name):
+    (pages / name).unlink()
+    typed(*WORDS, code=1)
+    assert (pages / name).is_file()
+
+
+def test_a_table_that_somebody_changed_is_written_anew(pages, typed):
+    content = (pages / "figures.csv").read_text("utf-8")
+    (pages / "figures.csv").write_text(content + "mine", "utf-8")
+    typed(*WORDS, code=1)
+    assert (pages / "figures.csv").read_text("utf-8") == content
+
+
 def test_another_judgement_is_shown(pages, typed):
     before = (pages / "index.html").read_text("utf-8")
     typed("accept", "suite.toml", "--out", "report", "--jobs", "1")
