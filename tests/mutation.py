@@ -163,7 +163,7 @@ def main(
         for name, target in ((name, one) for one in DATA["target"] for name in one["files"]):
             if file and not any(part in name for part in file):
                 continue
-            source = (ROOT / name).read_text(encoding="utf-8")
+            source = (ROOT / "rockcheck" / name).read_text(encoding="utf-8")
             lines = source.splitlines()
             listed = Plant()
             listed.visit(ast.parse(source))

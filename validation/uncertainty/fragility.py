@@ -7,7 +7,6 @@ the greatest likelihood. The study of populations calls it.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy  # it loads its parts as they are used
@@ -15,11 +14,8 @@ from numpy.typing import NDArray
 
 from rockcheck.ebm import EventBasedModel
 from rockcheck.scenes import Floats, Scene
-from rockcheck.validation.uncertainty.proportions import exact_interval
-
-if TYPE_CHECKING:
-    pass
 from rockcheck.validation.uncertainty.input_spread import ends_of
+from rockcheck.validation.uncertainty.proportions import exact_interval
 
 #: Median and dispersion where no lognormal curve fits.
 NO_FIT = math.nan, math.nan
