@@ -152,6 +152,60 @@ def test_an_engine_without_restitution_does_not_play_a_floor_that_bounces(restit
     assert agreement.plays(engine, dataclasses.replace(free, scene=scene)) == (restitution == 0.0)
 
 
+def of_models(*models):
+    """An agreement made up: maps of these models, of one node a panel."""
+    return {
+        "about": "About.",
+        "date": "2026-01-02",
+        "versions": {"rockcheck": "9.9"},
+        "settings": {"ebm": {}, "cm": {"penetration": 1e-6}},
+        "shares": [],
+        "map_frequencies": [1.0],
+        "map_amplitudes": [2.0],
+        "maps": [
+            {
+                "model": model,
+                "nodes": 8,
+                "equal": 7,
+                "outcomes": {panel.name: ["S"] for panel in paper_panels(8)},
+            }
+            for model in models
+        ],
+    }
+
+
+def map_of(*models):
+    return [*agreement_blocks(of_models(*models), paper_panels(8), came_with_package=False)][-1]
+
+
+def test_only_the_first_model_s_maps_have_the_titles_of_the_panels():
+    count = len(paper_panels(8))
+    titled = [bool(tile["title"]) for tile in map_of("ebm", "cm").data["panels"]]
+    assert titled == [True] * count + [False] * count
+
+
+def test_maps_are_as_high_as_they_have_rows():
+    heights = [map_of(*models).data["height"] for models in (("ebm",), ("ebm", "cm"))]
+    assert heights == pytest.approx([1.32, 2.24])
+
+
+def test_a_model_is_not_compared_with_itself():
+    note = map_of("ebm", "ebm-unilateral", "cm").note
+    assert note.endswith(": ebm 7 of 8, cm 7 of 8.")
+
+
+@pytest.mark.parametrize(
+    ("came", "words"),
+    [
+        (False, "About. Computed on 2026-01-02. Settings: ebm as it comes; cm penetration 1e-06."),
+        (True, "About. Not computed in this run: it came with the package, from a run on"),
+    ],
+)
+def test_an_agreement_says_where_it_comes_from(came, words):
+    first = next(agreement_blocks(of_models("ebm"), paper_panels(8), came_with_package=came))
+    assert first.text.startswith(words)
+
+
 def test_the_command_compares_models(tmp_path, monkeypatch, told):
     monkeypatch.setattr(agreement, "CANDIDATES", ("ebm-unilateral",))
     monkeypatch.setattr(agreement, "MAP_SIZE", 5)

@@ -16,13 +16,13 @@ STRIKES = Scene(
     block=BLOCK,
     floor=Floor(friction=0.5),
     walls=[Wall(side="left", gap=0.02, restitution=0.5), Wall(side="right", gap=0.9)],
-    excitation=Ricker(amplitude=4.0, period=0.8),
-    duration=20.0,
+    excitation=Ricker(amplitude=3.0, period=0.8),
+    duration=60.0,
 )
 SCENES = [
     STRIKES,
     STRIKES.replace(walls=(), excitation=Ricker(amplitude=12.0, period=1.5)),
-    STRIKES.replace(walls=(), excitation=Rest(), initial_rotation=-0.1, duration=60.0),
+    STRIKES.replace(walls=(), excitation=Rest(), initial_rotation=-0.1),
 ]
 
 
