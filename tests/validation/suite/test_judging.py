@@ -6,9 +6,10 @@ import dataclasses
 import pytest
 
 from rockcheck.validation.discrepancy.figures import Figure
-from rockcheck.validation.execute import models, pool
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.study import FAULTS
 from rockcheck.validation.suite import comparing, judging, planning, suites, tolerances
+from rockcheck.validation.uncertainty import numerical
 
 SUITE = """
 reference = "ebm-unilateral"
@@ -211,6 +212,19 @@ def test_a_cell_is_read_back_where_its_run_was(suite, read_back):
 
 def test_the_key_of_a_cell_is_that_of_its_task(suite):
     assert judging.cell_of([planned(suite)], [PLAYED]).key == planned(suite).key
+
+
+@pytest.mark.parametrize("asked", [False, True])
+def test_how_the_numerical_error_is_found_matters_where_it_is_asked_for(suite, monkeypatch, asked):
+    config = suite.config.model_copy(update={"uncertainty": asked})
+    asking = dataclasses.replace(suite, config=config)
+    before, digest = planned(asking).key, provenance.code_digest
+
+    def changed(module, *folders):
+        return "another" if module == numerical.__name__ else digest(module, *folders)
+
+    monkeypatch.setattr(provenance, "code_digest", changed)
+    assert (planned(asking).key != before) == asked
 
 
 # --- what is measured

@@ -201,3 +201,9 @@ def test_reasons_beyond_the_most_shown_are_counted(more, said):
     count = shown_scenes.MOST_SHOWN + more
     run = run_of(*(cell("m", check(verdict="fail"), scene=f"s{n}") for n in range(count)))
     assert (f"- and {more} more, in junit.xml" in job_page.markdown(run)) == said
+
+
+def test_a_name_of_more_than_a_thousand_letters_is_cut():
+    page = job_page.markdown(run_of(cell("m", check())).model_copy(update={"suite": "x" * 1001}))
+    assert "x" * 900 in page
+    assert "x" * 1001 not in page
