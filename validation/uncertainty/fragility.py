@@ -123,17 +123,13 @@ def fit_lognormal(
         )
         return -float(np.sum(likelihood))
 
+    # as wide as high: in the usual one, a sliver, the search may stand still
+    simplex = [[0.0, 1.0], [1.0, 1.0], [0.0, 2.0]]
     level, slope = scipy.optimize.minimize(
         unlikelihood,
-        [0.0, 1.0],
+        simplex[0],
         method="Nelder-Mead",
-        options={
-            # as wide as high: in the usual one, a sliver, the search may stand still
-            "initial_simplex": [[0.0, 1.0], [1.0, 1.0], [0.0, 2.0]],
-            "xatol": 1e-9,
-            "fatol": 1e-9,
-            "maxiter": 2000,
-        },
+        options={"initial_simplex": simplex, "xatol": 1e-9, "fatol": 1e-9, "maxiter": 2000},
     ).x
     # below is the search's rounding, of shares that are all the same
     return (float(np.exp(centre - level / slope)), float(1.0 / slope)) if slope > 1e-3 else NO_FIT

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from assessed import RUNS, SCENE, gathered, judged, ran
+from assessed import FREE, RUNS, SCENE, gathered, interval, judged, ran, search
 
 from rockcheck.validation.finding import Mark, plain
 from rockcheck.validation.studies.population import (
@@ -256,6 +256,16 @@ def test_shares_of_the_peak_s_variance_are_never_negative():
     assert [column.digits for column in table.columns[1:]] == [2, 2]
 
 
+def test_without_indices_there_is_no_table_of_them():
+    assert certainty_blocks.sensitivity_table(gathered({"a": RUNS["a"]})) == []
+
+
+def test_a_peak_that_does_not_vary_has_no_indices_and_no_table():
+    everything = gathered({"a": RUNS["a"]})
+    everything.__dict__["sensitivities"] = results.Sensitivities(indices=())
+    assert certainty_blocks.sensitivity_table(everything) == []
+
+
 def models_of(runs, **played):
     (table,) = certainty_blocks.model_table(gathered(runs, **played))
     return {row[0]: row[1:5] for row in table.rows}
@@ -269,8 +279,8 @@ def test_models_are_apart_where_both_stand():
 
 
 def test_a_peak_that_is_not_known_counts_as_none():
-    rows = models_of({"a": ran("at rest")}, cm={"a": ran("at rest", 0.5)})
-    assert rows["cm"][3] == pytest.approx(0.5)
+    rows = models_of({"a": ran("at rest")}, cm={"a": ran("at rest", 0.3)})
+    assert rows["cm"][3] == pytest.approx(0.3)
 
 
 def test_where_no_two_stand_no_difference_is_told():
@@ -286,6 +296,27 @@ def test_another_law_of_impacts_stands_beside_the_models():
 def test_without_another_law_there_is_no_row_of_it():
     rows = models_of({"a": ran("at rest", 0.2)}, cm={"a": ran("at rest", 0.3)})
     assert list(rows) == ["cm"]
+
+
+@pytest.mark.parametrize(("recorded", "head"), [(True, "record"), (False, "scene")])
+def test_another_model_stands_and_falls_beside_a_threshold(recorded, head):
+    search_of_gaps = search(interval(0, 0.03, 0.1, 0.0299, None))
+    batch = gathered(
+        {"a": RUNS["a"]}, recorded=recorded, free={"a": FREE["a"]}, gaps={"a": search_of_gaps}
+    )
+    plan = replace(batch.plan, models={"cm": {}})
+    stands, falls = (threshold.task for threshold in plan.thresholds(batch.done))
+    played = {
+        stands: results.Shown(result=RUNS["a"]),
+        falls: results.Shown(result=RUNS["c"]),
+    }
+    everything = type(batch)(plan, {**batch.done, **played})
+    (table,) = certainty_blocks.threshold_table(everything)
+    assert table.columns[0].name == head
+    assert table.rows == [
+        ["a", "gap 29.9 mm", "at rest"],
+        ["a", "gap 30 mm", "overturned right"],
+    ]
 
 
 def test_where_the_first_model_plays_itself_there_are_no_thresholds():

@@ -12,11 +12,11 @@ from rockcheck.validation.studies.population import results
 MODEL = EventBasedModel(pivot="unilateral")
 BLOCK = Block(half_width=0.2, half_height=1.0)
 STRIKES = Scene(
-    name="strikes the left wall",
+    name="strikes the left wall once",
     block=BLOCK,
     floor=Floor(friction=0.5),
     walls=[Wall(side="left", gap=0.02, restitution=0.5), Wall(side="right", gap=0.9)],
-    excitation=Ricker(amplitude=3.0, period=0.8),
+    excitation=Ricker(amplitude=2.5, period=0.8),
     duration=60.0,
 )
 SCENES = [
@@ -86,3 +86,7 @@ def test_a_run_that_failed_has_a_reason_and_no_figure():
     assert failed.fate == "failed"
     assert failed.reason == "the block would start inside a wall"
     assert failed.peak_rotation is None
+
+
+def test_a_fate_that_was_known_at_once_took_no_time():
+    assert results.Shown(result=results.RunResult(fate="at rest")).until_s == 0.0

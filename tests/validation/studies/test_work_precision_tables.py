@@ -6,6 +6,7 @@ import math
 import pandas as pd
 import pytest
 
+from rockcheck.reports import table_text
 from rockcheck.validation.studies.work_precision import timing_blocks
 from rockcheck.validation.studies.work_precision.curves import LEVEL, cost_at, error_at, slope
 from rockcheck.validation.studies.work_precision.lines import LINES
@@ -36,6 +37,34 @@ def test_tolerances_and_penetrations_are_evenly_spaced_in_their_logarithm(label)
     values = LINES[label].values
     ratios = [fine / coarse for coarse, fine in itertools.pairwise(values)]
     assert ratios == pytest.approx([ratios[0]] * len(ratios))
+
+
+@pytest.mark.parametrize(
+    "label", [label for label, line in LINES.items() if line.knob == "largest_step"]
+)
+def test_each_largest_step_is_half_of_the_one_before(label):
+    values = LINES[label].values
+    assert [fine / coarse for coarse, fine in itertools.pairwise(values)] == [0.5, 0.5, 0.5]
+
+
+def test_penetrations_by_which_convergence_is_judged_make_steps_of_a_tenth():
+    """The step of the continuous model goes with the root of the penetration."""
+    ratios = [fine / coarse for coarse, fine in itertools.pairwise(LINES["cm"].converge)]
+    assert ratios == pytest.approx([0.01, 0.01])
+
+
+@pytest.mark.parametrize("label", ["ebm", "ebm-unilateral", "ebm-bouc-wen", "cm"])
+def test_a_quick_run_has_values_of_the_whole_one(label):
+    assert set(LINES[label].quick) <= set(LINES[label].values)
+
+
+@pytest.mark.parametrize(
+    "label",
+    [label for label, line in LINES.items() if label == line.family and line.knob == "time_step"],
+)
+def test_a_quick_run_leaves_out_the_finest_step_of_an_engine(label):
+    values = LINES[label].values
+    assert LINES[label].quick == (values[:-1] if len(values) > 2 else values)
 
 
 # --- curves
@@ -241,3 +270,10 @@ def test_sizes_have_a_row_and_threads_a_column():
 def test_a_saving_is_the_ratio_of_its_costs():
     (row,) = timing_blocks.saving_table([Saving("cm", "wall", "ms", 3.0, 2.0)]).records()
     assert row["ratio"] == 1.5
+
+
+def test_errors_and_changes_have_two_digits():
+    batches = next(timing_blocks.batch_blocks([batch(1e-8, 1.234e-9, 3e-6)]))
+    saved = timing_blocks.saving_table([Saving("cm", "wall", "ms", 3.0, 2.0, change=1.234e-5)])
+    assert " 1.2·10⁻⁹ " in table_text.block_markdown(batches)
+    assert " 1.2·10⁻⁵ " in table_text.block_markdown(saved)
