@@ -1,4 +1,5 @@
-"""The candidates of a selection and their order; which corner rests on a wall. Natural units."""
+"""The candidates of a selection and their order; which corner rests on a wall, which gap is a
+landing. Natural units."""
 
 import math
 
@@ -7,7 +8,7 @@ import pytest
 from situations import Core, upright
 from stepping import TILTED, run_at, setting_of
 
-from rockcheck.ebm.core import contacts, modes, series
+from rockcheck.ebm.core import contacts, modes, series, strike
 from rockcheck.ebm.core.names import Family, Guard, Pivot
 from rockcheck.scenes import Wall
 
@@ -73,3 +74,26 @@ def test_of_a_block_that_turns_flush_with_a_wall_that_corner_rests_which_does_no
     assert contacts.closed_wall(block, motion, sign, True) == (rests == "bottom")
     assert contacts.closed_wall(block, motion, sign, False) == (rests == "top")
     assert not contacts.closed_wall(block, motion, -sign, False)
+
+
+@pytest.mark.parametrize(
+    ("theta", "spin", "slip", "lies"),
+    [
+        (9e-6, -0.01, 0.0, True),
+        (9e-6, -0.01, 1e-7, True),
+        (9e-6, -0.01, -1e-6, False),
+        (9e-6, -2.0, -2e-5, True),
+        (9e-6, 0.01, 0.0, False),
+        (2e-5, -0.01, 0.0, False),
+    ],
+)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_far_gap_that_closes_near_upright_is_a_landing(sign, theta, spin, slip, lies):
+    """Below 1e-5 rad, and where the pivot slips by less than 1e-10 until the block has landed."""
+    block, alpha = setting_of(0.4), 0.4
+    s, c = math.sin(alpha - theta), math.cos(alpha - theta)
+    motion = (0.0, c, sign * theta, sign * (slip - c * spin), s * spin, sign * spin)
+    state = run_at(motion, **TILTED, sense=sign, pivot=Pivot.SLIPPING).state
+    assert strike._lands_along(block, state) == lies
+    state.motion.y += 1e-9
+    assert not strike._lands_along(block, state)

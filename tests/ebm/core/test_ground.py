@@ -74,6 +74,7 @@ def test_up_to_its_next_extremum_a_motion_is_monotone(name):
             assert found in (ground.NEVER, pytest.approx(end))
         else:
             assert found == pytest.approx(expected, abs=2.0 * dense[1])
+            assert ground._with_rate(base, found)[1] == pytest.approx(0.0, abs=1e-11)
 
 
 @smooth
