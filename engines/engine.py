@@ -13,10 +13,12 @@ from pydantic import model_validator
 
 from rockcheck.engines import contacts, events
 from rockcheck.engines.steps import (
+    USUAL_TOLERANCE,
     AdaptiveStep,
     FixedStep,
     World,
     at_output_times,
+    in_fine_steps,
     in_units_of,
     time_of_fall,
 )
@@ -52,6 +54,8 @@ class ContactParameters:
 MOST_STEPS = 5_000_000
 #: The step of an engine that cannot step adaptively, where none is given, s.
 STOCK_STEP = 1e-4
+#: The longest step where a tolerance is given alone, s: no record's sample is passed over.
+LONGEST_STEP = 0.02
 
 
 #: What makes the scene as an engine holds it: at its best, with contacts that stop or bounce within
@@ -62,10 +66,12 @@ Worlds = tuple[Callable[[Scene], World], Callable[[Scene], World]]
 class Engine(Frozen):
     """A physics engine as a model of the block.
 
-    `time_step` in s, or "adaptive": then steps end at the events and are at most `largest_step` s
-    long. Those at impacts and just after events are `short_steps` times their usual length. Where
-    no step is given it is "adaptive", or `STOCK_STEP` where the engine cannot vary its steps. A
-    `FixedStep` or `AdaptiveStep` says all three at once.
+    `time_step` in s, or "adaptive": then steps end at the events, are at most `largest_step` s
+    long, and have an error of at most `tolerance`, in units of alpha (rotation) and alpha R
+    (place). With a `largest_step` alone no error is estimated; with neither the tolerance is
+    `USUAL_TOLERANCE`. Steps at impacts and just after events are `short_steps` times their usual
+    length. Where no step is given it is "adaptive", or `STOCK_STEP` where the engine cannot vary
+    its steps. A `FixedStep` or `AdaptiveStep` says all at once.
 
     `settings` "best" is the set-up that converges to rigid contact with Coulomb friction and
     Newton's restitution; "default" is the engine as it comes, a box on a floor with the engine's
@@ -93,8 +99,9 @@ class Engine(Frozen):
     #: What to look at where it does not conform, by theme, in the names of its settings.
     advice: ClassVar[Mapping[str, str]] = MappingProxyType({})
     time_step: float | Literal["adaptive"] = "adaptive"
-    largest_step: Positive = 5e-4
+    largest_step: Positive = LONGEST_STEP
     short_steps: Positive = 1.0
+    tolerance: Positive | None = None
     settings: Literal["best", "default"] = "best"
 
     @model_validator(mode="before")
@@ -109,6 +116,8 @@ class Engine(Frozen):
             fields = zip(steps.knobs, astuple(steps), strict=True)
             given |= {"time_step": "adaptive", **dict(fields)}
         step = given["time_step"]
+        if step == "adaptive" and not {"largest_step", "tolerance"} & given.keys():
+            given["tolerance"] = USUAL_TOLERANCE
         number = isinstance(step, int | float) and not isinstance(step, bool)
         why = ' with settings = "default":' if stock else f": {cls.fixed_because};"
         if step != "adaptive" and not (number and 0.0 < step <= sys.float_info.max):
@@ -124,7 +133,7 @@ class Engine(Frozen):
     def steps(self) -> FixedStep | AdaptiveStep:
         """How its steps follow each other."""
         return (
-            AdaptiveStep(self.largest_step, self.short_steps)
+            AdaptiveStep(self.largest_step, self.short_steps, self.tolerance)
             if self.time_step == "adaptive"
             else FixedStep(self.time_step)
         )
@@ -154,9 +163,8 @@ class Engine(Frozen):
 
         For adaptive steps this includes those at the events.
         """
-        return self.model_copy(
-            update={knob: factor * getattr(self, knob) for knob in self.steps.knobs}
-        )
+        steps = self.steps.coarser(factor)
+        return self.model_copy(update=dict(zip(steps.knobs, astuple(steps), strict=True)))
 
     def rigid_world(self, scene: Scene) -> World:
         """The scene with this engine's best settings.
@@ -202,11 +210,11 @@ class Engine(Frozen):
         """Raises `InputError` where the engine cannot hold the scene, or needs too many steps."""
         errors.check_kind(scene, Scene, "load_scene", "scene")
         steps = self.steps
-        if scene.duration / steps.largest > MOST_STEPS:
+        if scene.duration / steps.usual > MOST_STEPS:
             raise errors.InputError(
-                f"{steps.largest:g} is not allowed: {scene.duration:g} s would need more than"
-                f" {MOST_STEPS} steps",
-                steps.knobs[0],
+                f"{getattr(self, steps.limiting):g} is not allowed: {scene.duration:g} s would need"
+                f" more than {MOST_STEPS} steps",
+                steps.limiting,
             )
         if self.homogeneous_only and not scene.block.homogeneous:
             raise errors.InputError(
@@ -238,12 +246,14 @@ class Engine(Frozen):
                 set_up=begin - start,
                 steps=len(states) - 1,
             )
+        if steps.smooth:
+            times, states, felt = in_fine_steps(times, states, felt)
         states[:, [0, 1, 3, 4]] *= unit
         happened = events.events_of(scene, times, states, unit * felt)
         history = observation.observe(
             scene,
             self.name,
-            kinematics.of_box(scene.block, at_output_times(scene, times, states)),
+            kinematics.of_box(scene.block, at_output_times(scene, times, states, steps.smooth)),
             events=happened,
             cost=cost,
             settings=self.model_dump(),

@@ -18,7 +18,7 @@ REST = 20e-3  # s: a shorter rest is the dead centre of a last tiny rocking
 # block radii; wider at fixed steps, where a resting block falls freely for a step now and then
 CLOSED = 1e-6
 # of the thresholds: what a gap and a slip of a contact that holds may show
-GAP_NOISE, SLIP_NOISE = 1e-4, 1e-3
+GAP_NOISE, SLIP_NOISE = 1e-5, 1e-3
 SLIPPING = 1e-3  # m/s
 TURNING = 1e-3  # rad/s
 

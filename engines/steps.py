@@ -8,7 +8,9 @@ velocities into velocities, at the mean pose of a step (drift, kick, drift): its
 part of a third-order integrator with event location. Step ends are placed where gaps close, where
 slip stops and where a block at rest may start to move. An impact has a separate step, so short that
 nothing else happens in it. Between events the acceleration changes smoothly from step to step; that
-change corrects the drift, which is then of third order.
+change corrects the drift, which is then of third order. How much it corrects is known after the
+step, and bounds its error: the next step is as long as a tolerance allows, and a step with too
+large an error is taken again.
 """
 
 import math
@@ -34,6 +36,12 @@ LYING = math.pi / 2 - 1e-6
 ROOM = 8192
 #: An `embedding` of a world whose lengths are in block radii.
 EMBEDDED = 1e-9
+#: s: where a tolerance lets steps be longer, events and extremes are read off states so far apart.
+FINE = 5e-4
+#: With this tolerance a block of some metres takes steps of `FINE` and more.
+FINE_TOLERANCE = 1e-8
+#: The tolerance where neither it nor a longest step is given.
+USUAL_TOLERANCE = 1e-9
 BLOWN_UP = 1e6  # m, rad, m/s or rad/s: no scene comes near it
 
 
@@ -155,10 +163,11 @@ def time_of_fall(times: Floats, states: Floats) -> float:
     return float(times[-2] + part * (times[-1] - times[-2]))
 
 
-def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
-    """States at the run's times: positions by cubic Hermite interpolation, velocities linear.
+def at_output_times(scene: Scene, times: Floats, states: Floats, smooth: bool) -> Floats:
+    """States at the run's times: positions by cubic Hermite interpolation.
 
-    Velocities jump at impacts, where a cubic would overshoot.
+    Velocities are its slope where steps are `smooth`, that is, impacts have steps of their own.
+    Else they are linear: a velocity that jumps inside a step would overshoot.
     """
     from scipy.interpolate import CubicHermiteSpline
 
@@ -166,13 +175,35 @@ def at_output_times(scene: Scene, times: Floats, states: Floats) -> Floats:
     inside = np.minimum(inside[inside <= times[-1] * (1.0 + 1e-12) + 1e-12], times[-1])
     if len(times) == 1:
         return states[: len(inside)]
-    positions = CubicHermiteSpline(times, states[:, :3], states[:, 3:])(inside)
+    motion = CubicHermiteSpline(times, states[:, :3], states[:, 3:])
+    positions = motion(inside)
     # A cubic over a long step may show a fall that is none.
     upright = inside < time_of_fall(times, states)
     positions[upright, 2] = np.clip(positions[upright, 2], -LYING, LYING)
+    if smooth:
+        return np.hstack([positions, motion(inside, 1)])
     return np.column_stack(
         [positions, *(np.interp(inside, times, states[:, column]) for column in (3, 4, 5))]
     )
+
+
+def in_fine_steps(times: Floats, states: Floats, felt: Floats) -> Marched:
+    """The march of smooth steps with states in between, at most `FINE` s apart.
+
+    Positions are those of the cubic through both ends of a step, velocities its slope.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    parts = np.maximum(np.ceil(np.diff(times) / FINE), 1.0).astype(int)
+    ends = np.cumsum(parts)
+    step = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(1, len(step) + 1) - np.repeat(ends - parts, parts)) / parts[step]
+    finer = np.concatenate([times[:1], times[step] + share * np.diff(times)[step]])
+    motion = CubicHermiteSpline(times, states[:, :3], states[:, 3:])
+    between = np.hstack([motion(finer), motion(finer, 1)])
+    at_ends = np.concatenate([[0], ends])
+    finer[at_ends], between[at_ends] = times, states
+    return finer, between, felt[step]
 
 
 @dataclass(frozen=True)
@@ -182,6 +213,19 @@ class FixedStep:
     largest: float
     #: The settings of an engine that hold its fields.
     knobs: ClassVar[tuple[str, ...]] = ("time_step",)
+    #: The one of them that limits the usual step.
+    limiting: ClassVar[str] = "time_step"
+    #: Whether a step's motion is smooth: an impact may lie in it.
+    smooth: ClassVar[bool] = False
+
+    @property
+    def usual(self) -> float:
+        """How long a step usually is, s."""
+        return self.largest
+
+    def coarser(self, factor: float) -> "FixedStep":
+        """Steps `factor` times as long."""
+        return FixedStep(factor * self.largest)
 
     def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
         """The march of a world through a scene, which is still to be called."""
@@ -199,25 +243,51 @@ class FixedStep:
 class AdaptiveStep:
     """Steps that end at the events and are at most `largest` s long.
 
-    Steps at impacts and just after events are `short` times their usual length.
+    Steps at impacts and just after events are `short` times their usual length. With a `tolerance`,
+    in units of alpha (rotation) and alpha R (place), no step has a larger error, as estimated.
     """
 
     largest: float = 5e-4
     short: float = 1.0
-    knobs: ClassVar[tuple[str, ...]] = ("largest_step", "short_steps")
+    tolerance: float | None = None
+    knobs: ClassVar[tuple[str, ...]] = ("largest_step", "short_steps", "tolerance")
+
+    @property
+    def limiting(self) -> str:
+        """The setting that limits the usual step."""
+        return "largest_step" if self.usual == self.largest else "tolerance"
+
+    @property
+    def usual(self) -> float:
+        """How long a step usually is, s; with a tolerance, in the rocking of a block of some m."""
+        if self.tolerance is None:
+            return self.largest
+        return min(self.largest, FINE * (self.tolerance / FINE_TOLERANCE) ** (1.0 / 3.0))
+
+    def coarser(self, factor: float) -> "AdaptiveStep":
+        """Steps `factor` times as long: the error of one grows with the cube of its length."""
+        tolerance = None if self.tolerance is None else factor**3 * self.tolerance
+        return AdaptiveStep(factor * self.largest, factor * self.short, tolerance)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the motion in a step is read off as the cubic that the step is known to be."""
+        return self.tolerance is not None
 
     def ready(self, world: World, scene: Scene) -> Callable[[], Marched]:
         """The march of a world through a scene until |theta| = pi/2, to be called once.
 
         Its compiled step is loaded. The scene is one of a block with R = 1, see `in_units_of`. The
         march raises `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end /
-        `largest` steps, `end` the last of the scene's `run_times`.
+        `usual` steps, `end` the last of the scene's `run_times`.
         """
         from rockcheck.engines import adaptive_march, kernels
         from rockcheck.scenes.compiled import for_types_of
 
-        course, run, request = adaptive_march.start(scene, self.largest, self.short)
-        most_steps = 100_000 + 20 * int(course.end / self.largest)
+        course, run, request = adaptive_march.start(
+            scene, self.largest, self.usual, self.short, self.tolerance
+        )
+        most_steps = 100_000 + 20 * int(course.end / self.usual)
         first = np.empty((ROOM, kernels.COLUMNS))
         first[0, :7] = 0.0, *run.states[0].motion
         step = for_types_of(kernels.step, run, course, (0.0, 0.0, 0.0), first[0])
@@ -231,6 +301,8 @@ class AdaptiveStep:
                 if count == len(rows):
                     rows = np.concatenate([rows, np.empty_like(rows)])
                 going = step(run, course, kicked, rows[count])
+                if going == kernels.AGAIN:
+                    continue
                 count += 1
                 if count % 512 == 0:
                     progress.tell(rows[count - 1, 0], course.end)

@@ -61,7 +61,7 @@ def asked(cell: tuple[int, int, str]) -> tuple[str, Counter[str]]:
     found = numerical.numerical_uncertainty(model, scene, history)
     assert found is not None
     told: Counter[str] = Counter()
-    true = {name: value for name, _, value, _ in numerical._scalars(scene, truth)}
+    true = {name: value for name, _, value in numerical._scalars(scene, truth)}
     for q in found.quantities[:-1]:  # the last is the outcome
         error = abs(q.value - true[q.name]) if q.name in true else math.inf
         if q.name == "theta_rms" and numerical._side(history) == numerical._side(truth):

@@ -70,12 +70,37 @@ def test_short_steps_at_impacts_are_few(varying_engine):
 
 
 @pytest.mark.slow_for("dart")
+def test_the_error_follows_the_tolerance_of_a_step(varying_engine):
+    scenes = [pulse_scene(*pulse, 1.0, duration=4.0) for pulse in PULSES]
+    errors = {
+        tolerance: median_error(varying_engine(tolerance=tolerance), scenes)
+        for tolerance in (1e-5, 1e-7, 1e-9)
+    }
+    assert errors[1e-5] < 1e-4
+    assert errors[1e-7] < errors[1e-5] / 10.0
+    assert errors[1e-9] < errors[1e-7] / 3.0
+    assert errors[1e-9] < 3e-7
+
+
+@pytest.mark.slow_for("dart")
+def test_a_tolerance_takes_fewer_steps_than_a_longest_one_for_the_same_error(varying_engine):
+    scene = pulse_scene(*PULSES[1], 1.0, duration=4.0)
+    runs = [varying_engine(**steps).simulate(scene) for steps in ({}, {"largest_step": 5e-4})]
+    by_error, by_length = (
+        float(np.sqrt(np.mean((run.channels["theta"] - exact(scene)) ** 2))) / scene.block.alpha
+        for run in runs
+    )
+    assert by_error < max(3.0 * by_length, 1e-6)
+    assert runs[0].cost.steps < 0.4 * runs[1].cost.steps
+
+
+@pytest.mark.slow_for("dart")
 def test_no_error_is_left_that_no_step_changes(varying_engine):
     """With impacts a hundred times as long, the error grows: neither the corners' size nor the
     table of the base motion shows."""
     scene = pulse_scene(1.96, 1.6, 1.0, duration=4.5)
     usual, long = (
-        rotation_error(varying_engine(time_step="adaptive", short_steps=k), scene) for k in (1, 100)
+        rotation_error(varying_engine(largest_step=5e-4, short_steps=k), scene) for k in (1, 100)
     )
     assert usual < 5e-8
     assert long / usual > 4.0

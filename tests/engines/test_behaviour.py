@@ -78,6 +78,7 @@ for engine in (facts.engine for facts in registry.every()):
         ({"time_step": math.nan}, "time_step: nan is not allowed"),
         ({"time_step": 10**400}, "time_step: 10+... is not allowed"),
         ({"largest_step": -1.0}, "largest_step"),
+        ({"tolerance": 0.0}, "tolerance"),
         ({"settings": "worst"}, "settings"),
         (
             {"time_step": "adaptive", "settings": "default"},
@@ -99,8 +100,27 @@ def test_steps_are_adaptive_unless_something_else_is_asked_for(varying_engine):
     """An engine as it comes cannot step so: it has a fixed step, also by default."""
     given = ({}, {"settings": "default"}, {"settings": "default", "time_step": 1e-3})
     assert [varying_engine(**one).time_step for one in given] == ["adaptive", 1e-4, 1e-3]
-    assert varying_engine().largest_step == 5e-4
     assert varying_engine(time_step=1e-3).coarser(2.0).time_step == 2e-3
+
+
+@pytest.mark.parametrize(
+    ("settings", "longest", "tolerance"),
+    [
+        ({}, 0.02, 1e-9),
+        ({"short_steps": 2.0}, 0.02, 1e-9),
+        ({"largest_step": 2e-3}, 2e-3, None),
+        ({"tolerance": 1e-6}, 0.02, 1e-6),
+        ({"largest_step": 2e-3, "tolerance": 1e-6}, 2e-3, 1e-6),
+        ({"time_step": 1e-3}, 0.02, None),
+    ],
+)
+def test_adaptive_steps_follow_a_tolerance_or_a_longest_step(
+    varying_engine, settings, longest, tolerance
+):
+    model = varying_engine(**settings)
+    assert model.largest_step == longest
+    assert model.tolerance == tolerance
+    assert varying_engine(**model.model_dump()) == model
 
 
 def test_a_step_controller_says_how_steps_follow_each_other(varying_engine):
@@ -109,6 +129,8 @@ def test_a_step_controller_says_how_steps_follow_each_other(varying_engine):
     model = varying_engine(time_step=adaptive)
     assert (model.largest_step, model.short_steps, model.steps) == (2e-3, 3.0, adaptive)
     assert model.coarser(2.0).steps == steps.AdaptiveStep(4e-3, 6.0)
+    by_error = varying_engine(time_step=steps.AdaptiveStep(2e-3, 3.0, 1e-6))
+    assert by_error.coarser(2.0).steps == steps.AdaptiveStep(4e-3, 6.0, 8e-6)
     named = {"time_step": "adaptive", "largest_step": 2e-3, "short_steps": 3.0}
     assert model.steps == varying_engine(**named).steps
 
@@ -147,10 +169,12 @@ def test_a_default_run_of_the_readmes_scene_is_converged(varying_engine):
 
 
 @pytest.mark.parametrize(
-    "settings", [{"time_step": 1e-9}, {"time_step": "adaptive", "largest_step": 1e-9}]
+    ("knob", "value"), [("time_step", 1e-9), ("largest_step", 1e-9), ("tolerance", 1e-30)]
 )
-def test_too_many_steps_are_refused_at_once(varying_engine, settings, fault_of):
-    assert "5000000 steps" in str(fault_of(varying_engine(**settings).simulate, free_rocking(0.5)))
+def test_too_many_steps_are_refused_at_once(varying_engine, knob, value, fault_of):
+    fault = str(fault_of(varying_engine(**{knob: value}).simulate, free_rocking(0.5)))
+    assert fault.startswith(f"{knob}: {value:g} is not allowed: ")
+    assert fault.endswith("more than 5000000 steps")
 
 
 def test_history_says_how_it_came_about(engine):
@@ -374,6 +398,27 @@ def test_a_march_loads_its_compiled_step_before_its_clock_starts(monkeypatch):
     )
     monkeypatch.delattr(compiled, "for_types_of")
     assert len(march()[0]) > 1
+
+
+def test_what_is_read_off_between_steps_is_exact_where_the_acceleration_is_linear():
+    ends = np.array([0.0, 0.0003, 0.002, 0.0152])
+
+    def motion(t):
+        place = np.outer(t**3 - t, [1.0, -2.0, 3.0])
+        return np.hstack([place, np.outer(3.0 * t**2 - 1.0, [1.0, -2.0, 3.0])])
+
+    felt = np.arange(6.0).reshape(3, 2)
+    times, states, between = steps.in_fine_steps(ends, motion(ends), felt)
+    assert np.max(np.diff(times)) <= steps.FINE * (1.0 + 1e-9)
+    assert set(ends) <= set(times)
+    assert states == pytest.approx(motion(times), abs=1e-14)
+    assert between[times[1:] <= 0.002 + 1e-12][-1].tolist() == [2.0, 3.0]
+    assert between[-1].tolist() == [4.0, 5.0]
+
+
+def test_steps_are_long_where_nothing_moves(varying_engine):
+    history = varying_engine().simulate(free_rocking(0.0, duration=10.0))
+    assert history.cost.steps < 1.02 * 10.0 / varying_engine().largest_step + 10
 
 
 @pytest.mark.parametrize("step", [1e-3, "adaptive"])

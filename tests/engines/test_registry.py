@@ -132,7 +132,12 @@ def test_a_new_engine_plays_spectra(known):
 
 def test_a_new_engine_is_measured(known):
     assert known["lines"]["abacus"] == [2e-2, 2e-3]
-    assert set(known["lines"]) == {"abacus", "abacus adaptive", "abacus default"}
+    assert set(known["lines"]) == {
+        "abacus",
+        "abacus adaptive",
+        "abacus tolerance",
+        "abacus default",
+    }
     assert known["converge"] == [2e-3, 2e-4]
 
 

@@ -23,7 +23,7 @@ SHEETS = {
     "El Centro": ("fig",),
 }
 #: How a line of the diagrams is drawn, by the end of its name.
-STYLES: Mapping[str, Style] = {"default": "dots", "adaptive": "marked"}
+STYLES: Mapping[str, Style] = {"default": "dots", "adaptive": "marked", "tolerance": "dashed"}
 #: Below are rounding errors; above nothing is right, alpha.
 FLOOR, CEILING = 1e-13, 3.0
 #: The level that no error against the other reference can fall below.

@@ -35,7 +35,8 @@ class DiagramLine(models.Work):
     @property
     def steps_are_dear(self) -> bool:
         """Whether its adaptive steps cost as much as fixed ones of 1e-4 s."""
-        return self.knob == "largest_step" and registry.facts_of(self.family).dear_adaptive_steps
+        is_adaptive = self.settings.get("time_step") == "adaptive"
+        return is_adaptive and registry.facts_of(self.family).dear_adaptive_steps
 
 
 _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -43,6 +44,8 @@ _TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 _PENETRATIONS = (1e-6, 1e-8, 1e-10)
 #: Largest steps of engines that step adaptively, s.
 _LARGEST = (8e-3, 4e-3, 2e-3, 1e-3)
+#: Their tolerances where the error of a step limits it.
+_STEP_TOLERANCES = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 #: Steps of engines with their default settings in a quick run, s; in a whole run the first
 #: `DEFAULT_STEPS` of their diagram.
 _QUICK_DEFAULT, DEFAULT_STEPS = (1e-2, 1e-3), 3
@@ -50,6 +53,8 @@ _QUICK_DEFAULT, DEFAULT_STEPS = (1e-2, 1e-3), 3
 
 def lines_of_engine(facts: EngineFacts) -> list[DiagramLine]:
     """An engine's lines: fixed steps, adaptive ones where it has them, its default settings.
+
+    Adaptive steps are limited by the longest one, or by their error.
 
     A quick run leaves out the finest step, which costs more than all others together.
     """
@@ -73,7 +78,15 @@ def lines_of_engine(facts: EngineFacts) -> list[DiagramLine]:
             values=_LARGEST,
             quick=_LARGEST[1:3],
         )
-        lines.append(adaptive)
+        tolerance = DiagramLine(
+            label=f"{engine} tolerance",
+            family=engine,
+            settings={"time_step": "adaptive"},
+            knob="tolerance",
+            values=_STEP_TOLERANCES,
+            quick=_STEP_TOLERANCES[1:4:2],
+        )
+        lines += [adaptive, tolerance]
     default = DiagramLine(
         label=f"{engine} default",
         family=engine,

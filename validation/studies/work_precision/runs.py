@@ -97,7 +97,8 @@ class Play(Task):
         """The model's step, s: of adaptive ones the largest; NaN where it has none."""
         if line.knob == "largest_step":
             return self.value
-        return float(history.settings.get("time_step", math.nan))
+        step = history.settings.get("time_step", math.nan)
+        return math.nan if step == models.ADAPTIVE else float(step)
 
 
 def errors_of(reference: History, history: History) -> dict[str, float]:
