@@ -346,7 +346,7 @@ def test_figures_for_print_are_drawn_where_the_run_asks_for_them(
         assert said in refused("report", str(tmp_path), *asked)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_all_figures_are_written_for_who_asks_and_go_for_who_does_not(tmp_path, finished, typed):
     finished.save(tmp_path)
     figures = tmp_path / PAGES / "figures"

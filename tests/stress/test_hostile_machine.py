@@ -122,7 +122,9 @@ def workers(running: subprocess.Popen, settled: float = 3.0) -> list[str]:
 
 
 @pytest.mark.needs("Linux")
-@pytest.mark.parametrize("later", [0.0, 0.2, 0.4, 0.6, 3.0])
+@pytest.mark.parametrize(
+    "later", [0.0, 0.2, 0.6, *(pytest.param(t, marks=pytest.mark.slow) for t in (0.4, 3.0))]
+)
 def test_interrupted(tmp_path, later):
     """Ctrl-C ends a study in one line; what was finished is written, and says that it is not all.
     It reaches a worker, too, before that can say that it is not meant."""

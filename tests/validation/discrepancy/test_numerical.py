@@ -248,6 +248,7 @@ def test_a_model_without_a_step_is_not_judged():
     assert numerical.numerical_uncertainty(object(), BOOKCASE) is None
 
 
+@pytest.mark.slow
 def test_the_interval_covers_as_often_as_it_says():
     chance = np.random.default_rng(5)
     inside = []

@@ -334,7 +334,14 @@ def test_the_band_holds_the_binomial_spread():
     assert none[1:4] == pytest.approx([0.0, 0.0, 1.0 - 0.025**0.01], rel=1e-4)
 
 
-@pytest.mark.parametrize(("motions", "shared"), [(10, 0.0), (20, 0.3), (50, 0.4)])
+@pytest.mark.parametrize(
+    ("motions", "shared"),
+    [
+        pytest.param(10, 0.0, marks=pytest.mark.slow),
+        (20, 0.3),
+        pytest.param(50, 0.4, marks=pytest.mark.slow),
+    ],
+)
 def test_the_band_covers_as_often_as_it_says(motions, shared):
     """Motions with capacities of their own and directions that scatter about them; shares between 2
     and 98 %.
