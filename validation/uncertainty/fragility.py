@@ -69,8 +69,7 @@ def curve_of(
     """
     hits, decided = (hit & ~failed).sum(axis=1), (~failed).sum(axis=1)  # (motion, intensity)
     median, dispersion = fit_lognormal(intensities, hits.sum(axis=0), decided.sum(axis=0))
-    with np.errstate(divide="ignore"):  # of a dispersion of 0 it is a step
-        fitted = scipy.special.ndtr(np.log(intensities / median) / dispersion)
+    fitted = probabilities(intensities, median, dispersion)
     points = np.column_stack([intensities, *share_of(hits, decided), fitted]).tolist()
     sets = np.random.default_rng(2).integers(len(hits), size=(draws, len(hits)))
     medians = [
@@ -80,6 +79,16 @@ def curve_of(
     known = [one for one in medians if not math.isnan(one)]
     low, high = ends_of(known).tolist() if known and len(known) >= 0.9 * draws else NO_FIT
     return Curve(label, len(hit), int(failed.sum()), median, dispersion, low, high, points)
+
+
+def probabilities(intensities: Floats, median: float, dispersion: float) -> Floats:
+    """The lognormal curve at some intensities: of a dispersion of 0 a step, one half at its median.
+
+    NaN where nothing fits.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        fitted = scipy.special.ndtr(np.log(intensities / median) / dispersion)
+    return np.where(intensities == median, 0.5, fitted)
 
 
 def share_of(hits: NDArray[np.int64], decided: NDArray[np.int64]) -> tuple[Floats, Floats, Floats]:
@@ -105,13 +114,19 @@ def fit_lognormal(
     `hits` counts the decided runs (`runs`) in which the event happened at each intensity. `NO_FIT`
     where that is all or none of them, or where the curve does not rise with the intensity. Where
     all happen above and none below a level, any median between is as likely and a dispersion of 0
-    the likeliest: the middle one, in ln x, is taken.
+    the likeliest: the middle one, in ln x, is taken. Where some happen at one intensity alone, the
+    likelihood has no maximum: it rises towards a step there. That step is taken where it has none
+    below it and all above it, else there is no fit.
     """
     if not 0 < hits.sum() < runs.sum():
         return NO_FIT
     least, most = intensities[hits > 0].min(), intensities[hits < runs].max()
     if most < least:
         return math.sqrt(least * most), 0.0
+    if most == least:
+        played = intensities[runs > 0]
+        is_between = played.min() < least < played.max()
+        return (float(least), 0.0) if is_between else NO_FIT
     logarithm = np.log(intensities)
     centre = float(np.mean(logarithm))
 
