@@ -167,7 +167,7 @@ def leans(run: March) -> bool:
     """Whether a block that does not stand flat touches a wall."""
     if run.closed[0] and run.closed[1]:
         return False
-    for i in range(FLOOR, len(run.closed)):  # noqa: SIM110 - compiled
+    for i in range(FLOOR, len(run.closed)):  # noqa: SIM110 - compiled, where there are no generators
         if run.closed[i]:
             return True
     return False
