@@ -90,7 +90,7 @@ def follow(block, run, began):
     _note_first(state, began)
     if rocks(mode):
         for sign in (1.0, -1.0):
-            _combine(run.a, 0.0, sign, 0.0, 0.0, 0.0, 0.0)
+            _combine(run.a, constant=0.0, of_phi=sign, of_s=0.0, of_c=0.0, of_xi=0.0, of_y=0.0)
             _look(block, run, began, -np.inf)
     elif mode.family == Family.TILT and not stands_still(mode):
         _follow_tilted(block, run, began)

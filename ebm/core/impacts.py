@@ -67,17 +67,11 @@ def floor_impact(b, S1, w1, v1, mu_s, mu_k):
     w2, p, q = floor_stick(b, S1, w1, v1)
     if S2 * w2 >= 0.0 and p >= 0.0 and abs(q) <= mu_s * p + rounding:
         return Landing.HELD_FAST, w2, 0.0, p
-    turns = False
     toward = -1.0 if q > 0.0 else 1.0
     for d in (toward, -toward):
         slips_w2, v2, push = floor_slip(b, S1, d, mu_k, w1, v1)
-        turns = turns or S2 * slips_w2 >= 0.0
         if S2 * slips_w2 >= 0.0 and d * v2 >= -rounding:
             return Landing.SLID, slips_w2, v2, push
-    if turns and mu_s > mu_k and S2 * w2 >= 0.0:
-        # Static friction above kinetic leaves a gap in which neither form is consistent: sticking
-        # is the nearer one.
-        return Landing.HELD_FAST, w2, 0.0, p
     p = side_of(b, S1).arm * abs(w1)
     xdot = v1 - b.height * w1
     return (

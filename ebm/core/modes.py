@@ -319,7 +319,7 @@ def _least_violated(block, base, run, at, search):
 
     The first one that fits is left in the state.
     """
-    least, chosen = np.inf, -1
+    least, best = np.inf, -1
     for number in range(at.begin, at.end):
         if least == 0.0:
             break
@@ -327,8 +327,8 @@ def _least_violated(block, base, run, at, search):
             violation = constraint_violation(block, base, run, search != Search.FITS)
             violation = max(violation, run.state.least_slack if search == Search.TRIED else 0.0)
             if violation < least:
-                least, chosen = violation, number
-    return least, chosen
+                least, best = violation, number
+    return least, best
 
 
 @inner_kernel
