@@ -55,7 +55,9 @@ def test_stages_follow_each_other_as_the_theory_page_says(monkeypatch):
     monkeypatch.setattr(
         compiled._Inner,
         "__call__",
-        lambda kernel, *given: called.append(kernel.__name__) or kernel.py_func(*given),
+        lambda kernel, *given, **named: (
+            called.append(kernel.__name__) or kernel.py_func(*given, **named)
+        ),
     )
     monkeypatch.setattr(natural, "is_ready", lambda *given: False)
     tilted = Scene(
