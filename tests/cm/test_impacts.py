@@ -196,6 +196,13 @@ def test_a_contact_closes_where_its_parabola_does(pull, rate):
     assert gap + since * (rate + 0.5 * pull * since) == pytest.approx(0.0, abs=1e-18)
 
 
+def test_a_contact_that_has_just_opened_closes_to_all_digits():
+    """Thrown up at 0.1 m/s and pulled back at 4000 m/s^2 it returns after 2 0.1/4000 s."""
+    opening = corner(gap=1e-17, before=0.1 + 4e3 * LENGTH)
+    time = closing_time(parameters(), opening, 0.1, LENGTH)
+    assert time + 0.5 * LENGTH == pytest.approx(5e-5, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("gap", "rate"), [(1e-6, 0.1), (1.0, -0.5), (4.9e-4 * 0.4, -0.4)], ids=["opens", "far", "later"]
 )

@@ -81,6 +81,11 @@ def test_a_reason_of_many_tasks_is_a_line():
     assert table_text.failure_lines(failures) == ["a and 2 more: no end", "c: crashed"]
 
 
+def test_a_reason_of_two_tasks_is_a_line():
+    failures = {"a": "no end", "b": "no end"}
+    assert table_text.failure_lines(failures) == ["a and 1 more: no end"]
+
+
 def finding(**more):
     return Finding("f", "Title", "Answer.", [TABLE], **more)
 

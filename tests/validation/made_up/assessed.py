@@ -122,3 +122,26 @@ def gap_answer(**searches):
     )
     (answer,) = statistics.gap_answers(everything)
     return answer
+
+
+#: It falls at no gap of all that matter.
+SAFE = statistics.GapAnswer(
+    side="left",
+    low=0.0,
+    high=0.1,
+    looked_every=1e-3,
+    finely_up_to=0.1,
+    beyond_every=0.0,
+    draws_every=None,
+    draws_beyond_every=None,
+    clearance=0.1,
+    free_overturned=0,
+    free_runs=1,
+    safe_up_to=0.1,
+    first=None,
+    falls=(),
+    rows=(),
+    undecided=0,
+    runs=9,
+    complete=True,
+)

@@ -144,6 +144,29 @@ def test_slow_engines_play_fewer_nodes_and_only_contacts_that_they_have(agree):
     assert [row["nodes"] for row in table.records()] == [80, 80, 16, 8]
 
 
+def test_a_model_that_plays_all_nodes_plays_those_near_the_boundary_that_are_more(agree):
+    """Of stripes three nodes wide two nodes in the first one make all near but ten."""
+    panel = paper_panels(8)[0]
+    outcomes = np.tile(np.arange(20) // 3 % 2, (20, 1))
+    outcomes[[5, 15], 0] = 1
+    spectra = {panel: made(panel, outcomes)}
+    found, _ = agree(lambda *_: "S", ("ebm-unilateral", "cm"), spectra, 3)
+    near, away = (share["nodes"] for share in found["shares"] if share["model"] == "cm")
+    assert near == 30
+    assert away == 10
+
+
+def test_an_agreement_names_the_models_that_play_fewer_nodes(agree):
+    panel = paper_panels(8)[0]
+    spectra = {panel: made(panel, np.tile(np.arange(20) >= 10, (20, 1)))}
+    found, _ = agree(lambda *_: "S", ("ebm-unilateral", "cm", "dart", "drake"), spectra, 3)
+    assert ": dart, drake." in found["about"]
+
+
+def test_an_engine_that_plays_all_nodes_draws_a_map():
+    assert max(agreement.PLAYED_SHARE.values()) < 1.0
+
+
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_an_engine_without_restitution_does_not_play_a_floor_that_bounces(restitution):
     engine = Request(model="mujoco", settings={"settings": "default", "time_step": 1e-3})

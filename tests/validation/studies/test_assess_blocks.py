@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from assessed import FREE, RUNS, SCENE, gathered, interval, judged, ran, search
+from assessed import FREE, RUNS, SCENE, UNCERTAIN, gathered, interval, judged, ran, search
 
 from rockcheck.validation.finding import Mark, plain
 from rockcheck.validation.studies.population import (
@@ -14,6 +14,7 @@ from rockcheck.validation.studies.population import (
     statistics,
 )
 from rockcheck.validation.studies.population.certainty import Contribution, UncertaintyAnswer
+from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.uncertainty.input_spread import Sensitivity
 
 # What is assessed
@@ -254,6 +255,22 @@ def test_shares_of_the_peak_s_variance_are_never_negative():
     (table,) = certainty_blocks.sensitivity_table(everything)
     assert table.rows == [["floor.friction", 0.0, 1.02]]
     assert [column.digits for column in table.columns[1:]] == [2, 2]
+
+
+def sensitivities_of(result):
+    """Those of an uncertain scene under its own motion, whose task has this result."""
+    everything = gathered({"a": RUNS["a"]}, given=UNCERTAIN, recorded=False, draws=4)
+    done = everything.done | {everything.plan.sensitivity: result}
+    return Gathered(everything.plan, done).sensitivities
+
+
+def test_indices_are_the_result_of_their_task():
+    result = results.Sensitivities(indices=())
+    assert sensitivities_of(result) == result
+
+
+def test_of_indices_that_failed_there_are_none():
+    assert sensitivities_of("it takes too many steps") is None
 
 
 def test_without_indices_there_is_no_table_of_them():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from assessed import RUNS, UNCERTAIN, gathered, interval, judged, ran
+from assessed import RUNS, SAFE, UNCERTAIN, gathered, interval, judged, ran
 
 from rockcheck.validation.studies.population import results, sentences, statistics
 from rockcheck.validation.studies.population.certainty import (
@@ -13,7 +13,6 @@ from rockcheck.validation.studies.population.certainty import (
 )
 from rockcheck.validation.studies.population.statistics import (
     CaseFalls,
-    GapAnswer,
     IntensityAnswer,
     QuantityAnswer,
     RecordIntensity,
@@ -124,28 +123,6 @@ def test_without_a_run_that_stands_no_figure_is_named():
 
 
 # Which gap is safe?
-
-#: It falls at no gap of all that matter.
-SAFE = GapAnswer(
-    side="left",
-    low=0.0,
-    high=0.1,
-    looked_every=1e-3,
-    finely_up_to=0.1,
-    beyond_every=0.0,
-    draws_every=None,
-    draws_beyond_every=None,
-    clearance=0.1,
-    free_overturned=0,
-    free_runs=1,
-    safe_up_to=0.1,
-    first=None,
-    falls=(),
-    rows=(),
-    undecided=0,
-    runs=9,
-    complete=True,
-)
 
 
 def falling(*cases, **change):

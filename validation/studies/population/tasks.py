@@ -329,8 +329,6 @@ def _searched(
     stands: search.Stands, runs: NDArray[np.int64], grid: Floats, resolution: Floats | float
 ) -> list[results.FallInterval]:
     """The intervals of these runs in which they do not stand."""
-    if not len(runs) or not len(grid):
-        return []
     seen = stands(np.repeat(runs, len(grid)), np.tile(grid, len(runs))).reshape(len(runs), -1)
     return _narrowed(stands, runs, seen, grid, resolution)
 

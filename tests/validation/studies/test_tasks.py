@@ -1,0 +1,153 @@
+"""Tasks of an assessment: what each plays, by a batch that is made up."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from assessed import SCENE
+
+from rockcheck import Record, Rest
+from rockcheck.ebm import fates
+from rockcheck.validation.studies.population.tasks import (
+    DrawTask,
+    FactorTask,
+    PeaksTask,
+    effort,
+    history_text,
+    motion_end,
+)
+
+
+@pytest.fixture
+def batches(monkeypatch):
+    """What is played, where runs overturn from a factor of 2, and that of -1 is not decided."""
+    played = []
+
+    def batch(task, which, **more):
+        played.append(more)
+        factor = np.broadcast_to(more["factor"], len(which))
+        outcome = np.where(factor >= 2.0, fates.OVERTURNED_LEFT, fates.AT_REST)
+        outcome = np.where(factor == -1.0, fates.UNDECIDED, outcome)
+        peak = 0.1 * SCENE.block.alpha * np.abs(factor)
+        return fates.Fates(outcome=outcome, time_s=np.ones(len(which)), peak=peak)
+
+    monkeypatch.setattr(DrawTask, "batch", batch)
+    return played
+
+
+# Factors on the motion
+
+LOOKED_AT = (1.0, 1.5, 3.0, 4.0)
+
+
+def factor_search(*, both=False):
+    task = FactorTask(("up",), SCENE, "ebm-unilateral", factors=LOOKED_AT, both=both)
+    return task.play()
+
+
+@pytest.mark.usefixtures("batches")
+def test_the_factor_at_which_it_falls_is_narrowed_to_a_quarter_of_a_percent():
+    (fall,) = factor_search().intervals
+    assert fall.low == pytest.approx(2.0, abs=1.5 * 2.5e-3)
+    assert fall.low - fall.stands_below <= 1.5 * 2.5e-3
+    assert fall.high == 4.0
+
+
+@pytest.mark.usefixtures("batches")
+def test_all_runs_of_the_search_are_counted():
+    """Four that are looked at, and 1.5 halved nine times, to 0.003."""
+    assert factor_search().runs == 4 + 9
+
+
+def test_the_vertical_motion_is_left_as_it_is(batches):
+    factor_search()
+    assert {batch["vertical_factor"] for batch in batches} == {1.0}
+
+
+def test_the_vertical_motion_may_be_scaled_too(batches):
+    factor_search(both=True)
+    assert batches[0]["vertical_factor"].tolist() == list(LOOKED_AT)
+
+
+# Peaks at factors
+
+
+def peaks(*, both=False):
+    factors = (0.5, -0.5, -1.0, 2.5)
+    return PeaksTask(("up",), SCENE, "ebm-unilateral", factors=factors, both=both).play().peaks
+
+
+@pytest.mark.usefixtures("batches")
+def test_peaks_are_in_units_of_the_slenderness():
+    assert peaks()[:2] == pytest.approx([0.05, 0.05])
+
+
+@pytest.mark.usefixtures("batches")
+def test_a_run_that_is_not_decided_has_no_peak():
+    assert math.isnan(peaks()[2])
+
+
+@pytest.mark.usefixtures("batches")
+def test_the_peak_of_a_fall_is_beyond_all():
+    assert peaks()[3] == math.inf
+
+
+def test_peaks_leave_the_vertical_motion_as_it_is(batches):
+    peaks()
+    assert batches[0]["vertical_factor"] == 1.0
+
+
+def test_a_mirrored_motion_has_the_same_vertical_one(batches):
+    peaks(both=True)
+    assert batches[0]["vertical_factor"].tolist() == [0.5, 0.5, 1.0, 2.5]
+
+
+# What a task needs
+
+
+@pytest.mark.parametrize(
+    ("model", "runs", "seconds", "where"),
+    [
+        ("ebm-unilateral", 119_000, 59.5, "here"),
+        ("ebm-unilateral", 121_000, 60.5, "worker"),
+        ("cm", 59, 0.0295, "here"),
+        ("mujoco", 2, 2.0, "worker"),
+    ],
+)
+def test_a_study_of_less_than_a_minute_by_a_compiled_model_is_played_here(
+    model, runs, seconds, where
+):
+    needs = effort(model, {}, runs, runs)
+    assert needs["where"] == where
+    assert needs["expected"] == pytest.approx(seconds)
+
+
+# Histories
+
+
+def test_a_motion_lasts_as_long_as_the_base_moves():
+    record = Record.from_samples([1.0, 2.0, 0.0], 5.0)
+    scene = SCENE.replace(excitation=Rest(), vertical=record, duration=2.0)
+    assert motion_end(scene) == 10.0
+    assert motion_end(scene.replace(duration=12.0)) == 12.0
+
+
+def rows_until(until):
+    """Times of the rows of a history of 4001 rows at 1 ms that are kept up to a time."""
+
+    history = SimpleNamespace(channels={"t": 1e-3 * np.arange(4001), "theta": np.zeros(4001)})
+    _, *rows = history_text(history, until).splitlines()
+    return [float(row.split(",")[0]) for row in rows]
+
+
+def test_a_short_history_is_kept_whole_up_to_its_end():
+    times = rows_until(1.999)
+    assert len(times) == 2000
+    assert times[-1] == pytest.approx(1.999)
+
+
+def test_of_a_long_history_every_other_row_is_kept():
+    times = rows_until(2.0)
+    assert len(times) == 1001
+    assert times[1] == pytest.approx(2e-3)
