@@ -69,6 +69,8 @@ def row_of(coefficients: Sequence[float]) -> np.ndarray:
 
 TILTED = {"family": Family.TILT, "pull": 1}
 ROCKS = TILTED | {"pivot": Pivot.STICK}
+FLAT = {"family": Family.FLAT, "sense": 1, "pull": 1}
+RESTS = FLAT | {"pivot": Pivot.STICK}
 
 
 def block_of(alpha: float, radius: float = 1.0) -> Block:

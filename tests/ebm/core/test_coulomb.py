@@ -5,17 +5,16 @@ import math
 
 import numpy as np
 import pytest
-from stepping import ROCKS, TILTED, run_at, setting_of
+from stepping import FLAT, RESTS, ROCKS, TILTED, run_at, setting_of
 
 from rockcheck.ebm.core import coulomb
 from rockcheck.ebm.core.ground import ground_of
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Pivot
+from rockcheck.ebm.core.names import Ending, Event, Guard, HistoryMode, Pivot
 from rockcheck.ebm.core.state import Base, mode_code, rock_on
 from rockcheck.scenes import Record
 
 ALPHA = 0.3
-FLAT = {"family": Family.FLAT, "sense": 1, "pull": 1}
-RESTS, SLIDES = FLAT | {"pivot": Pivot.STICK}, FLAT | {"pivot": Pivot.SLIPPING, "slip": 1}
+SLIDES = FLAT | {"pivot": Pivot.SLIPPING, "slip": 1}
 
 
 def run_after(guard, event, slide=0.0, **mode):
@@ -65,8 +64,12 @@ def test_a_block_settles_where_an_impact_leaves_it_at_rest():
     assert told(run) == [Event.FLOOR_IMPACT, Event.SETTLED]
 
 
-def test_what_rests_on_is_not_told():
-    assert told(follow(run_after(Guard.UPLIFT_PLUS, Event.UNTOLD, **RESTS))) == []
+@pytest.mark.parametrize("push", [0.0, 0.3, -0.3])
+def test_below_its_slope_a_block_rests_on_and_nothing_is_told(push):
+    """tan(0.3) is 0.309."""
+    run = follow(run_after(Guard.UPLIFT_PLUS, Event.UNTOLD, **RESTS), push)
+    assert mode_code(run.state) == HistoryMode.REST
+    assert told(run) == []
 
 
 def test_a_mode_that_an_impact_has_left_is_not_selected_anew():

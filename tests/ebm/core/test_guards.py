@@ -19,11 +19,12 @@ from situations import (
     run_of,
     standing,
 )
-from stepping import ROCKS, TILTED, run_at, setting_of
+from stepping import FLAT, RESTS, ROCKS, TILTED, run_at, setting_of
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, ground, guards, modes, motion, series, steps
 from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
+from rockcheck.ebm.core.state import Base
 from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Wall
 
 
@@ -151,6 +152,73 @@ def test_series_obey_newton_and_euler_in_every_term(mode, vertical):
         for one, other in laws:
             terms = (one - other).coef[: series.ORDER - 1]  # accelerations have two terms fewer
             assert np.abs(terms).max() < 5e-15 * max(1.0, np.abs(one.coef).max())
+
+
+@pytest.mark.parametrize(("z", "loads"), [(0.4, True), (-0.4, False)])
+@pytest.mark.parametrize("tilted", [True, False])
+def test_series_obey_bouc_wens_law_in_every_term(tilted, z, loads):
+    """u_y z' = V (1 - z^2) where the pivot loads, V where it unloads, and Q = -mu z P."""
+    scene = Scene(
+        name="winds",
+        block=PAPER_BLOCK,
+        floor=Floor(friction=0.4),
+        excitation=Ricker(amplitude=6.0, period=1.3),
+        vertical=Ricker(amplitude=3.0, period=1.1),
+        duration=1.0,
+    )
+    model = EventBasedModel(friction="bouc-wen", yield_displacement=0.1 * PAPER_BLOCK.radius)
+    block, phi, w = natural.setting_of(scene, model), 0.1 * tilted, 0.3 * tilted
+    s, c = math.sin(PAPER_BLOCK.alpha - phi), math.cos(PAPER_BLOCK.alpha - phi)
+    mode = TILTED if tilted else FLAT
+    run = run_at(
+        (s, c, phi, 0.2 - c * w, s * w, w),
+        t=1.0,
+        **mode | {"sense": 1, "pivot": Pivot.SLIPPING, "slip": 1},
+    )
+    run.state.winds, run.state.zeta = True, z
+    order = motion.mode_series(block, natural.base_of(scene), run, 12, 0.0, 1.0)
+    phi, w, s, c, x, y, p, q, u, g, z = (
+        Polynomial(run.a[Row[name], : order - 1])
+        for name in ("PHI", "OMEGA", "SIN", "COS", "XI", "Y", "P", "Q", "U", "G", "Z")
+    )
+    slip = (x - s).deriv() if tilted else x.deriv()
+    laws = [
+        (x.deriv(2), q - u),
+        (y.deriv(2), p - g),
+        (0.1 * z.deriv(), slip * (1.0 - z * z) if loads else slip),
+        (q, -0.4 * z * p),
+    ]
+    if tilted:
+        laws += [
+            (s.deriv(), -w * c),
+            (c.deriv(), w * s),
+            (phi.deriv(2), 3.0 * (c * q - s * p)),
+        ]
+    for one, other in laws:
+        terms = (one - other).coef[: order - 3]
+        assert np.abs(terms).max() < 1e-13 * max(1.0, np.abs(one.coef).max())
+
+
+def test_a_flying_block_falls_as_g_and_the_base_s_motion_say():
+    upward = ground.ground_of(Ricker(amplitude=0.3, period=1.1), 1.0, 1.0)
+    base = Base(ground.ground_of(Rest(), 1.0, 1.0), upward)
+    run = run_at((0.0, 2.0, 0.0, 0.0, 0.5, 0.0), t=1.0, **FLAT, pivot=Pivot.OFF)
+    order = motion.mode_series(setting_of(0.3), base, run, 12, 0.0, 1.0)
+    y, g = (Polynomial(run.a[row, : order - 1]) for row in (Row.Y, Row.G))
+    assert (y.deriv(2) + g).coef[: order - 3] == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("mu", "friction", "holds"),
+    [(1.2, "coulomb", True), (0.01, "coulomb", False), (0.01, "no-slip", True)],
+)
+def test_a_rocking_block_is_proved_to_stick_by_its_friction(mu, friction, holds):
+    still = ground.ground_of(Rest(), 1.0, 1.0)
+    block = setting_of(0.3, mu, pivot="bilateral", friction=friction)
+    run = run_at((0.0, math.cos(0.2), 0.1, 0.0, 0.0, 0.0), **ROCKS, sense=1)
+    run.state.order = motion.mode_series(block, Base(still, still), run, series.ORDER, 0.0, 0.1)
+    run.state.length = 0.1
+    assert guards.rock_guards_hold(block, run) == holds
 
 
 @pytest.mark.parametrize(("away", "spins"), [(0.0, 0.0), (0.05, 0.1 * contacts.SLOW)])
@@ -303,6 +371,33 @@ def test_series_keep_the_corner_on_its_wall(case, friction):
         assert y == pytest.approx(c, rel=1e-10, abs=1e-10)
         sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
         assert x[1:] == pytest.approx(case * (sine * c - cosine * s)[1:], rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("length", "tau", "guard"), [(2.0, 0.3, Guard.UPLIFT_PLUS), (0.8, 0.27, Guard.NONE)]
+)
+def test_a_force_that_vanishes_late_in_a_step_is_looked_for_in_a_shorter_one(length, tau, guard):
+    """An acceleration that rises by 1 in 1 s lifts a block of slope 0.3 at 0.3 s. Behind a quarter
+    of its step the step ends a tenth before."""
+    block = setting_of(math.atan(0.3))
+    ramp = ground.ground_of(Record.from_samples([0.0, 3.0], time_step=3.0), 1.0, 1.0)
+    base = Base(ramp, ground.ground_of(Rest(), 1.0, 1.0))
+    run = run_at((0.0, block.height, 0.0, 0.0, 0.0, 0.0), **RESTS)
+    run.state.order = motion.mode_series(block, base, run, series.ORDER, 0.0, length)
+    run.state.length = length
+    guards.fill_guards(block, run.state, run.a)
+    guards.first_event(run)
+    assert run.state.guard == guard
+    assert run.state.tau == pytest.approx(tau, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("which", "degree"),
+    [(Guard.PHI, 8), (Guard.SLIP, 7), (Guard.LOADS, 7), (Guard.FLOOR_PUSH, 6)],
+)
+def test_a_guard_has_the_terms_of_its_series(which, degree):
+    """Of a series of 8 a rate and z, which follows a rate, have 7, and an acceleration 6."""
+    assert guards.guard(which, 8, run_at().a) == degree
 
 
 def test_the_table_of_guards_has_a_column_for_each_series():

@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
-from stepping import ROCKS, run_at, setting_of
+from stepping import FLAT, RESTS, ROCKS, run_at, setting_of
 
 from rockcheck.ebm.core import coulomb, motion, series, steps
 from rockcheck.ebm.core.ground import acceleration, ground_of
-from rockcheck.ebm.core.names import Ending, Event, Family, Guard, HistoryMode, Kind, Pivot
+from rockcheck.ebm.core.names import Ending, Event, Guard, HistoryMode, Kind, Pivot
 from rockcheck.ebm.core.state import Base, Records
 from rockcheck.scenes import Block, Record, Rest, Ricker, Sine
 
@@ -40,7 +40,7 @@ def first_step(base, start, mode, t):
 def test_a_flat_block_slides_as_friction_and_the_base_accelerate_it(early):
     """x'' = mu - u while it slides to the left."""
     t = PULSE.form.centre - early
-    mode = {"family": Family.FLAT, "sense": 1, "pivot": Pivot.SLIPPING, "slip": -1, "pull": 1}
+    mode = FLAT | {"pivot": Pivot.SLIPPING, "slip": -1}
     end, length = first_step(
         Base(PULSE, STILL), (0.1, math.cos(ALPHA), 0.0, -5.0, 0.0, 0.0), mode, t
     )
@@ -160,9 +160,6 @@ def test_a_run_ends_at_the_last_event_that_it_may_have(events, ending):
     run.state.guard = Guard.CONE_PLUS
     steps.passes_on(setting_of(ALPHA), Base(STILL, STILL), run)
     assert run.state.ending == ending
-
-
-RESTS = {"family": Family.FLAT, "sense": 1, "pivot": Pivot.STICK, "pull": 1}
 
 
 @pytest.mark.parametrize(("most", "uplift"), [(2.0, 0.5), (-2.0, 0.375)])
