@@ -234,3 +234,22 @@ def test_the_largest_value_is_that_of_the_highest_top(seed):
     assert polyval(at, c) == pytest.approx(top, abs=1e-13)
     assert series.may_top(a, 0, 1, len(rate), tau, top - 1e-12) or not falls
     assert not series.may_top(a, 0, 1, len(rate), tau, np.abs(c) @ tau ** np.arange(len(c)))
+
+
+def test_all_terms_of_a_series_count():
+    ones = row_of(np.ones(series.ORDER + 1))
+    assert series.value(ones, 0, series.ORDER, 1.0) == series.ORDER + 1
+
+
+def test_a_velocity_and_a_force_of_noise_move_a_position_by_its_noise():
+    position, rate, force = NOISES
+    assert rate * series.AHEAD == pytest.approx(position, rel=1e-15, abs=0.0)
+    assert 0.5 * force * series.AHEAD**2 == pytest.approx(position, rel=1e-15, abs=0.0)
+
+
+@pytest.mark.parametrize(("level", "may"), [(0.53, True), (1.6, False)])
+def test_late_terms_bound_a_top(level, may):
+    """1/2 + tau^9 - tau^10 has its top, 0.539, at 0.9, and stays below 1.5."""
+    c = np.array([0.5, *[0.0] * 8, 1.0, -1.0])
+    a = np.concatenate([row_of(c), row_of(polyder(c))])
+    assert series.may_top(a, 0, 1, 10, 1.0, level) == may
