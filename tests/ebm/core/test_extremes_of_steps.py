@@ -143,6 +143,20 @@ def test_the_extremes_of_a_step_are_those_of_a_dense_look(name, sense):
             assert at == pytest.approx(expected["turned_at"], abs=2e-4)
 
 
+@pytest.mark.parametrize("weight", [1.0, -2.0])
+@pytest.mark.parametrize("place", range(5))
+def test_a_combination_has_a_series_by_its_weight(place, weight):
+    """One without weight need not be there."""
+    a, order = run_at().a, [Row.PHI, Row.SIN, Row.COS, Row.XI, Row.Y]
+    terms = np.arange(1.0, 17.0)
+    a[order] = math.nan
+    a[order[place], :16] = terms
+    weights = [0.0] * 5
+    weights[place] = weight
+    extremes._combine(a, 3.0, *weights)
+    assert a[Row.WATCHED, :16].tolist() == [weight + 3.0, *(weight * terms[1:])]
+
+
 def test_a_record_has_the_places_of_all_corners():
     """Outward of each side, and inward; of two motions the larger one."""
     block, rng = setting_of(RACK), np.random.default_rng(8)
