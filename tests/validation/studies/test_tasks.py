@@ -151,3 +151,14 @@ def test_of_a_long_history_every_other_row_is_kept():
     times = rows_until(2.0)
     assert len(times) == 1001
     assert times[1] == pytest.approx(2e-3)
+
+
+# Batches
+
+
+def test_the_motion_of_a_draw_is_that_of_its_scene(monkeypatch):
+    tables = []
+    monkeypatch.setattr(fates, "play_fates", lambda table, model, **how: tables.append(table))
+    DrawTask(("up",), SCENE, "ebm-unilateral").batch(np.array([0]))
+    assert tables[0].factor.tolist() == [1.0]
+    assert tables[0].vertical_factor.tolist() == [1.0]

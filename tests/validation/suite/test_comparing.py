@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from rockcheck import Block, Floor, History, Rest, Scene
+from rockcheck import Block, Floor, History, Rest, Scene, Wall
 from rockcheck.validation.discrepancy.impact_laws import Landing
+from rockcheck.validation.execute.models import Work
 from rockcheck.validation.suite import comparing
 
 T = np.linspace(0.0, 6.0, 601)
@@ -105,3 +106,30 @@ def test_without_a_landing_the_other_laws_do_not_matter(swing):
     reference = comparing.Reference(swing(0.05), {"open": swing(0.1)})
     value, _ = figures_of(compared(swing(0.1), reference, ("",)))["peak_ratio", ""]
     assert value == pytest.approx(2.0)
+
+
+# The reference under the other laws of impacts
+
+SHORT = SCENE.replace(duration=0.02)
+
+
+@pytest.mark.parametrize(
+    ("walls", "laws"),
+    [
+        ((), {"moreau", "leading-first", "trailing-first"}),
+        (
+            (Wall(side="left", gap=0.1),),
+            {"moreau", "floor-first", "leading-first", "trailing-first"},
+        ),
+    ],
+)
+def test_a_model_with_a_choice_of_law_is_played_under_the_others(walls, laws):
+    reference = Work(label="r", family="ebm-unilateral")
+    histories = comparing.histories_under_other_laws(SHORT.replace(walls=walls), reference)
+    assert set(histories) == laws
+
+
+@pytest.mark.parametrize("family", ["ebm", "cm", "planted:Planted"])
+def test_a_model_without_a_choice_of_law_is_not_played_again(family):
+    reference = Work(label="r", family=family)
+    assert comparing.histories_under_other_laws(SHORT, reference) == {}
