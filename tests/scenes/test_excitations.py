@@ -201,3 +201,35 @@ def test_the_largest_acceleration_of_a_symmetric_pulse_is_its_amplitude(amplitud
 def test_the_extremes_of_an_antisymmetric_pulse_are_equal_and_opposite():
     least, largest = Ricker(amplitude=1.3, period=0.7).extremes
     assert largest == pytest.approx(-least, rel=1e-15)
+
+
+@pytest.mark.parametrize("symmetric", [False, True])
+@pytest.mark.parametrize("period", [0.2, 5.0])
+def test_a_ricker_pulse_is_quiet_where_nothing_is_left_of_it_and_not_long_before(symmetric, period):
+    pulse = Ricker(amplitude=1.0, period=period, symmetric=symmetric)
+    before = pulse.centre + 0.9 * (pulse.quiet_after - pulse.centre)
+    assert abs(float(pulse.acceleration(pulse.quiet_after))) < 1e-16
+    assert abs(float(pulse.acceleration(before))) > 1e-16
+
+
+# The peak of a record
+
+
+def test_a_record_is_scaled_to_a_peak_in_standard_gravity():
+    record = Record(unscaled=(0.0, 1.0, -4.0), time_step=0.1, pga=0.5)
+    assert record.samples.tolist() == pytest.approx([0.0, 0.125 * 9.80665, -0.5 * 9.80665])
+    assert record.peak == pytest.approx(0.5)
+
+
+def test_a_record_that_does_not_move_has_no_peak(fault_of):
+    fault = fault_of(Record, unscaled=(0.0, 0.0), time_step=0.1, pga=0.5)
+    assert "does not move" in str(fault)
+
+
+@pytest.mark.parametrize("pga", [0.0, -0.1, 1000.1, True, "0.5"])
+def test_a_peak_is_a_number_above_zero(pga, fault_of):
+    assert "a number above 0" in str(fault_of(Record, unscaled=(1.0,), time_step=0.1, pga=pga))
+
+
+def test_the_largest_peak_is_a_thousand_times_gravity():
+    assert Record(unscaled=(2.0,), time_step=0.1, pga=1000.0).peak == pytest.approx(1000.0)

@@ -116,10 +116,10 @@ SHORT = SCENE.replace(duration=0.02)
 @pytest.mark.parametrize(
     ("walls", "laws"),
     [
-        ((), {"moreau", "leading-first", "trailing-first"}),
+        ((), {"leading-first", "trailing-first"}),
         (
             (Wall(side="left", gap=0.1),),
-            {"moreau", "floor-first", "leading-first", "trailing-first"},
+            {"floor-first", "leading-first", "trailing-first"},
         ),
     ],
 )
