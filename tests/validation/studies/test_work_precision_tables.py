@@ -2,14 +2,16 @@
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
 
+from rockcheck.engines.facts import BenchmarkSteps
 from rockcheck.reports import table_text
 from rockcheck.validation.studies.work_precision import timing_blocks
 from rockcheck.validation.studies.work_precision.curves import LEVEL, cost_at, error_at, slope
-from rockcheck.validation.studies.work_precision.lines import LINES
+from rockcheck.validation.studies.work_precision.lines import LINES, lines_of_engine
 from rockcheck.validation.studies.work_precision.points import KINDS, frame_of
 from rockcheck.validation.studies.work_precision.runs import BenchmarkRun
 from rockcheck.validation.studies.work_precision.savings import Saving
@@ -72,6 +74,25 @@ def test_a_quick_run_leaves_out_the_finest_step_of_an_engine(label):
 
 def line_of(*points):
     return pd.DataFrame(points, columns=["value", "rms", "cpu"])
+
+
+@pytest.mark.parametrize(
+    ("vary", "labels"),
+    [(True, ["e", "e adaptive", "e tolerance", "e default"]), (False, ["e", "e default"])],
+)
+def test_an_engine_has_lines_of_adaptive_steps_where_its_steps_vary(vary, labels):
+    facts = SimpleNamespace(name="e", benchmark=BenchmarkSteps(), steps_vary=vary)
+    assert [line.label for line in lines_of_engine(facts)] == labels
+
+
+@pytest.mark.parametrize(
+    ("steps", "quick"),
+    [((1e-2, 1e-3, 1e-4), (1e-2, 1e-3)), ((1e-2, 1e-3), (1e-2, 1e-3))],
+)
+def test_a_quick_run_of_an_engine_has_two_steps_at_least(steps, quick):
+    benchmark = BenchmarkSteps(diagram=steps)
+    facts = SimpleNamespace(name="e", benchmark=benchmark, steps_vary=False)
+    assert lines_of_engine(facts)[0].quick == quick
 
 
 def test_the_order_is_that_of_the_errors_that_can_be_fitted():
