@@ -233,3 +233,8 @@ def test_a_peak_is_a_number_above_zero(pga, fault_of):
 
 def test_the_largest_peak_is_a_thousand_times_gravity():
     assert Record(unscaled=(2.0,), time_step=0.1, pga=1000.0).peak == pytest.approx(1000.0)
+
+
+def test_a_record_tells_of_periods_from_two_steps_to_its_duration():
+    record = Recording(samples=np.ones(6), time_step=0.02, unit="m/s2", form="CSV")
+    assert intensity.resolved_periods(record) == pytest.approx((0.04, 0.1))

@@ -1,6 +1,7 @@
 """What is read off motions: of exact ones the targets, of others what they show."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,8 @@ from rockcheck.validation.studies.conformance import (
 )
 from rockcheck.validation.studies.conformance.phenomena import PHENOMENA
 from rockcheck.validation.studies.conformance.phenomenon import Motion, Phenomenon
+from rockcheck.validation.studies.conformance.players import Player
+from rockcheck.validation.studies.conformance.trial import Trial
 
 G = 9.81
 EXACT = EventBasedModel(pivot="unilateral")
@@ -433,6 +436,15 @@ def test_a_rotation_beyond_a_half_turn_is_in_degrees():
         checked(SLIDE, theta=np.linspace(0.0, 3.2, 1001))
 
 
+def test_only_the_first_row_is_held_against_the_start():
+    jumps = np.where(rows(SLIDE.duration) > 0.0, SLIDE.block.radius, 0.0)
+    checked(SLIDE, x=jumps)
+
+
+def test_the_last_row_is_held_against_the_end():
+    trial.check_units(SLIDE, motion([0.0, 0.5, 0.95]).history)
+
+
 def test_a_history_that_ends_long_before_its_scene_is_in_other_units():
     checked(SLIDE, end=0.9)
     with pytest.raises(ModelFailure, match="t ends at"):
@@ -441,3 +453,56 @@ def test_a_history_that_ends_long_before_its_scene_is_in_other_units():
 
 def test_a_block_that_has_fallen_may_end_its_history():
     checked(SLIDE, end=0.3, theta=np.linspace(0.0, 1.5, 301))
+
+
+# A trial
+
+
+@pytest.fixture
+def tried(monkeypatch):
+    """The result of a phenomenon by a model that plays `simulate`."""
+
+    def result(id, simulate=EXACT.simulate, *, stated="", family="mujoco", **model):
+        made = SimpleNamespace(simulate=simulate, **model)
+        monkeypatch.setattr("rockcheck.validation.execute.models.build", lambda *_: made)
+        player = Player(label="made", family=family, setup="best", step=1e-3, version=stated)
+        return Trial(player=player, id=id).play()
+
+    return result
+
+
+@pytest.mark.parametrize(("stated", "shown"), [("", "7"), ("8", "8")])
+def test_the_version_is_the_player_s_or_else_the_model_s(tried, stated, shown):
+    assert tried("RC-05", stated=stated, version="7").version == shown
+
+
+def test_a_part_that_the_engine_lacks_is_not_played(tried):
+    result = tried("RC-07", lacks=lambda: ("restitution",))
+    assert result.verdict == "lacks"
+    assert result.value is None
+
+
+def test_what_needs_no_such_part_is_played(tried):
+    assert tried("RC-05", lacks=lambda: ("restitution",)).verdict == "pass"
+
+
+def test_the_value_is_read_off_and_judged(tried):
+    result = tried("RC-05")
+    assert result.verdict == "pass"
+    assert result.value == pytest.approx(1.0)
+
+
+def test_what_is_never_seen_has_no_value(tried):
+    """A block that sticks does not slip at any push."""
+    result = tried("RC-02", lambda scene: motion(rows(4.0), y=0.5).history)
+    assert result.verdict == "fail"
+    assert result.value is None
+
+
+def test_a_history_in_files_is_held_against_its_scene(tried):
+    with pytest.raises(ModelFailure, match="unit"):
+        tried("RC-05", lambda scene: motion(rows(10.0), x=9.0).history, family="measured")
+
+
+def test_the_history_of_an_engine_is_not(tried):
+    assert tried("RC-05", lambda scene: motion(rows(10.0), x=9.0).history).value == 0.0
