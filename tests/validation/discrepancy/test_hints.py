@@ -93,6 +93,45 @@ def test_what_agrees_has_no_hint(table):
     assert hints.hint(table("a.csv", pulse(T), T), table("b.csv", 1.05 * pulse(T), T)) is None
 
 
+@pytest.mark.parametrize(("share", "explains"), [(0.88, True), (0.8, False)])
+def test_a_change_explains_what_falls_below_a_tenth_of_what_it_was(table, share, explains):
+    """A turned sign leaves 0.12 of 1.88, or 0.2 of 1.8."""
+    found = hints.hint(table("a.csv", pulse(T), T), table("b.csv", -share * pulse(T), T))
+    assert (found is not None) == explains
+
+
+def test_beside_a_reference_that_stands_there_is_no_hint(table):
+    still = table("a.csv", np.zeros(601), T)
+    assert hints.hint(still, table("b.csv", pulse(T), T)) is None
+
+
+def test_two_rows_are_enough(table):
+    t, theta = np.array([0.0, 1.0]), np.array([0.1, 0.2])
+    assert hints.hint(table("a.csv", theta, t), table("b.csv", -theta, t)).turned
+
+
+def test_a_shift_that_leaves_less_than_half_of_the_time_is_no_hint(table):
+    """The whole motion is left, in a third of the time."""
+    reference = table("a.csv", pulse(T, delay=-1.4, width=0.05), T)
+    late = table("b.csv", pulse(T, delay=2.6, width=0.05), T)
+    assert hints.hint(reference, late) is None
+
+
+def test_the_time_that_is_left_is_counted_from_where_both_begin(table):
+    """Of six seconds from 4 s on a shift of two leaves four."""
+    reference = table("a.csv", pulse(T), T + 4.0)
+    late = table("b.csv", pulse(T, delay=2.0), T + 4.0)
+    assert hints.hint(reference, late).shift == pytest.approx(-2.0, abs=1e-3)
+
+
+def test_what_is_left_is_counted_of_the_reference_s_rotation(table):
+    """A swing of the candidate before the reference begins is cut off by the shift."""
+    before = 0.15 * np.exp(-((T - 0.8) ** 2) / 0.05)
+    reference = table("a.csv", pulse(T), T)
+    late = table("b.csv", pulse(T, delay=2.0) + before, T)
+    assert hints.hint(reference, late).shift == pytest.approx(-2.0, abs=1e-2)
+
+
 def test_compare_gives_the_option(table, tmp_path, typed):
     table("a.csv", pulse(T), T)
     table("b.csv", pulse(T, delay=0.4), T)

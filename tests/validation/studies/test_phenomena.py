@@ -60,6 +60,47 @@ def test_the_event_based_model_shows_each_phenomenon(id):
     assert shown(id) == pytest.approx(PHENOMENA[id].target, abs=4e-3)
 
 
+#: Of each phenomenon that is judged a value as a wrong engine shows it.
+WRONG = {
+    "RC-01": 0.97,
+    "RC-02": 1.03,
+    "RC-03": 3.6,  # a micrometre a second
+    "RC-04": 0.2,
+    "RC-05": 1.0 + 2.0**-14,
+    "RC-06": -0.05,
+    "RC-07": -0.05,
+    "RC-08": 0.05,
+    "RC-09": 1.03,
+    "RC-10": 0.98,
+    "RC-11": 1.02,
+    "RC-12": 0.0,
+    "RC-13": 1.0,
+    "RC-14": 0.03,
+    "RC-15": 0.02,
+    "RC-16": 0.2,
+    "RC-17": 0.02,
+    "RC-19": 1.0,
+    "RC-20": 0.97,
+    "RC-21": 1.0,
+    "RC-22": 1.0,
+    "RC-23": 1.0,
+    "RC-24": 0.9,
+    "RC-25": 0.1,
+    "RC-26": 0.2,
+    "RC-27": 1.03,
+    "RC-28": 1.0,
+}
+
+
+@pytest.mark.parametrize("id", WRONG)
+def test_a_wrong_engine_fails(id):
+    assert PHENOMENA[id].judge(WRONG[id])[0] == "fail"
+
+
+def test_what_has_several_answers_is_not_judged():
+    assert set(PHENOMENA) - set(WRONG) == {"RC-18", "RC-29"}
+
+
 # Verdicts
 
 
@@ -442,7 +483,7 @@ def test_only_the_first_row_is_held_against_the_start():
 
 
 def test_the_last_row_is_held_against_the_end():
-    trial.check_units(SLIDE, motion([0.0, 0.5, 0.95]).history)
+    trial.check_units(SLIDE, motion([0.0, 0.5, 0.95], y=0.5).history)
 
 
 def test_a_history_that_ends_long_before_its_scene_is_in_other_units():
