@@ -66,6 +66,68 @@ def gap_after(i, since):
     return place_y if i in (LEFT, RIGHT) else 0.8 + place_x
 
 
+# How long and slow is long and slow
+
+
+def course(usual=5e-3, short=1.0, tolerance=None, scene=SCENE):
+    """The course of a run whose steps may be as long as 1 s."""
+    return adaptive_march.start(scene, 1.0, usual, short, tolerance)[0]
+
+
+@pytest.mark.parametrize("name", ["closed", "resting", "settling", "fine"])
+def test_what_is_near_slow_and_settled_goes_with_the_usual_step(name):
+    once, twice = (getattr(course(usual), name) for usual in (5e-3, 1e-2))
+    assert twice == pytest.approx(2.0 * once)
+
+
+@pytest.mark.parametrize("name", ["probe", "shortest", "long_approach", "long_slowing"])
+def test_steps_at_events_go_with_their_setting(name):
+    once, twice = (getattr(course(short=short), name) for short in (1.0, 2.0))
+    assert twice == pytest.approx(2.0 * once)
+
+
+@pytest.mark.parametrize("name", ["probe", "shortest", "long_approach"])
+def test_steps_at_events_are_longer_for_a_block_that_rocks_slowly(name):
+    """1/p goes with the root of 1/g."""
+    slow = SCENE.replace(gravity=G / 4.0)
+    once, twice = (getattr(course(scene=scene), name) for scene in (SCENE, slow))
+    assert twice == pytest.approx(2.0 * once)
+
+
+def test_with_a_tolerance_slip_is_close_to_its_end_within_a_part_of_the_usual_step():
+    once, twice = (course(usual, tolerance=1e-8).long_slowing for usual in (5e-3, 1e-2))
+    assert twice == pytest.approx(2.0 * once)
+    assert once < 5e-3
+
+
+def test_what_touches_is_within_a_ten_millionth_of_the_radius():
+    assert course().closed < 1e-7
+
+
+def test_an_impact_takes_less_than_a_ten_millionth_of_the_usual_time():
+    assert course().shortest * SCENE.frequency_parameter < 1e-7
+
+
+def test_no_step_at_an_event_is_longer_than_the_longest():
+    short, _, _ = adaptive_march.start(SCENE, 1e-9, 5e-3, 1.0, None)
+    assert short.probe == 1e-9
+    assert short.shortest == 1e-9
+
+
+def test_without_a_tolerance_errors_do_not_limit_steps():
+    assert course().tolerance == math.inf
+    assert course(tolerance=1e-8).tolerance == pytest.approx(1e-8 * BLOCK.alpha)
+
+
+@pytest.mark.parametrize(("tolerance", "ends"), [(1e-8, True), (None, False)])
+def test_with_a_tolerance_steps_end_at_kinks_of_the_base(tolerance, ends):
+    """Of a record too weak to move the block."""
+    weak = SCENE.replace(excitation=Record.from_samples([0.0, 0.1, 0.3, 0.1], 0.25))
+    stops = course(scene=weak, tolerance=tolerance).stops.tolist()
+    assert (0.25 in stops) == ends
+    assert stops[-1] == math.inf
+
+
 # Contacts
 
 
@@ -614,17 +676,25 @@ def test_a_motion_without_end_is_lost(speed):
     assert stepped(march, (speed, 0.0, 0.0))[0] == kernels.LOST
 
 
-def test_a_step_with_too_large_an_error_is_taken_again_shorter():
-    """The acceleration jumps by 1000 within a step of 4 ms."""
-    march = March(
-        SCENE.replace(initial_height=1.0), known=True, past_dt=0.004, ay=-G, tolerance=1e-9
-    )
-    march.run.states["allowed"] = 0.004
+def jolted(dt, *, probe=1e-4):
+    """The outcome of a step in which the acceleration jumps by 1000, and its march."""
+    flying = {"known": True, "past_dt": dt, "ay": -G, "tolerance": 1e-15}
+    march = March(SCENE.replace(initial_height=1.0), course={"probe": probe}, **flying)
+    march.run.states["allowed"] = dt
     kernels.plan(march.run, march.course)
-    outcome, _ = stepped(march, (4.0, -G * 0.004, 0.0))
+    return stepped(march, (1e3 * dt, -G * dt, 0.0))[0], march
+
+
+def test_a_step_with_too_large_an_error_is_taken_again_shorter():
+    outcome, march = jolted(0.004)
     assert outcome == kernels.AGAIN
     assert march.state.t == pytest.approx(0.2 * 0.004)
     assert march.motion.y == pytest.approx(1.8)
+
+
+def test_a_probe_is_not_taken_again():
+    outcome, _ = jolted(1e-4)
+    assert outcome == kernels.GOES_ON
 
 
 def test_a_step_that_ends_in_an_impact_knows_no_acceleration():

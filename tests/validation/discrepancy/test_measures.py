@@ -164,6 +164,32 @@ def test_hausdorff_scales_time_by_the_scene_s_own_gravity(made):
     assert on_the_moon / on_earth == pytest.approx(math.sqrt(1.62 / 9.81), rel=0.02)
 
 
+def farthest(points, line):
+    """The largest distance of points from a broken line, which is sampled."""
+    along = np.linspace(0.0, len(line) - 1.0, 20001)
+    samples = np.column_stack([np.interp(along, range(len(line)), axis) for axis in line.T])
+    return max(float(np.min(np.linalg.norm(samples - point, axis=1))) for point in points)
+
+
+@pytest.mark.parametrize(
+    ("times", "first", "second"),
+    [
+        ((0.0, 0.1, 0.2, 1.0, 2.0), (0.0, 1.0, 0.0, 0.0, 10.0), (0.0, -0.01, 0.0, 0.0, 10.0)),
+        ((0.0, 1.0, 2.0, 3.0), (0.0, 1.0, 0.0, 0.0), (0.0, 1.0, 2.0, 0.0)),
+        ((0.0, 1.0), (0.0, 0.0), (0.5, 0.0)),
+        ((0.0,), (0.1,), (0.3,)),
+    ],
+    ids=["near the first row", "in a line with a piece", "two rows", "one row"],
+)
+def test_hausdorff_is_the_distance_of_two_broken_lines(made, times, first, second):
+    """Of which the first two have their farthest point where a bound by one piece misleads."""
+    scaled = np.array(times) / PAPER_BLOCK.frequency_parameter
+    found = compare(made(np.array(first), scaled), made(np.array(second), scaled))
+    one, other = (np.column_stack([times, theta]) for theta in (first, second))
+    expected = max(farthest(one, other), farthest(other, one))
+    assert found["theta_hausdorff"] == pytest.approx(expected, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("column", "touched"),
     [
