@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -336,6 +338,53 @@ def test_errors_of_impulses_count_against_the_strongest(made, candidate, error):
     assert found["impulse_error"] == pytest.approx(error, nan_ok=True)
 
 
+def fallen(made, side="left"):
+    """A history that ends in a fall at 2.5 s."""
+    outcome = f"overturned {side}"
+    return made(WAVE[:1000], T[:1000], outcome=outcome, events=[Event(t=2.5, kind=outcome)])
+
+
+def test_a_fall_is_no_impulse(made):
+    figure = compare(fallen(made), fallen(made), measures=["impulse_error"]).figure("impulse_error")
+    assert figure.value == 0.0
+    assert figure.note == "no impact of one contact alone has a counterpart"
+
+
+def test_the_largest_error_of_a_time_counts(made):
+    first, second = (
+        made(WAVE, T, events=[impact(1.0), impact(2.0 + late), impact(3.0)])
+        for late in (0.0, 0.008)
+    )
+    figure = compare(first, second).figure("impact_time")
+    assert figure.value == pytest.approx(0.008)
+    assert figure.note == "floor impact at 2.000 s"
+
+
+def test_one_that_falls_and_one_that_stands_do_not_agree(made):
+    stands = made(WAVE, T)
+    assert compare(fallen(made), stands)["outcome_agrees"] == 0.0
+    assert compare(stands, fallen(made))["outcome_agrees"] == 0.0
+
+
+@pytest.mark.parametrize("name", ["outcome_agrees", "unmatched_impacts"])
+def test_what_is_counted_has_no_resolution(name):
+    assert measures.DIFFERENCES[name].resolution == 0.0
+
+
+@pytest.mark.parametrize(("apart", "matched"), [(0.02, 1), (0.02 + 5e-8, 0)])
+def test_impacts_match_within_twenty_milliseconds(apart, matched):
+    pairs, _, _ = match_impacts([impact(1.0)], [impact(1.0 + apart)])
+    assert len(pairs) == matched
+
+
+@pytest.mark.parametrize("impulse", [0.005, 0.0])
+def test_an_impact_is_weak_beside_others_alone(impulse):
+    """Not where all are as small, or no impulse is known."""
+    _, only_reference, only_candidate = match_impacts([impact(1.0, impulse)], [])
+    assert len(only_reference) == 1
+    assert only_candidate == []
+
+
 @pytest.mark.parametrize(("apart", "error"), [(0.001, 0.0), (0.003, 0.5)])
 def test_an_impulse_that_floor_and_wall_share_is_not_compared(made, apart, error):
     reference = [impact(1.0, 2.0), impact(2.0, 1.0)]
@@ -484,6 +533,62 @@ def test_iso_18571_rates_on_one_bounded_grid(made):
     assert 0.3 < worse.value < 0.9
     assert flat.value is None
     assert "constant" in flat.note
+
+
+@pytest.fixture
+def rated(made, monkeypatch):
+    """The ISO rating of two rotations at times, by a library made up, and what it is given."""
+    given = []
+
+    class Rating:
+        def __init__(self, *curves, dt):
+            given.append((*curves, dt))
+
+        def overall_rating(self, ndigits):
+            return 0.123456 if ndigits < 0 else round(0.123456, ndigits)
+
+    module = SimpleNamespace(ISO18571=Rating)
+    monkeypatch.setitem(sys.modules, "objective_rating_metrics", SimpleNamespace(rating=module))
+    monkeypatch.setitem(sys.modules, "objective_rating_metrics.rating", module)
+
+    def rate(first, second, t):
+        histories = made(first, t), made(second, t)
+        return compare(*histories, measures=["iso_18571"]).figure("iso_18571"), given
+
+    return rate
+
+
+def test_an_iso_rating_is_not_rounded(rated):
+    figure, _ = rated(WAVE[:40], 0.5 * WAVE[:40], T[:40])
+    assert figure.value == 0.123456
+
+
+def test_an_iso_rating_is_of_one_uniform_grid(rated):
+    t = 1.0 + np.concatenate([0.01 * np.arange(20), 0.2 + 0.1 * np.arange(20)])
+    _, ((reference, candidate, dt),) = rated(t, 2.0 * t, t)
+    expected = np.linspace(1.0, 3.1, 40)
+    assert reference[:, 0] == pytest.approx(expected)
+    assert reference[:, 1] == pytest.approx(expected)
+    assert candidate[:, 1] == pytest.approx(2.0 * expected)
+    assert dt == pytest.approx(2.1 / 39.0)
+
+
+def test_an_iso_rating_is_of_four_thousand_samples_at_most(rated):
+    _, ((reference, _, _),) = rated(WAVE, 0.5 * WAVE, T)
+    assert len(reference) == 4000
+
+
+@pytest.mark.parametrize(("rows", "has"), [(19, False), (20, True)])
+def test_a_short_curve_has_no_iso_rating(rated, rows, has):
+    figure, _ = rated(WAVE[:rows], 0.5 * WAVE[:rows], T[:rows])
+    assert (figure.value is not None) == has
+
+
+@pytest.mark.parametrize("shares", [(0.0, 1.0), (1.0, 0.0), (1.0, math.nan)])
+def test_a_curve_that_is_constant_or_none_has_no_iso_rating(rated, shares):
+    figure, given = rated(*(share * WAVE[:40] for share in shares), T[:40])
+    assert figure.value is None
+    assert given == []
 
 
 FORMS = {
