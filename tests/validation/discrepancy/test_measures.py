@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rockcheck import Event, EventBasedModel, Floor, compare, load_scene
+from rockcheck import Event, EventBasedModel, Floor, Wall, compare, load_scene
 from rockcheck.scenes import PAPER_BLOCK
 from rockcheck.validation.discrepancy import measures
 from rockcheck.validation.discrepancy.compare import describe
@@ -366,9 +366,11 @@ def test_one_that_falls_and_one_that_stands_do_not_agree(made):
     assert compare(stands, fallen(made))["outcome_agrees"] == 0.0
 
 
-@pytest.mark.parametrize("name", ["outcome_agrees", "unmatched_impacts"])
+@pytest.mark.parametrize(
+    "name", ["outcome_agrees", "unmatched_impacts", "floor_impacts", "wall_impacts"]
+)
 def test_what_is_counted_has_no_resolution(name):
-    assert measures.DIFFERENCES[name].resolution == 0.0
+    assert (measures.DIFFERENCES | measures.FIGURES)[name].resolution == 0.0
 
 
 @pytest.mark.parametrize(("apart", "matched"), [(0.02, 1), (0.02 + 5e-8, 0)])
@@ -425,6 +427,25 @@ def test_figures_of_one_history(made):
     assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-12)
     for name, rise in (("highest_hop", 0.004), ("deepest_penetration", -0.002)):
         assert figures(made(theta, T, y=y + rise, **unknown))[name] == pytest.approx(abs(rise))
+
+
+@pytest.mark.parametrize(("until", "fell"), [(2.4, False), (2.5, True), (None, True)])
+def test_the_peak_of_a_block_that_has_fallen_is_none(made, until, fell):
+    found = {figure.measure: figure for figure in describe(fallen(made), until=until)}
+    assert ("overturned at 2.5 s" in found["peak_rotation"].note) == fell
+
+
+def test_the_last_slip_of_a_window_is_that_at_its_end(made):
+    history = made(WAVE, T, slip=0.01 * T)
+    assert figures(history, until=5.0)["last_slip"] == pytest.approx(0.05)
+    assert figures(history)["last_slip"] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("side", "sign"), [("left", -1.0), ("right", 1.0)])
+def test_a_corner_behind_a_wall_has_penetrated_it(made, side, sign):
+    scene = load_scene("fig5a").replace(walls=[Wall(side=side, gap=0.02)])
+    beyond = made(0.0 * T, T, x=sign * np.minimum(0.01 * T, 0.023))
+    assert figures(beyond, scene=scene)["deepest_penetration"] == pytest.approx(0.003)
 
 
 def turning(step, peak=0.5):
@@ -638,3 +659,14 @@ def test_a_wrong_history_is_seen():
         suites.load_suite("engines").scenes["rocking"], ["quarter_period_error"], gravity=9.8
     )
     assert figure.value == pytest.approx(0.5 * 0.01 / 9.81 * 0.733, rel=0.01)
+
+
+def test_a_block_that_a_wall_has_slowed_stops_sooner():
+    """Its last row comes just after it has stopped, the one before it earlier."""
+    scene = suites.load_suite("engines").scenes["rebound"]
+    (wall,), slowing = scene.walls, scene.floor.friction * scene.gravity
+    at_wall = math.sqrt(scene.initial_velocity**2 - 2.0 * slowing * wall.gap)
+    lost = (1.0 - wall.restitution) * at_wall
+    duration = 1.02 * (abs(scene.initial_velocity) - lost) / slowing
+    (figure,) = described(scene, FORMS["rebound"], duration=duration, output_step=0.1 * duration)
+    assert figure.value == pytest.approx(0.0, abs=5e-7)
