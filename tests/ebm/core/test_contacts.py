@@ -31,6 +31,14 @@ def test_a_block_that_lands_flush_with_a_wall_touches_it_exactly(off, side, plac
     assert motion.x == place
 
 
+@pytest.mark.parametrize(("on_floor", "height"), [(True, math.cos(0.4)), (False, 1.5)])
+def test_a_block_that_turns_upright_on_the_floor_stands_on_it(on_floor, height):
+    motion = run_at((0.0, 1.5, 1e-7, 0.0, 0.0, 0.0)).state.motion
+    contacts.land_upright(setting_of(0.4), motion, 1, on_floor)
+    assert motion.theta == 0.0
+    assert motion.y == height
+
+
 @pytest.mark.parametrize(("sense", "near", "away"), [(1, 0.8, 0.6), (-1, 0.6, 0.8)])
 def test_a_turn_moves_each_corner_across_its_arm(sense, near, away):
     """A corner at (x, y) from the mass's centre moves with (-y, x) times the rate. `near` is the

@@ -11,7 +11,7 @@ from rockcheck.ebm.core import coulomb
 from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import Ending, Event, Guard, HistoryMode, Pivot
 from rockcheck.ebm.core.state import Base, mode_code, rock_on
-from rockcheck.scenes import Record
+from rockcheck.scenes import Record, Rest
 
 ALPHA = 0.3
 SLIDES = FLAT | {"pivot": Pivot.SLIPPING, "slip": 1}
@@ -60,8 +60,23 @@ def test_an_impact_is_told_as_one_and_leaves_the_slide():
 
 
 def test_a_block_settles_where_an_impact_leaves_it_at_rest():
-    run = follow(run_after(Guard.PHI, Event.FLOOR_IMPACT, **ROCKS, sense=1))
+    """Without an impulse of its own."""
+    run = run_after(Guard.PHI, Event.FLOOR_IMPACT, **ROCKS, sense=1)
+    run.state.impulse = 0.3
+    follow(run)
     assert told(run) == [Event.FLOOR_IMPACT, Event.SETTLED]
+    assert run.records.log[:2, 4].tolist() == [0.3, 0.0]
+
+
+@pytest.mark.parametrize(("mu", "guard"), [(0.1, Guard.CONE_PLUS), (0.9, Guard.NONE)])
+def test_a_rocking_block_is_held_by_its_friction_alone(mu, guard):
+    """Released from 0.1 rad it asks for friction of about 0.2."""
+    block, still = setting_of(ALPHA, mu, pivot="bilateral"), ground_of(Rest(), 1.0, 1.0)
+    run = run_at((0.0, math.cos(0.2), 0.1, 0.0, 0.0, 0.0), **ROCKS, sense=1)
+    run.state.tolerance_rad = run.state.last_term_rad = 1e-10
+    coulomb.expand(block, Base(still, still), run, 0.1)
+    coulomb.locate(block, run)
+    assert run.state.guard == guard
 
 
 @pytest.mark.parametrize("push", [0.0, 0.3, -0.3])

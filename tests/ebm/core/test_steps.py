@@ -10,7 +10,7 @@ from stepping import FLAT, RESTS, ROCKS, run_at, setting_of
 
 from rockcheck.ebm.core import coulomb, motion, series, steps
 from rockcheck.ebm.core.ground import acceleration, ground_of
-from rockcheck.ebm.core.names import Ending, Event, Guard, HistoryMode, Kind, Pivot
+from rockcheck.ebm.core.names import Ending, Event, Guard, HistoryMode, Kind, Pivot, Row
 from rockcheck.ebm.core.state import Base, Records
 from rockcheck.scenes import Block, Record, Rest, Ricker, Sine
 
@@ -65,6 +65,16 @@ def test_a_block_rocks_as_its_moments_turn_it(upward):
     exact = solve_ivp(turns, (0.0, length), [tilt, rate], "DOP853", rtol=1e-12, atol=1e-13)
     assert 0.05 < length < 5.0
     np.testing.assert_allclose([end.theta, end.w], exact.y[:, -1], rtol=0.0, atol=1e-9)
+
+
+def test_forces_follow_a_base_that_shakes_fast_up_and_down():
+    """A step of a rocking block ends before they err by the tolerance."""
+    upward = ground_of(Sine(amplitude=0.4, period=0.03), 1.0, 1.0)
+    run = begun((0.0, math.cos(ALPHA - 0.1), 0.1, 0.0, 0.0, 0.0), ROCKS | {"sense": 1})
+    coulomb.expand(setting_of(ALPHA), Base(STILL, upward), run, 50.0)
+    end = run.state.length
+    gravity = series.value(run.a, Row.G, run.state.order, end)
+    assert gravity == pytest.approx(1.0 + acceleration(upward, end), abs=TOLERANCE)
 
 
 def rises():
@@ -153,6 +163,18 @@ def test_a_hanging_block_grazes_the_floor_with_less_energy_than_its_swing_errs_b
     assert steps._grazes(block, base, run) == grazes
 
 
+def test_a_block_that_grazes_the_floor_is_put_where_it_rises_as_fast():
+    """Pulled back by 3/4 sin(0.3) g it takes 2 w over that."""
+    block, base, rate = setting_of(ALPHA, pivot="bilateral"), Base(STILL, constant(-2.0)), -1e-4
+    start = (0.0, math.cos(ALPHA), 0.0, -math.cos(ALPHA) * rate, math.sin(ALPHA) * rate, rate)
+    run = begun(start, ROCKS | {"sense": 1, "pull": -1})
+    coulomb.expand(block, base, run, 1.0)
+    run.state.tolerance_rad, run.state.swing = 1e-6, 0.1
+    assert steps._grazes(block, base, run)
+    assert run.state.t == pytest.approx(2e-4 / (0.75 * math.sin(ALPHA)), rel=1e-3)
+    assert run.state.motion.w == pytest.approx(-rate, rel=1e-3)
+
+
 @pytest.mark.parametrize(("events", "ending"), [(98, Ending.GOING), (99, Ending.TOO_MANY_EVENTS)])
 def test_a_run_ends_at_the_last_event_that_it_may_have(events, ending):
     run = rises()
@@ -191,3 +213,24 @@ def test_a_row_has_place_and_rates_and_the_mode():
     steps.sample_rest(run._replace(records=rows), 0.0)
     assert rows.out.tolist() == [[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], [0.0] * 6]
     assert rows.out_mode.tolist() == [HistoryMode.ROCK, 0]
+
+
+@pytest.mark.parametrize(
+    ("tau", "guard", "count", "whole"),
+    [
+        (0.5, Guard.NONE, 6, True),
+        (0.3, Guard.NONE, 6, False),
+        (0.2, Guard.PHI, 5, False),
+        (0.5, Guard.PHI, 6, False),
+    ],
+)
+def test_a_step_writes_the_rows_before_its_end(tau, guard, count, whole):
+    """From 1 on, a row each 0.25, of a base that is smooth until 1.5."""
+    run = run_at((0.0, math.cos(ALPHA), 0.0, 0.0, 0.0, 0.0), t=1.0, **RESTS)
+    rows = Records(np.zeros((9, 6)), np.zeros(9, dtype=np.int8), *run.records[2:])
+    state = run.state
+    state.rows, state.control.output_step, state.smooth_until = 4, 0.25, 1.5
+    state.tau, state.guard = tau, guard
+    steps.sample(setting_of(ALPHA), run._replace(records=rows))
+    assert state.rows == count
+    assert state.whole == whole
