@@ -25,7 +25,7 @@ from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, ground, guards, modes, motion, series, steps
 from rockcheck.ebm.core.names import Guard, Pivot, Row, Rule
 from rockcheck.ebm.core.state import Base
-from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Wall
+from rockcheck.scenes import PAPER_BLOCK, Floor, Record, Rest, Ricker, Scene, Sine, Wall
 
 
 @pytest.mark.parametrize("pivot", PIVOTS)
@@ -199,6 +199,16 @@ def test_series_obey_bouc_wens_law_in_every_term(tilted, z, loads):
         assert np.abs(terms).max() < 1e-13 * max(1.0, np.abs(one.coef).max())
 
 
+def test_at_its_balance_point_the_floor_s_push_follows_the_base():
+    """Nothing moves, and the series of the motion has no terms: that of the push has."""
+    upward = ground.ground_of(Sine(amplitude=0.4, period=0.9), 1.0, 1.0)
+    base = Base(ground.ground_of(Rest(), 1.0, 1.0), upward)
+    run = run_at((0.0, 1.0, 0.3, 0.0, 0.0, 0.0), t=0.2, **ROCKS, sense=1)
+    order = motion.mode_series(setting_of(0.3), base, run, series.ORDER, 1e-12, 0.1)
+    push = series.value(run.a, Row.P, order - 2, 0.1)
+    assert push == pytest.approx(1.0 + ground.acceleration(upward, 0.3), abs=1e-11)
+
+
 def test_a_flying_block_falls_as_g_and_the_base_s_motion_say():
     upward = ground.ground_of(Ricker(amplitude=0.3, period=1.1), 1.0, 1.0)
     base = Base(ground.ground_of(Rest(), 1.0, 1.0), upward)
@@ -366,11 +376,13 @@ def test_series_keep_the_corner_on_its_wall(case, friction):
         start = [0.0, -pivot[1], theta, w * corner[1], -w * pivot[0], w]
         run = run_at(start, t=1.0, **TILTED, pivot=Pivot.SLIPPING, **along)
         run.state.winds, run.state.zeta = friction == "bouc-wen", 0.3
-        motion.mode_series(b, natural.base_of(scene), run, order, 0.0, 0.0)
+        run.state.order = motion.mode_series(b, natural.base_of(scene), run, order, 0.0, 0.0)
         x, y, s, c = (run.a[row, : order - 1] for row in (Row.XI, Row.Y, Row.SIN, Row.COS))
         assert y == pytest.approx(c, rel=1e-10, abs=1e-10)
         sine, cosine = (side.tip_sin, side.tip_cos) if case > 0 else (side.far_sin, side.far_cos)
         assert x[1:] == pytest.approx(case * (sine * c - cosine * s)[1:], rel=1e-10, abs=1e-10)
+        motion.motion_at(b, run.state, run.a, 0.0, run.state.sampled)
+        assert run.state.sampled.w == pytest.approx(w, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -389,6 +401,44 @@ def test_a_force_that_vanishes_late_in_a_step_is_looked_for_in_a_shorter_one(len
     guards.first_event(run)
     assert run.state.guard == guard
     assert run.state.tau == pytest.approx(tau, abs=1e-9)
+
+
+@pytest.mark.parametrize(("z", "watched"), [(-0.1, True), (0.0, False), (0.1, False)])
+@pytest.mark.parametrize("slip", [1, -1])
+def test_a_winding_pivot_that_unloads_is_watched_until_it_loads(slip, z, watched):
+    run = run_at(**TILTED, sense=1, pivot=Pivot.SLIPPING, slip=slip)
+    run.state.winds, run.a[Row.Z, 0] = True, slip * z
+    guards.fill_guards(setting_of(0.3, friction="bouc-wen", pivot="bilateral"), run.state, run.a)
+    assert bool(run.a[Row.THERE, Guard.LOADS]) == watched
+
+
+@pytest.mark.parametrize(
+    ("which", "slack", "gap", "rate", "lift"),
+    [
+        (Guard.LANDING, 2.0, 0.0, 0.0, contacts.CLOSED),
+        (Guard.LANDING, 1.0, 0.0, 0.0, 0.0),
+        (Guard.LANDING, 2.0, 2e-10, 0.0, 0.0),
+        (Guard.LANDING, 2.0, 0.0, -2e-9, 0.0),
+        (Guard.PHI, 2.0, 0.0, 0.0, 0.0),
+    ],
+)
+def test_a_gap_may_close_by_the_noise_in_a_mode_that_goes_on(which, slack, gap, rate, lift):
+    """Where it touches without speed."""
+    a = run_at().a
+    a[Row.GUARD, :2] = gap, rate
+    guards._with_slack(which, slack, a)
+    assert a[Row.GUARD, 0] == gap + lift
+
+
+@pytest.mark.parametrize(("tip", "far"), [(1, 0), (0, 1)])
+def test_a_corner_on_a_wall_has_a_push_and_no_gap(tip, far):
+    mode = TILTED | {"sense": 1, "pivot": Pivot.SLIPPING, "slip": 1, "tip": tip, "far": far}
+    run = run_at((0.0, 0.9, 0.1, 0.0, 0.0, 0.0), **mode)
+    guards.fill_guards(setting_of(0.3, walls=WALLS), run.state, run.a)
+    there = [bool(run.a[Row.THERE, which]) for which in (Guard.TIP_GAP, Guard.FAR_GAP)]
+    pushes = [bool(run.a[Row.THERE, which]) for which in (Guard.TIP_PUSH, Guard.FAR_PUSH)]
+    assert there == [not tip, not far]
+    assert pushes == [bool(tip), bool(far)]
 
 
 @pytest.mark.parametrize(

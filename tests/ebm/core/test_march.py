@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from stepping import ROCKS, play, run_at, setting_of
 
@@ -9,7 +10,7 @@ from rockcheck.ebm import EventBasedModel
 from rockcheck.ebm.core import march, series
 from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import Ending, Event, Guard, Row
-from rockcheck.ebm.core.state import Base, workspace
+from rockcheck.ebm.core.state import Base, Records, workspace
 from rockcheck.scenes import PAPER_BLOCK, Floor, Rest, Scene
 
 ALPHA = 0.3
@@ -47,6 +48,34 @@ def test_the_tolerance_is_of_alpha():
     march.begin(setting_of(ALPHA), Base(STILL, STILL), run)
     assert run.state.tolerance_rad == pytest.approx(0.3e-8, rel=1e-14)
     assert run.state.peak == 0.1
+
+
+def test_what_a_series_leaves_out_is_half_of_the_tolerance():
+    """Its terms fall like the powers of a ratio, from 1 to the tolerance."""
+    run = run_at((0.0, HEIGHT, 0.1, 0.0, 0.0, 0.0))
+    run.state.control.tolerance = 1e-8
+    march.begin(setting_of(ALPHA), Base(STILL, STILL), run)
+    ratio = 1e-8 ** (1.0 / series.ORDER)
+    left_out = run.state.last_term_rad * ratio / (1.0 - ratio)
+    assert left_out == pytest.approx(0.15e-8, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("theta", "ending", "decides", "rows", "ends"),
+    [
+        (0.1, Ending.DONE, False, 3, Ending.DONE),
+        (0.1, Ending.DONE, True, 0, Ending.DONE),
+        (0.1, Ending.OVERTURNED, False, 0, Ending.OVERTURNED),
+        (math.nan, Ending.DONE, False, 0, Ending.NOT_FINITE),
+    ],
+)
+def test_a_run_whose_time_is_up_has_all_its_rows(theta, ending, decides, rows, ends):
+    run = run_at((0.0, HEIGHT, theta, 0.0, 0.0, 0.0), **ROCKS, sense=1)
+    written = Records(np.zeros((3, 6)), np.zeros(3, dtype=np.int8), *run.records[2:])
+    run.state.ending, run.state.control.until_decided = ending, decides
+    march.end(setting_of(ALPHA), run._replace(records=written))
+    assert run.state.rows == rows
+    assert run.state.ending == ends
 
 
 @pytest.mark.parametrize(("rate", "tried"), [(-0.3, 0), (0.0, 1)])

@@ -170,6 +170,23 @@ def test_a_force_that_only_touches_zero_ends_no_mode(dip):
     assert first([polyval(tau, touch), touch[1] + 2.0 * tau, 1.0], 0.5) == (0.5, Guard.NONE)
 
 
+@pytest.mark.parametrize(
+    ("later", "which"),
+    [(-2e-9, Guard.FLOOR_PUSH), (-5e-10, Guard.PHI), (5e-10, Guard.PHI), (2e-9, Guard.PHI)],
+)
+def test_of_a_contact_and_a_force_at_one_instant_the_contact_is_the_event(later, which):
+    """A force ends the mode where it vanishes by more than an instant, 1e-9, before."""
+    run = run_at()
+    for guard in range(len(guards.KIND)):
+        guards.drop(run.a, guard)
+    guards._enter(run.a, Guard.PHI, 0.0, 1.0)
+    guards._enter(run.a, Guard.FLOOR_PUSH, 0.0, 1.0)
+    run.a[Row.PHI, :2], run.a[Row.P, :2] = (0.1, -1.0), (0.1 + later, -1.0)
+    run.state.order, run.state.length = 4, 1.0
+    guards.first_event(run)
+    assert run.state.guard == which
+
+
 @pytest.mark.parametrize("noise", NOISES)
 def test_noise_is_no_sign(noise):
     for terms, sign in (

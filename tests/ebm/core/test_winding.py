@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from stepping import RESTS, TILTED, run_at, setting_of
+from stepping import FLAT, RESTS, TILTED, run_at, setting_of
 
 from rockcheck.ebm.core import bouc_wen, motion
 from rockcheck.ebm.core.ground import acceleration, ground_of
@@ -17,7 +17,8 @@ from rockcheck.scenes import Record, Rest, Sine
 ALPHA, MU, YIELDS = 0.3, 0.5, 0.1
 SLIPS = {"pivot": Pivot.SLIPPING, "slip": 1}
 STILL = ground_of(Rest(), 1.0, 1.0)
-BLOCK = setting_of(ALPHA, MU, pivot="bilateral", friction="bouc-wen", yield_displacement=YIELDS)
+LAW = {"pivot": "bilateral", "friction": "bouc-wen", "yield_displacement": YIELDS}
+BLOCK = setting_of(ALPHA, MU, **LAW)
 
 
 def winding(z, slide=0.0, rate=0.0, **mode):
@@ -30,11 +31,11 @@ def winding(z, slide=0.0, rate=0.0, **mode):
     return run
 
 
-def after(run, guard, event=Event.UNTOLD, push=0.0):
+def after(run, guard, event=Event.UNTOLD, push=0.0, mu=MU):
     """The run after an event that this guard has found, on a base that accelerates so."""
     run.state.guard, run.state.event = guard, event
     along = ground_of(Record.from_samples([push] * 3, time_step=1.0), 1.0, 1.0)
-    bouc_wen.after_event(BLOCK, Base(along, STILL), run)
+    bouc_wen.after_event(setting_of(ALPHA, mu, **LAW), Base(along, STILL), run)
     return run
 
 
@@ -43,7 +44,8 @@ def told(run):
     return run.records.log[: run.state.events, 1].tolist()
 
 
-def test_a_step_of_a_pivot_that_loads_is_that_of_an_integration():
+@pytest.mark.parametrize("reach", [0.03, 1.0])
+def test_a_step_of_a_pivot_that_loads_is_that_of_an_integration(reach):
     """Newton and Euler with Q = -mu z P, and u_y z' = V (1 - z^2)."""
     shakes = ground_of(Sine(amplitude=0.2, period=2.0), 1.0, 1.0)
     tilt, rate, slide, z = 0.1, 0.2, 0.3, 0.2
@@ -52,7 +54,7 @@ def test_a_step_of_a_pivot_that_loads_is_that_of_an_integration():
     state = run.state
     state.motion = (0.0, c, tilt, slide - c * rate, s * rate, rate)
     state.tolerance_rad = state.last_term_rad = 1e-12
-    bouc_wen.expand(BLOCK, Base(shakes, STILL), run, 0.03)
+    bouc_wen.expand(BLOCK, Base(shakes, STILL), run, reach)
     state.tau = state.length
     motion.motion_at(BLOCK, state, run.a, state.tau, state.motion)
     bouc_wen.advance(run)
@@ -76,6 +78,17 @@ def test_a_step_of_a_pivot_that_loads_is_that_of_an_integration():
     end = [state.motion.vx, state.motion.theta, state.motion.w, state.zeta]
     assert state.tau > 0.02
     assert end == pytest.approx(exact.y[:, -1], abs=1e-10)
+
+
+@pytest.mark.parametrize(("left", "winds"), [(9e-9, False), (1.1e-8, True)])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_pivot_has_yielded_within_ten_tolerances_of_its_limit(sense, left, winds):
+    run = winding(0.0, **TILTED, **SLIPS, sense=sense)
+    run.state.tolerance_rad, run.state.order = 1e-9, 2
+    run.a[Row.Z, :2] = 1.0 - left, 0.0
+    bouc_wen.advance(run)
+    assert run.state.winds == winds
+    assert told(run) == ([] if winds else [Event.SLIPS])
 
 
 @pytest.mark.parametrize(("pivot", "winds"), [(Pivot.SLIPPING, False), (Pivot.STICK, True)])
@@ -112,6 +125,14 @@ def test_an_impact_leaves_a_pivot_as_far_wound():
     assert run.state.winds
 
 
+def test_an_impact_that_leaves_a_block_sliding_leaves_it_as_far_wound():
+    run = winding(0.3, 0.05, **TILTED, **SLIPS, sense=1)
+    after(run, Guard.PHI, Event.FLOOR_IMPACT, mu=0.1)
+    assert mode_code(run.state) == HistoryMode.SLIDE
+    assert run.state.zeta == 0.3
+    assert run.state.winds
+
+
 def test_as_a_block_uplifts_friction_begins_as_coulombs():
     """The base pushes with 0.4: theta'' = 3/4 (0.4 c - s), and z is -Q/(mu P)."""
     run = after(winding(math.nan, **RESTS), Guard.UPLIFT_PLUS, push=0.4)
@@ -119,6 +140,26 @@ def test_as_a_block_uplifts_friction_begins_as_coulombs():
     turns = 0.75 * (0.4 * c - s)
     share = (0.4 - c * turns) / (MU * (1.0 + s * turns))
     assert run.state.ending == Ending.GOING
+    assert run.state.mode.pivot == Pivot.SLIPPING
     assert mode_code(run.state) == HistoryMode.ROCK
     assert run.state.zeta == pytest.approx(-share, rel=1e-12)
     assert told(run) == [Event.UPLIFT]
+
+
+@pytest.mark.parametrize(
+    ("push", "guard", "shown", "z", "winds"),
+    [
+        (0.0, Guard.SLIP, HistoryMode.REST, 0.0, True),
+        # It slides back, and unwinds.
+        (0.2, Guard.SLIP, HistoryMode.SLIDE, 0.7, True),
+        # As with Coulomb's friction, it slides at once.
+        (0.2, Guard.CONE_PLUS, HistoryMode.SLIDE, -1.0, False),
+    ],
+)
+def test_friction_of_a_flat_block_goes_on_only_where_it_slides_back(push, guard, shown, z, winds):
+    """With a friction of 0.1."""
+    mode = FLAT | SLIPS if guard == Guard.SLIP else RESTS
+    run = after(winding(0.7, **mode), guard, push=push, mu=0.1)
+    assert mode_code(run.state) == shown
+    assert run.state.zeta == pytest.approx(z, abs=1e-12)
+    assert run.state.winds == winds
