@@ -10,9 +10,10 @@ import pytest
 
 from rockcheck import Event, EventBasedModel, Floor, Wall, compare, load_scene
 from rockcheck.scenes import PAPER_BLOCK
+from rockcheck.scenes.extremes import NO_STRIKE, WallExtremes
 from rockcheck.validation.discrepancy import measures
-from rockcheck.validation.discrepancy.compare import describe
-from rockcheck.validation.discrepancy.figures import Pair
+from rockcheck.validation.discrepancy.compare import describe, motion_of, wall_speeds
+from rockcheck.validation.discrepancy.figures import Pair, between_rows
 from rockcheck.validation.discrepancy.impacts import match_impacts
 from rockcheck.validation.suite import suites
 
@@ -267,6 +268,83 @@ def test_both_fell_the_same_way_is_whole(made):
     found = compare(first, dataclasses.replace(second, outcome="overturned right"))
     assert found.gap
     assert found["outcome_agrees"] == 0.0
+
+
+@pytest.mark.parametrize(("share", "alike"), [(0.5e-6, True), (1e-5, False)])
+def test_blocks_are_compared_that_differ_by_digits_of_a_file(made, fault_of, share, alike):
+    history = made(WAVE, T)
+    wider = PAPER_BLOCK.replace(half_width=(1.0 + share) * PAPER_BLOCK.half_width)
+    other = dataclasses.replace(history, block=wider)
+    if alike:
+        assert compare(history, other)["theta_rms"] == 0.0
+    else:
+        assert "block" in str(fault_of(compare, history, other))
+
+
+def test_histories_that_begin_alike_have_no_gap(made):
+    late = made(0.0 * SECONDS, 5.0 + SECONDS)
+    assert compare(late, late).gap == ""
+
+
+@pytest.mark.parametrize(("impulse", "impacts"), [(1.0, 1), (0.0, 0)])
+def test_a_landing_with_an_impulse_is_a_floor_impact(made, impulse, impacts):
+    history = made(WAVE, T, events=[impact(1.0, impulse, "landing")])
+    assert figures(history)["floor_impacts"] == impacts
+
+
+@pytest.mark.parametrize(
+    ("unit", "distance"), [("angle", 5e-5), ("m", 1.25e-4), ("s", 0.01), ("1", 0.0)]
+)
+def test_what_lies_between_two_rows_is_not_told_from_zero(unit, distance):
+    """At p = 2/s and g = 10 m/s^2, a hundredth of a second apart."""
+    assert between_rows(unit, 2.0, 10.0, 0.01) == pytest.approx(distance)
+
+
+@pytest.mark.parametrize(("peak", "rocks"), [(0.9e-4, False), (1.1e-4, True)])
+def test_a_reference_that_turns_by_a_tenth_of_a_milliradian_rocks(made, peak, rocks):
+    small = made(peak / PAPER_BLOCK.alpha * np.sin(T), T)
+    assert (compare(small, made(WAVE, T))["peak_ratio"] > 0.0) == rocks
+
+
+def test_a_candidate_that_does_not_rotate_has_no_phase(made):
+    figure = compare(made(WAVE, T), made(0.0 * T, T)).figure("sprague_geers_p")
+    assert figure.value is None
+    assert "only one of the two rotates" in figure.note
+
+
+# How far a block moves
+
+
+def struck(speed, strikes=1):
+    return WallExtremes(strikes=strikes, first_s=1.0, speed=speed, impulse=1.0)
+
+
+def with_walls(history, **walls):
+    kept = dataclasses.replace(history.extremes, walls=walls, source="model")
+    return dataclasses.replace(history, model_extremes=kept)
+
+
+def test_the_figures_of_a_block_that_stands(made):
+    history = with_walls(made(WAVE, T), left=struck(0.5), right=struck(0.9, strikes=0))
+    motion = motion_of(history)
+    assert motion["peak_rotation"] == pytest.approx(0.3, rel=1e-6)
+    assert motion["wall_speed"] == 0.5
+
+
+def test_the_peak_of_a_block_that_is_not_known_is_not_known(made):
+    assert motion_of(dataclasses.replace(made(WAVE, T), block=None))["peak_rotation"] is None
+
+
+def test_of_a_block_that_falls_the_speed_at_a_wall_alone_is_known(made):
+    motion = motion_of(with_walls(fallen(made), left=struck(0.5)))
+    assert motion.pop("wall_speed") == 0.5
+    assert set(motion.values()) == {None}
+
+
+def test_only_walls_that_are_struck_have_a_speed(made):
+    history = with_walls(made(WAVE, T), left=struck(0.5), right=NO_STRIKE)
+    scene = load_scene("fig5a")
+    assert list(wall_speeds(history, scene)) == [(0.5, "left")]
 
 
 def test_falls_without_events_are_timed_by_their_rotation(made):
