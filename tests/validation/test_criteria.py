@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -205,3 +206,27 @@ def test_the_critical_double_impulse_is_the_step_over_one_and_the_ratio():
         assert criteria.critical_double_impulse(block, G) == pytest.approx(
             criteria.overturning_velocity(block, G) / (1.0 + ratio), rel=1e-14
         )
+
+
+def step_at(frequency):
+    """A base whose spectrum is large from a frequency on, and zero below it."""
+    return SimpleNamespace(vertical=0.0, spectral=lambda f, _: 1e6 if f >= frequency else 0.0)
+
+
+@pytest.mark.parametrize("frequency", [0.0512, 0.5, 7.3])
+def test_the_sliding_estimate_is_of_the_lowest_frequency_that_reaches_its_capacity(frequency):
+    capacity = 2.0 * SCENE.floor.friction * SCENE.gravity
+    slip = capacity / (2.0 * math.pi * frequency) ** 2
+    assert criteria.reserve_sliding(SCENE, step_at(frequency)) == pytest.approx(slip, rel=1e-3)
+
+
+@pytest.mark.parametrize(("share", "falls"), [(1.001, False), (0.999, True)])
+def test_the_rocking_estimate_ends_at_the_balance_point(share, falls):
+    """The demand ceases at a frequency just above, or just below that of alpha."""
+    block, g = SCENE.block, SCENE.gravity
+    slope = block.half_width / block.half_height
+    inertia = 4.0 / 3.0 * (1.0 + slope**2)
+    work = 1.0 / math.cos(block.alpha) - 1.0
+    rate = math.sqrt(2.0 * g * work / (inertia * block.half_height)) / block.alpha
+    found = criteria.reserve_rocking(SCENE, step_at(share * rate / (2.0 * math.pi)))
+    assert found == (math.inf if falls else pytest.approx(block.alpha))
