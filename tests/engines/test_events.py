@@ -119,6 +119,20 @@ def test_a_block_that_was_flat_for_a_moment_only_has_no_uplift():
     assert len(of_kind(told(theta=theta, standing=True), "uplift")) == 2
 
 
+def test_the_impulse_of_a_rocking_impact_is_housners():
+    """At 1 rad/s: it leaves the left corner and turns on about the right one."""
+    ratio = 1.0 - 1.5 * math.sin(BLOCK.alpha) ** 2
+    since = T - 0.1
+    theta = -np.where(since < 0.0, since, ratio * since)
+    sine = np.sin(np.abs(theta))
+    x = np.where(theta > 0.0, 1.0, -1.0) * (0.3 * np.cos(theta) - 0.8 * sine - 0.3)
+    (hit,) = of_kind(told(x=x, theta=theta, standing=True), "floor impact")
+    assert hit.t == pytest.approx(0.1, abs=STEP)
+    # The corner carries part of the weight for the two milliseconds that are counted, and a step.
+    assert hit.impulse > 0.3 * (1.0 + ratio)
+    assert hit.impulse < 0.3 * (1.0 + ratio) + G * (2e-3 + STEP)
+
+
 # Slip
 
 SLOWS = 0.4 * G
@@ -168,6 +182,19 @@ def test_a_flush_hit_is_told_of_both_corners_with_its_impulse():
     assert of_kind(found, "release") == []
 
 
+def test_a_wall_is_struck_where_the_gap_closes_between_two_steps():
+    """At 0.2002 s; the next step ends at 0.2005 s, behind the wall."""
+    x = np.where(T < 0.20075, 0.5 * T, 0.1001)
+    beside = BESIDE.replace(walls=[Wall(side="right", gap=0.1001)])
+    hits = of_kind(told(x=x, scene=beside), "wall impact")
+    assert [event.t for event in hits] == pytest.approx([0.2002, 0.2002], abs=1e-6)
+
+
+def test_a_strike_at_the_end_of_the_scene_is_told():
+    hits = of_kind(told(x=0.1 * T, scene=BESIDE), "wall impact")
+    assert [event.t for event in hits] == pytest.approx([1.0, 1.0], abs=1e-6)
+
+
 def test_a_wall_that_is_touched_for_long_releases():
     """It stays at the wall for 0.3 s."""
     x = np.where(T < 0.2, 0.5 * T, 0.1) - 0.25 * np.clip(T - 0.5, 0.0, None)
@@ -191,6 +218,16 @@ def test_a_fall_is_told_at_a_right_angle_and_nothing_after_it(sign, side):
     assert found[-1].kind == f"overturned {side}"
     assert found[-1].t == pytest.approx(math.pi / 10.0, abs=1e-6)
     assert found[-1].mode_after == "overturned"
+
+
+def test_a_fall_begins_in_the_mode_of_the_step_before():
+    """It comes down in the air, and touches the floor with its last two states."""
+    rows = int(math.pi / 2.0 / (5.0 * STEP)) + 2
+    theta = 5.0 * T
+    touches = 0.8 * np.cos(theta) + 0.3 * np.sin(theta)
+    y = np.where(np.arange(len(T)) < rows - 2, 2.0, touches)
+    found = told(theta=theta, y=y, rows=rows)
+    assert found[-1].mode_before != "flight"
 
 
 def test_what_comes_after_the_end_of_the_scene_is_not_told():

@@ -188,6 +188,39 @@ def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     assert 0.92 <= np.mean(inside) <= 0.98
 
 
+def test_two_tests_differ_by_students_interval(made):
+    """Of rotations that are 0.2 and 0.2 + d t apart: sd d t/sqrt 2, and 12.706/sqrt 2 of it."""
+    t = np.array([0.0, 1.0, 2.0, 3.0])
+    apart = 0.01 * t
+    tests = [made(0.2 + sign * 0.5 * apart, t, slip=apart * (sign > 0.0)) for sign in (1.0, -1.0)]
+    alpha, student = tests[0].block.alpha, 12.7062 / np.sqrt(2.0)
+    found = measured.mean_history(tests).uncertainty
+    # The squares of the differences at the rows, by the trapezoidal rule.
+    mean_square = (0.5 * 0.0 + 0.01**2 + 0.02**2 + 0.5 * 0.03**2) / 3.0
+    expected = {
+        "theta_rms": student * alpha * np.sqrt(mean_square / 2.0),
+        "peak_rotation": student * alpha * (0.03 / 2.0 - 0.0) / np.sqrt(2.0),
+        "last_slip": student * 0.03 / np.sqrt(2.0),
+    }
+    assert found["theta_rms"] == pytest.approx(expected["theta_rms"], rel=1e-4)
+    assert found["peak_rotation"] == pytest.approx(expected["peak_rotation"], rel=1e-4)
+    assert found["last_slip"] == pytest.approx(expected["last_slip"], rel=1e-4)
+
+
+def test_repeats_are_aligned_with_the_first(tmp_path):
+    paths = [tmp_path / f"{name}.csv" for name in "abc"]
+    for path, delay in zip(paths, (0.0, 0.3, -0.2), strict=True):
+        swing(delay=delay).save(path)
+    files = {"bookcase": tuple(str(path) for path in paths)}
+    scene = load_scene("bookcase").replace(duration=4.0, output_step=0.01)
+    history = measured.Measured(files=files, align=True).simulate(scene)
+    assert [note for note in history.notes if "shifted" in note] == [
+        "b.csv is shifted by -0.3 s",
+        "c.csv is shifted by +0.2 s",
+    ]
+    assert history.peak_rotation == pytest.approx(0.1, rel=1e-3)
+
+
 LEFT, RIGHT = (
     replace(swing(), channels=swing().channels | {"theta": np.linspace(0.0, end, 401)})
     for end in (1.57, -1.57)
