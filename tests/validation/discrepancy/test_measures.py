@@ -419,7 +419,7 @@ def test_errors_of_impulses_count_against_the_strongest(made, candidate, error):
 def fallen(made, side="left"):
     """A history that ends in a fall at 2.5 s."""
     outcome = f"overturned {side}"
-    return made(WAVE[:1000], T[:1000], outcome=outcome, events=[Event(t=2.5, kind=outcome)])
+    return made(WAVE[:1001], T[:1001], outcome=outcome, events=[Event(t=2.5, kind=outcome)])
 
 
 def test_a_fall_is_no_impulse(made):
