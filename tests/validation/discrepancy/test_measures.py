@@ -644,7 +644,7 @@ def rated(made, monkeypatch):
             given.append((*curves, dt))
 
         def overall_rating(self, ndigits):
-            return 0.123456 if ndigits < 0 else round(0.123456, ndigits)
+            return 0.123456 if ndigits == -1 else round(0.123456, abs(ndigits))
 
     module = SimpleNamespace(ISO18571=Rating)
     monkeypatch.setitem(sys.modules, "objective_rating_metrics", SimpleNamespace(rating=module))
@@ -683,9 +683,15 @@ def test_a_short_curve_has_no_iso_rating(rated, rows, has):
     assert (figure.value is not None) == has
 
 
-@pytest.mark.parametrize("shares", [(0.0, 1.0), (1.0, 0.0), (1.0, math.nan)])
-def test_a_curve_that_is_constant_or_none_has_no_iso_rating(rated, shares):
-    figure, given = rated(*(share * WAVE[:40] for share in shares), T[:40])
+CONSTANT = np.full(40, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [(CONSTANT, WAVE[:40]), (WAVE[:40], CONSTANT), (WAVE[:40], math.nan * CONSTANT)],
+)
+def test_a_curve_that_is_constant_or_none_has_no_iso_rating(rated, first, second):
+    figure, given = rated(first, second, T[:40])
     assert figure.value is None
     assert given == []
 
