@@ -644,7 +644,7 @@ def rated(made, monkeypatch):
             given.append((*curves, dt))
 
         def overall_rating(self, ndigits):
-            return 0.123456 if ndigits == -1 else round(0.123456, abs(ndigits))
+            return 0.123456 if ndigits < 0 else round(0.123456, ndigits)
 
     module = SimpleNamespace(ISO18571=Rating)
     monkeypatch.setitem(sys.modules, "objective_rating_metrics", SimpleNamespace(rating=module))
