@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck import Block, Floor, HalfSine, Record, Rest, Scene, Sine, Wall
+from rockcheck import Block, Cosine, Floor, HalfSine, Record, Rest, Scene, Sine, Wall
 from rockcheck.engines import base_motion, contacts
 
 SCENE = Scene(
@@ -162,3 +162,15 @@ def test_both_corners_of_a_loaded_block_have_a_limit():
     scene = SCENE.replace(excitation=ramp, gravity=10.0, floor=Floor(friction=0.6))
     base = base_motion.velocity_of(scene.excitation)
     assert base_motion.starts_of_motion(scene, base) == pytest.approx([0.25, 0.5, 0.6])
+
+
+def test_a_base_that_stays_beyond_a_limit_starts_nothing_anew():
+    """It passes 3 m/s^2 once, and 4 after a sample of 3.5."""
+    assert starts([0.0, 3.5, 8.0]) == pytest.approx([3.0 / 3.5, 1.0 + 0.5 / 4.5])
+
+
+@pytest.mark.parametrize("period", [0.3, 0.6, 0.7, 1.1, 1.9, 2.3])
+def test_a_pulse_that_ends_with_a_jump_ends_with_it(period):
+    """Whole cycles of a cosine leave no velocity, however their end is rounded."""
+    (last,) = velocities(Cosine(amplitude=2.0, period=period, cycles=3), [99.0])
+    assert last == pytest.approx(0.0, abs=1e-9)
