@@ -89,3 +89,9 @@ def test_the_vertical_motion_is_dropped_first():
     smallest(lambda scene: tried.append(scene) is not None, trials=2)
     assert tried[0].vertical == Rest()
     assert tried[1].excitation == Rest()
+
+
+def test_a_run_is_cut_to_a_hundredth_of_the_block_s_time():
+    """Of sqrt(R/g), 0.32 s at 1 m."""
+    scene, _ = smallest(lambda scene: True)
+    assert 0.003 < scene.duration < 0.013
