@@ -74,6 +74,8 @@ def test_of_a_block_that_turns_flush_with_a_wall_that_corner_rests_which_does_no
     assert contacts.closed_wall(block, motion, sign, True) == (rests == "bottom")
     assert contacts.closed_wall(block, motion, sign, False) == (rests == "top")
     assert not contacts.closed_wall(block, motion, -sign, False)
+    assert modes.touched_walls(block, motion, sign, False) == (rests == "top")
+    assert modes.touched_walls(block, motion, -sign, False) == 2 * (rests == "bottom")
 
 
 @pytest.mark.parametrize(

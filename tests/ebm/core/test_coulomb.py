@@ -52,6 +52,13 @@ def test_a_block_that_is_pushed_beyond_its_slope_uplifts():
     assert run.records.log[0].tolist() == [0.0, Event.UPLIFT, HistoryMode.REST, 2.0, 0.0]
 
 
+def test_a_mode_that_fits_is_allowed_the_noise_alone():
+    """And is no modelling choice."""
+    run = follow(run_after(Guard.CONE_PLUS, Event.UNTOLD, **RESTS), push=0.4)
+    assert run.state.slack == 1.0
+    assert run.state.rules.sum() == 0
+
+
 def test_an_impact_is_told_as_one_and_leaves_the_slide():
     run = follow(run_after(Guard.PHI, Event.FLOOR_IMPACT, slide=0.1, **ROCKS, sense=1), mu=0.2)
     assert run.state.motion.vx == 0.1
