@@ -129,3 +129,14 @@ def test_a_kink_of_either_component_ends_what_is_smooth():
     )
     assert ground.smooth_until(Base(sooner, later), 0.1) == pytest.approx(1.0)
     assert ground.smooth_until(Base(later, sooner), 0.1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("ahead", "passed"), [(0.01, 0.5), (0.0002, 0.5008)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_acceleration_exceeds_its_limit_a_little_before_it_does_so_by_the_noise(
+    sign, ahead, passed
+):
+    """It rises to 1 in 1 s past a limit of 0.5; it is 0.501 at 0.501 s."""
+    ramp = ground.ground_of(Record.from_samples([0.0, sign], 1.0), 1.0, 1.0)
+    found = ground.next_exceedance(ramp, 0.0, -0.5, 0.5, 1e-3, ahead)
+    assert found == pytest.approx(passed, abs=1e-12)

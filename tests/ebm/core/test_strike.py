@@ -6,12 +6,14 @@ import math
 import numpy as np
 import pytest
 from cases import places, random_scene
-from stepping import ROCKS, run_at, setting_of, six
+from stepping import ROCKS, TILTED, run_at, setting_of, six
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, settle, strike
+from rockcheck.ebm.core.ground import ground_of
 from rockcheck.ebm.core.names import Family, Guard, Pivot, Rule
-from rockcheck.scenes import PAPER_BLOCK, Floor, Scene, Wall
+from rockcheck.ebm.core.state import Base
+from rockcheck.scenes import PAPER_BLOCK, Floor, Rest, Scene, Wall
 
 
 @pytest.mark.parametrize("pivot", ["bilateral", "unilateral"])
@@ -243,3 +245,13 @@ def test_a_flying_block_that_turns_flush_against_a_wall_strikes_no_floor(side, s
     strikes = history.extremes.walls[side].strikes
     assert strikes == 3
     assert [event.kind for event in history.event_list] == ["wall impact"] * strikes
+
+
+def test_a_flying_block_that_turns_upright_where_it_touches_is_put_onto_the_floor():
+    """Its lower corner is on the floor to rounding, and at rest."""
+    block, still = setting_of(0.4), ground_of(Rest(), 1.0, 1.0)
+    place = (0.0, math.cos(0.4) + 5e-11, 0.0, 0.0, 0.3 * math.sin(0.4), -0.3)
+    run = run_at(place, **TILTED, sense=1, pivot=Pivot.OFF)
+    run.state.guard = Guard.PHI
+    strike.strike(block, Base(still, still), run, 1e-9)
+    assert run.state.motion.y == math.cos(0.4)
