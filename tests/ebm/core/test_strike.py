@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from cases import places, random_scene
-from stepping import ROCKS, TILTED, run_at, setting_of, six
+from stepping import FLAT, ROCKS, TILTED, run_at, setting_of, six
 
 from rockcheck.ebm import EventBasedModel, natural
 from rockcheck.ebm.core import contacts, settle, strike
@@ -150,6 +150,37 @@ def test_the_corner_of_a_loaded_block_leaves_as_newton_says(case):
         )
         gains += state.gains
     assert 0 < gains < 60
+
+
+@pytest.mark.parametrize(("guard", "wall"), [(Guard.TIP_GAP, 1), (Guard.FAR_GAP, -1)])
+def test_the_corner_whose_gap_closes_rebounds(guard, wall):
+    """The top one on the side to which the block tips, left, or the bottom one on the other."""
+    touches = math.sin(0.5) - math.sin(0.4)
+    walls = [
+        Wall(side="left", gap=touches if wall > 0 else 0.3, restitution=0.5),
+        Wall(side="right", gap=touches if wall < 0 else 0.3, restitution=0.5),
+    ]
+    block, still = setting_of(0.4, walls=walls, pivot="bilateral"), ground_of(Rest(), 1.0, 1.0)
+    slides = TILTED | {"sense": 1, "pivot": Pivot.SLIPPING, "slip": -wall}
+    run = run_at((0.0, math.cos(0.3), 0.1, -0.2 * wall, 0.0, 0.0), **slides)
+    run.state.guard, upward = guard, wall * math.cos(0.5)
+    strike.strike(block, Base(still, still), run, 1e-9)
+    motion, side = run.state.motion, 0 if wall > 0 else 1
+    assert motion.vx - upward * motion.w == pytest.approx(0.1 * wall, abs=1e-12)
+    assert run.state.wall_impulse[side] > 0.0
+    assert run.state.wall_impulse[1 - side] == 0.0
+    # The floor's impulse, all that is vertical, counts with the wall's.
+    assert run.state.impulse == pytest.approx(run.state.wall_impulse[side] + abs(motion.vy))
+
+
+@pytest.mark.parametrize(("spin", "flat"), [(0.0, 1), (0.1, 1), (0.3, 0), (-0.3, 0)])
+def test_a_block_lands_flat_where_both_corners_come_down(spin, flat):
+    """At 0.1, and at 0.39 times the spin less and more."""
+    block, still = setting_of(0.4), ground_of(Rest(), 1.0, 1.0)
+    run = run_at((0.0, math.cos(0.4), 0.0, 0.0, -0.1, spin), **FLAT, pivot=Pivot.OFF)
+    run.state.guard = Guard.LANDING
+    strike.strike(block, Base(still, still), run, 1e-9)
+    assert run.state.rules[Rule.FLAT_LANDING] == flat
 
 
 @pytest.mark.parametrize("sense", [1, -1])
