@@ -1,6 +1,7 @@
 """What every engine's settings mean, by an engine made up."""
 
 import sys
+import time
 from typing import ClassVar
 
 import numpy as np
@@ -59,6 +60,10 @@ NEXT, BEFORE = (HERE[0], HERE[1] + 1), (HERE[0], HERE[1] - 1)
 )
 def test_a_package_has_wheels_from_its_first_to_its_last_python(first, last, has):
     assert with_wheels(first, last).has_wheel() == has
+
+
+def test_a_package_that_says_nothing_has_wheels():
+    assert Made.has_wheel()
 
 
 def test_without_wheels_a_package_is_compiled():
@@ -188,3 +193,9 @@ def test_extremes_end_with_the_scene():
     """A step of 0.04 s goes on to 0.32 s; the way there is that of 0.31 s."""
     reach = Flying(time_step=0.04).simulate(THROWN).extremes.reach_right
     assert reach == pytest.approx(0.155)
+
+
+def test_the_processor_time_of_a_run_is_a_part_of_that_of_the_call():
+    before = time.process_time()
+    cost = Flying(time_step=1e-3).simulate(THROWN).cost
+    assert 0.0 <= cost.cpu_seconds <= time.process_time() - before
