@@ -121,6 +121,13 @@ def test_what_the_peak_does_not_depend_on_has_no_index():
     )
 
 
+def test_what_matters_most_comes_first():
+    tilt = files.Spread(value=0.5 * ALPHA, sd=0.05 * ALPHA)
+    for given in (FRICTION | {"initial_rotation": tilt}, {"initial_rotation": tilt} | FRICTION):
+        found = input_spread.sensitivities(tilted(0.5, given=given), EventBasedModel(), samples=16)
+        assert [index.name for index in found] == ["initial_rotation", "floor.friction"]
+
+
 def test_a_scene_without_uncertain_numbers_is_refused(fault_of):
     assert "no number of this scene is uncertain" in str(
         fault_of(input_spread.propagate, tilted(0.5, given={}))
