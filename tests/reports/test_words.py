@@ -1,11 +1,15 @@
 """What a scene, a history and a comparison read like, by their numbers."""
 
 import math
+import re
 
+import numpy as np
 import pytest
 
 from rockcheck import Block, Cosine, Event, Floor, HalfSine, Record, Rest, Ricker, Scene, Sine, Wall
+from rockcheck.ebm.spectrum import LEFT as FELL_LEFT, RIGHT as FELL_RIGHT, Spectrum
 from rockcheck.reports.show import words
+from rockcheck.validation.discrepancy.figures import Figure
 
 SCENE = Scene(
     name="shelf",
@@ -181,3 +185,41 @@ def test_units_are_as_printed(name, text):
 def test_a_moment_that_is_none_is_left_as_it_is():
     assert words.moment("2026-01-02T03:04:05+00:00") == "2026-01-02 03:04 UTC"
     assert words.moment("once") == "once"
+
+
+def test_a_spectrum_shows_its_shares_and_no_base_motion():
+    spectrum = Spectrum(
+        outcomes=np.array([[0, 0, FELL_LEFT], [FELL_RIGHT] * 3], dtype=np.int8),
+        frequency_ratios=np.array([1.0, 2.0, 3.0]),
+        amplitude_ratios=np.array([1.0, 2.0]),
+        evaluations=5,
+        undecided=np.zeros((0, 2), dtype=np.int64),
+        scene=SCENE,
+        model=None,
+    )
+    html = words.spectrum_html(spectrum)
+    shares = dict(
+        re.findall(r">(safe|overturned left|overturned right)</th><td[^>]*>([^<]*)<", html)
+    )
+    assert shares == {"safe": "33.3 %", "overturned left": "16.7 %", "overturned right": "50 %"}
+    assert "6, from 5 runs" in html
+    assert "μ 0.4" in html
+    assert "Ricker" not in html
+
+
+def figure_of(window, until):
+    return Figure(measure="m", label="m", unit="1", value=1.0, window=window, until=until)
+
+
+@pytest.mark.parametrize(
+    ("window", "until", "text"),
+    [
+        ("horizon", 2.5, "to the horizon (2.5 s)"),
+        ("horizon", None, "to the horizon"),
+        ("4s", 4.0, "first 4 s"),
+        ("4s", None, "first 4s"),
+        ("", None, "whole run"),
+    ],
+)
+def test_a_window_is_told_by_its_end(window, until, text):
+    assert words.window(figure_of(window, until)) == text

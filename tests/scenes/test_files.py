@@ -246,3 +246,15 @@ def test_correlated_inputs_have_the_correlation_and_their_own_distributions():
     assert np.corrcoef(values.T)[0] == pytest.approx([1.0, 0.0, -0.8], abs=0.02)
     assert values.mean(axis=0) == pytest.approx([2.0, 0.4, 0.05], rel=5e-3)
     assert values.std(axis=0) == pytest.approx([0.1, 0.2 / math.sqrt(12.0), 0.01], rel=2e-2)
+
+
+def test_a_scene_file_has_its_remarks_on_top_and_its_tables_last(tmp_path):
+    """A value after a table would be the table's."""
+    tables = {"block": {"half_width": 0.3, "half_height": 1.0}, "name": "shelf", "duration": 2.0}
+    text = files.scene_text(tables | {"floor": {"friction": 0.5}}, "First.\nSecond.")
+    assert text.startswith("# First.\n# Second.\n")
+    path = tmp_path / "shelf.toml"
+    path.write_text(text, "utf-8")
+    scene = load_scene(path)
+    assert scene.duration == 2.0
+    assert scene.block.half_height == 1.0
