@@ -5,6 +5,7 @@ import io
 import pytest
 import whole_runs
 from rich.console import Console
+from rich.text import Text as Line
 
 from rockcheck.reports import terminal
 from rockcheck.validation.finding import Column, Finding, Table, Text, text
@@ -119,3 +120,19 @@ def test_a_terminal_breaks_a_sentence_between_words():
 
 def test_a_pipe_has_a_sentence_in_one_line():
     assert shown(finding(Text(LONG))).splitlines() == [LONG]
+
+
+@pytest.mark.parametrize(("on", "count"), [("all", 1), ("page", 0), ("file", 0)])
+def test_a_table_for_pages_or_files_is_not_on_a_terminal(on, count):
+    table = Table("t", [text("name")], [["bookcase"]], on=on)
+    assert shown(finding(table)).count("bookcase") == count
+
+
+def test_a_column_without_a_word_takes_no_room():
+    assert terminal.TextColumn("", [Line("")], is_left=True).least_width == 0
+
+
+@pytest.mark.parametrize(("is_left", "width"), [(True, 16), (False, 4)])
+def test_a_longer_text_at_the_left_has_room_to_be_read(is_left, width):
+    column = terminal.TextColumn("head", [Line("ab cd " * 9)], is_left=is_left)
+    assert column.least_width == width

@@ -5,7 +5,7 @@ import math
 
 import pytest
 
-from rockcheck import Block, Floor, HalfSine, Record, Scene, Wall
+from rockcheck import Block, Floor, HalfSine, Record, Rest, Scene, Wall
 from rockcheck.validation.studies.conformance import export
 from rockcheck.validation.studies.conformance.changes import changes, wrote
 
@@ -139,3 +139,36 @@ def test_a_base_motion_has_velocities_and_accelerations_at_even_times():
     # The horizontal one has gained 0.5 m/s, and the vertical one all of its 2 A T/(2 pi).
     assert table[at, 1:] == pytest.approx([0.5, 0.4 / math.pi, 2.0, 0.0], abs=1e-6)
     assert table[-1, 1] == pytest.approx(1.0)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A folder to which two scenes are exported, of which one has a base that moves."""
+    resting = SCENE.replace(name="rest", excitation=Rest(), vertical=Rest())
+    lifted = resting.replace(name="lifted", vertical=HalfSine(amplitude=1.0, period=0.4))
+    monkeypatch.setattr(export, "SCENES", {"rest": resting, "lifted": lifted})
+    return tmp_path
+
+
+def test_a_folder_holds_the_scenes_and_the_bases_that_move(folder):
+    assert export.export(folder) == ["rest", "lifted"]
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "README.md",
+        "engine.toml",
+        "lifted-base.csv",
+        "scenes.csv",
+    ]
+    head, *rows = (folder / "scenes.csv").read_text("utf-8").splitlines()
+    assert head.startswith("scene,duration_s,")
+    assert [row.split(",")[0] for row in rows] == ["rest", "lifted"]
+
+
+def test_what_an_engine_says_of_itself_stays(folder):
+    (folder / "engine.toml").write_text("mine", "utf-8")
+    export.export(folder)
+    assert (folder / "engine.toml").read_text("utf-8") == "mine"
+
+
+def test_an_engine_is_asked_about_itself(folder):
+    export.export(folder)
+    assert "engine" in (folder / "engine.toml").read_text("utf-8")
