@@ -9,6 +9,7 @@ from assessed import SCENE
 
 from rockcheck import Record, Rest
 from rockcheck.ebm import fates
+from rockcheck.validation.studies.population.rows import table_of
 from rockcheck.validation.studies.population.tasks import (
     DrawTask,
     FactorTask,
@@ -162,3 +163,25 @@ def test_the_motion_of_a_draw_is_that_of_its_scene(monkeypatch):
     DrawTask(("up",), SCENE, "ebm-unilateral").batch(np.array([0]))
     assert tables[0].factor.tolist() == [1.0]
     assert tables[0].vertical_factor.tolist() == [1.0]
+
+
+# Rows of a batch
+
+
+def test_a_gap_is_of_one_side_and_the_other_is_the_scene_s():
+    table = table_of([SCENE], np.array([0, 0]), gaps=("right", np.array([0.1, 0.2])))
+    assert table.gap_right.tolist() == [0.1, 0.2]
+    assert np.isnan(table.gap_left).all()
+
+
+def test_without_gaps_all_are_the_scene_s():
+    table = table_of([SCENE], np.array([0]))
+    assert np.isnan([*table.gap_left, *table.gap_right]).all()
+
+
+def test_scenes_under_one_motion_have_it_once():
+    other = SCENE.replace(floor=SCENE.floor.replace(friction=0.7))
+    shaken = SCENE.replace(excitation=Record.from_samples([1.0, 2.0], 0.1))
+    table = table_of([SCENE, other, shaken], np.array([2, 0, 1]))
+    assert table.motion.tolist() == [1, 0, 0]
+    assert [motion for motion, _ in table.motions] == [SCENE.excitation, shaken.excitation]
