@@ -257,3 +257,43 @@ def test_what_never_slips_has_no_friction_to_jam():
         for mu in (0.5, 5.0)
     ]
     np.testing.assert_array_equal(*motions)
+
+
+# Natural units
+
+LOADED = Block(half_width=0.3, half_height=1.0, centre_of_mass=(0.08, -0.2), moment_of_inertia=0.4)
+
+
+@pytest.mark.parametrize("block", [LOADED, PAPER_BLOCK], ids=["loaded", "homogeneous"])
+@pytest.mark.parametrize(("side", "sign"), [("left", 1.0), ("right", -1.0)])
+def test_corners_are_seen_from_the_mass_under_their_angles(block, side, sign):
+    """The pivot's, the top corner's above it, and the other lower one's."""
+    dx, dz = block.offset
+    arm, other = block.half_width + sign * dx, block.half_width - sign * dx
+    height, top = block.half_height + dz, block.half_height - dz
+    alpha, radius = math.atan2(arm, height), math.hypot(arm, height)
+    above, far = math.atan2(arm, top), math.atan2(other, height)
+    found = natural.side_of(scene_of(block=block), side)
+    assert found.alpha == pytest.approx(alpha)
+    assert found.radius == pytest.approx(radius / block.radius)
+    assert found.arm == pytest.approx(arm / block.radius)
+    assert found.top_alpha == pytest.approx(above)
+    assert found.top_radius == pytest.approx(math.hypot(arm, top) / block.radius)
+    ratio = math.hypot(arm, top) / radius
+    assert found.tip_sin == pytest.approx(ratio * math.sin(alpha + above))
+    assert found.tip_cos == pytest.approx(ratio * math.cos(alpha + above))
+    ratio = math.hypot(other, height) / radius
+    assert found.far_sin == pytest.approx(ratio * math.sin(alpha + far))
+    assert found.far_cos == pytest.approx(ratio * math.cos(alpha + far))
+
+
+def test_a_thrown_block_has_its_velocities_in_natural_units():
+    """Of R and sqrt(R/g), with R = 1.25 m."""
+    block = Block(half_width=0.75, half_height=1.0)
+    thrown = {"initial_height": 0.5, "initial_velocity": 0.4, "initial_angular_velocity": 0.3}
+    scene = scene_of(block=block, **thrown)
+    x, y, theta, vx, vy, w = scene.initial_state
+    unit = math.sqrt(1.25 / 9.81)
+    expected = [x / 1.25, y / 1.25, theta, vx * unit / 1.25, vy * unit / 1.25, w * unit]
+    assert abs(vy) > 0.1
+    assert natural.state_of(scene).tolist() == pytest.approx(expected)

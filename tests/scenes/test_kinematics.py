@@ -163,6 +163,22 @@ def test_a_run_of_all_rows_is_kept_whole():
     assert history.channels["mode"].tolist() == ["rest"] * 5
 
 
+def test_a_row_at_the_end_that_is_off_the_grid_is_not_shown():
+    """Of 0.38 s, with a row each 0.1 s."""
+    scene = SCENE.replace(duration=0.38)
+    ends = (0.0, 0.3, 1.54, 0.0, 0.0, 0.1)
+    history = observation.observe(scene, "made", np.array([FLAT] * 4 + [ends]))
+    assert history.channels["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    assert history.channels["theta"][-1] == 0.0
+    assert history.outcome == "moving"
+
+
+def test_a_row_at_a_right_angle_is_left_out():
+    rows = [FLAT, (0.0, 1.0, math.pi / 2.0, 0.0, 0.0, 1.0)]
+    history = observed(rows, events=[Event(t=0.1, kind="overturned left")])
+    assert len(history.channels["t"]) == 1
+
+
 def test_rows_from_a_right_angle_on_are_left_out():
     rows = [FLAT, (0.0, 1.0, 1.5, 0.0, 0.0, 1.0), (0.0, 1.0, 1.6, 0.0, 0.0, 1.0)]
     down = [Event(t=0.15, kind="overturned left")]

@@ -177,6 +177,9 @@ def test_a_gap_is_of_one_side_and_the_other_is_the_scene_s():
 def test_without_gaps_all_are_the_scene_s():
     table = table_of([SCENE], np.array([0]))
     assert np.isnan([*table.gap_left, *table.gap_right]).all()
+    assert table.restitution == 0.0
+    assert table.factor.tolist() == [1.0]
+    assert table.vertical_factor.tolist() == [1.0]
 
 
 def test_scenes_under_one_motion_have_it_once():
