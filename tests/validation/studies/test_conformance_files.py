@@ -133,6 +133,7 @@ def test_a_row_holds_geometry_contacts_and_the_start():
 def test_a_base_motion_has_velocities_and_accelerations_at_even_times():
     table = export.base_of(SCENE)
     step = table[1, 0]
+    assert step == pytest.approx(1e-3)
     assert table[-1, 0] == pytest.approx(1.2)
     assert table[:, 0] == pytest.approx([step * k for k in range(len(table))])
     at = round(0.5 / step)
