@@ -12,6 +12,9 @@ An uncertain number is a table, such as `friction = { value = 0.3, sd = 0.03 }`:
 Any number of a scene may be uncertain. `load_scene` takes the values; `load_uncertain_scene` also
 returns the distributions. Numbers are independent unless a table `[correlation]` says otherwise:
 `"block.half_width, block.half_height" = 0.8`.
+
+A table `[building]` puts the block on a storey, which the excitation moves (see `buildings`):
+`storeys`, `storey`, `period`, `damping`, or `modes`.
 """
 
 from __future__ import annotations
@@ -20,15 +23,18 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
 import numpy as np
 from pydantic import model_validator
 
+from rockcheck.scenes import buildings
 from rockcheck.scenes.base import DATA, Finite, Floats, Frozen, Positive
+from rockcheck.scenes.buildings import Building
 from rockcheck.scenes.errors import InputError, printable, suggestion, unknown_name
+from rockcheck.scenes.excitations import Excitation
 from rockcheck.scenes.reading import read_text
 from rockcheck.scenes.recordings.sets import record_path
 from rockcheck.scenes.scene import Scene
@@ -37,6 +43,9 @@ Place = tuple[str | int, ...]
 #: Keys that mark a table of a scene file as an uncertain number.
 _KEYS = {"value", "sd", "low", "high"}
 CORRELATION = "correlation"
+#: A building's free vibration is played until it is below this part of the least acceleration that
+#: moves a block at rest, that is where it uplifts or slides; on ice, of so much g.
+QUIET_SHARE, LEAST_MOVING = 0.1, 0.01
 
 
 def named_scenes() -> dict[str, Path]:
@@ -78,12 +87,14 @@ def uncertain_scene_from(
     """A scene with its uncertain numbers, from the tables of a scene file."""
     spreads: dict[str, Spread] = {}
     plain = _plain({key: value for key, value in data.items() if key != CORRELATION}, (), spreads)
+    building = buildings.building_of(plain.pop("building")) if "building" in plain else None
     scene = scene_from(plain, folder=folder, default_name=default_name)
-    return uncertain_scene(scene, spreads, data.get(CORRELATION, {}))
+    given = uncertain_scene(scene, spreads, data.get(CORRELATION, {}))
+    return given if building is None else on_storey(given, building)
 
 
 def scene_from(data: dict[str, Any], *, folder: Path, default_name: str) -> Scene:
-    """A scene from the tables of a scene file.
+    """A scene from the tables of a scene file, but for its building.
 
     Record files are looked up in `folder`, then among the package's records.
     """
@@ -207,12 +218,21 @@ class UncertainScene:
     """A scene and the distributions of its uncertain numbers.
 
     `spreads` is keyed by the place of the number, such as "floor.friction" or "walls.left.gap".
+    `correlation` is their matrix in this order, the unit matrix if all are independent. Where the
+    block stands in a `building`, the scene's excitation is that of the storey, and `ground` moves
+    the building.
     """
 
     scene: Scene
     spreads: Mapping[str, Spread]
-    #: Correlation matrix in the order of `spreads`; the unit matrix if all are independent.
     correlation: Floats
+    building: Building | None = None
+    ground: Excitation | None = None
+
+    @property
+    def ground_motion(self) -> Excitation:
+        """The horizontal motion of the ground: without a building that of the block's base."""
+        return self.scene.excitation if self.ground is None else self.ground
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -295,6 +315,30 @@ def uncertain_scene(
             CORRELATION,
         )
     return UncertainScene(scene, dict(spreads), matrix)
+
+
+def on_storey(given: UncertainScene, building: Building) -> UncertainScene:
+    """The scene with its block on a storey of a building, which its excitation moves.
+
+    Raises `InputError` where a number of the building or of the motion is uncertain.
+    """
+    for place in given.spreads:
+        if place.partition(".")[0] in ("building", "excitation"):
+            raise InputError("no number of a building or of its ground motion is uncertain", place)
+    scene = given.scene
+    moves_at = max(min(scene.block.slope, scene.floor.mu_s), LEAST_MOVING)
+    try:
+        motion = buildings.storey_motion(
+            building, scene.excitation, QUIET_SHARE * moves_at * scene.gravity
+        )
+    except InputError as error:
+        raise InputError(error.reason, "building") from None
+    return replace(
+        given,
+        scene=scene.replace(excitation=motion),
+        building=building,
+        ground=scene.excitation,
+    )
 
 
 def with_numbers(scene: Scene, numbers: Mapping[str, float]) -> Scene:

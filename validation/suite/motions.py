@@ -172,15 +172,17 @@ def _shaken(
     """A scene under one motion, horizontal and perhaps vertical.
 
     Spreads of the excitation that it replaces are dropped; the others stay as they are correlated.
+    A building stays, and the motion moves it.
     """
     scene, name = base.scene, f"{base.scene.name[: _LONGEST - len(label) - 2]}, {label}"
     kept = [k for k, place in enumerate(base.names) if place.partition(".")[0] not in change]
     duration = max(scene.duration, change["excitation"].quiet_after)
-    return files.UncertainScene(
+    shaken = files.UncertainScene(
         scene.replace(name=name, duration=duration, **change),
         {base.names[k]: base.spreads[base.names[k]] for k in kept},
         base.correlation[np.ix_(kept, kept)],
     )
+    return shaken if base.building is None else files.on_storey(shaken, base.building)
 
 
 #: Time step of the generated records, s.

@@ -10,7 +10,7 @@ from functools import reduce
 from pathlib import Path
 from typing import Any
 
-from rockcheck.scenes import Scene, errors, files
+from rockcheck.scenes import errors, files
 from rockcheck.validation.suite.suite_file import SuiteFile
 
 
@@ -33,15 +33,15 @@ def _all_scenes(config: SuiteFile, folder: Path) -> Iterator[files.UncertainScen
         yield files.uncertain_scene_from(table, folder=folder, default_name=f"scene {number}")
     for grid in config.grid:
         for choice in itertools.product(*grid.axes):
-            yield files.uncertain_scene(_combined(grid.scene, choice, folder), {}, {})
+            table = _combined(grid.scene, choice)
+            yield files.uncertain_scene_from(table, folder=folder, default_name="scene")
 
 
-def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]], folder: Path) -> Scene:
+def _combined(base: dict[str, Any], choice: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if not all(isinstance(alternative.get("name"), str) for alternative in choice):
         raise errors.InputError("each alternative needs a name", "grid.axes")
     names = [str(table["name"]) for table in (base, *choice) if "name" in table]
-    table = {**reduce(_merged, choice, base), "name": "-".join(names)}
-    return files.scene_from(table, folder=folder, default_name="scene")
+    return {**reduce(_merged, choice, base), "name": "-".join(names)}
 
 
 def _merged(base: Any, change: Any) -> Any:

@@ -214,7 +214,7 @@ def run_table(gathered: Gathered) -> Table:
     rows = []
     for case, shown in gathered.shown.items():
         run = shown.result
-        sizes = [size_of(plan.measure, plan.cases[case].scene)] if plan.measure else []
+        sizes = [size_of(plan.measure, plan.cases[case])] if plan.measure else []
         values = [None if run.overturned else value_of(run, q.name) for q in QUANTITIES]
         rows.append(
             [

@@ -11,19 +11,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rockcheck.scenes import InputError, Scene, errors, recordings
+from rockcheck.scenes import InputError, Scene, errors, files, recordings
 from rockcheck.scenes.recordings import intensity
 from rockcheck.validation.criteria import sampled
 
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of intensity: its name for options, label, unit, and value of a motion."""
+    """A measure of intensity: its name for options, label, unit, and value of a motion.
+
+    It is `of` the ground's motion, or `of_floor`: of that of the block's base.
+    """
 
     name: str
     label: str
     unit: str
     of: Callable[[recordings.Recording, Scene], float]
+    of_floor: bool = False
 
 
 def _pga_ratio(motion: recordings.Recording, scene: Scene) -> float:
@@ -39,6 +43,13 @@ MEASURES = {
     measure.name: measure
     for measure in (
         Measure("pga", "PGA", "g", lambda motion, scene: intensity.peak_acceleration(motion)),
+        Measure(
+            "pfa",
+            "peak floor acceleration",
+            "g",
+            lambda motion, scene: intensity.peak_acceleration(motion),
+            of_floor=True,
+        ),
         Measure("pgv", "PGV", "m/s", lambda motion, scene: intensity.peak_velocity(motion)),
         Measure("pga-ratio", "PGA/(g tan α)", "", _pga_ratio),
         Measure("pgv-ratio", "p PGV/(g tan α)", "", _pgv_ratio),
@@ -74,8 +85,9 @@ def _resolved_acceleration(motion: recordings.Recording, period: float) -> float
     return intensity.spectral_acceleration(motion, period)
 
 
-def size_of(measure: Measure, scene: Scene) -> float:
+def size_of(measure: Measure, given: files.UncertainScene) -> float:
     """The intensity of a scene's horizontal motion as it is; 0 of a base at rest."""
-    if scene.excitation.kind == "rest":
+    motion = given.scene.excitation if measure.of_floor else given.ground_motion
+    if motion.kind == "rest":
         return 0.0
-    return float(measure.of(sampled(scene.excitation, scene.excitation.quiet_after), scene))
+    return float(measure.of(sampled(motion, motion.quiet_after), given.scene))

@@ -113,7 +113,7 @@ def levels_of_records(
         raise InputError(f"{len(cases)} is too few: give at least {FEWEST} records", "records")
     sized = {}
     for name, given in cases.items():
-        size = size_of(measure, given.scene)
+        size = size_of(measure, given)
         if size <= 0.0:
             raise InputError(f"{name}: a record without motion has no intensity", "records")
         sized["", name] = given.scene, size

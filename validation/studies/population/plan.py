@@ -241,7 +241,7 @@ class Plan:
                 **self._batch_effort(math.log(FACTOR_RANGE) / FACTOR_STEP),
             )
             for case, given in self.cases.items()
-            if self.measure is not None and size_of(self.measure, given.scene) > 0.0
+            if self.measure is not None and size_of(self.measure, given) > 0.0
         }
 
     @cached_property

@@ -323,7 +323,7 @@ def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
         return None
     records = []
     for case, search in gathered.factors.items():
-        size = size_of(measure, gathered.plan.cases[case].scene)
+        size = size_of(measure, gathered.plan.cases[case])
         falls = search.intervals
         islands = [fall for fall in falls if fall.stands_above is not None]
         records.append(
