@@ -44,8 +44,8 @@ Place = tuple[str | int, ...]
 _KEYS = {"value", "sd", "low", "high"}
 CORRELATION = "correlation"
 #: A building's free vibration is played until it is below this part of the least acceleration that
-#: moves a block at rest, that is where it uplifts or slides; on ice, of so much g.
-QUIET_SHARE, LEAST_MOVING = 0.1, 0.01
+#: moves a block at rest.
+QUIET_SHARE = 0.1
 
 
 def named_scenes() -> dict[str, Path]:
@@ -326,11 +326,9 @@ def on_storey(given: UncertainScene, building: Building) -> UncertainScene:
         if place.partition(".")[0] in ("building", "excitation"):
             raise InputError("no number of a building or of its ground motion is uncertain", place)
     scene = given.scene
-    moves_at = max(min(scene.block.slope, scene.floor.mu_s), LEAST_MOVING)
+    quiet = QUIET_SHARE * scene.moving_acceleration
     try:
-        motion = buildings.storey_motion(
-            building, scene.excitation, QUIET_SHARE * moves_at * scene.gravity
-        )
+        motion = buildings.storey_motion(building, scene.excitation, quiet)
     except InputError as error:
         raise InputError(error.reason, "building") from None
     return replace(

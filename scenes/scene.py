@@ -21,6 +21,8 @@ MOST_SAMPLES = 5_000_000
 #: At mu = 4/3 the pivot of a homogeneous block can jam while it slips (Painleve); physics beyond it
 #: is not unique.
 PAINLEVE_FRICTION = 4.0 / 3.0
+#: Any acceleration of the base moves a block on ice: of less than this part of g, it is left out.
+LEAST_MOVING = 0.01
 
 
 class Floor(Frozen):
@@ -148,6 +150,14 @@ class Scene(Shown, Frozen):
         p = sqrt(3 g/(4 R)) of a homogeneous block.
         """
         return self.block.weaker_pivot.frequency_parameter(self.gravity)
+
+    @property
+    def moving_acceleration(self) -> float:
+        """Least horizontal base acceleration (m/s^2) that moves a block at rest.
+
+        It uplifts above g tan(alpha) or slides above mu_s g; on ice `LEAST_MOVING` stands for it.
+        """
+        return self.gravity * max(min(self.block.slope, self.floor.mu_s), LEAST_MOVING)
 
     @property
     def output_times(self) -> Floats:

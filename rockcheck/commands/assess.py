@@ -21,6 +21,7 @@ from rockcheck.scenes import InputError, Scene, Side, files, printable
 from rockcheck.validation.execute import models
 from rockcheck.validation.paper import FREQUENCIES
 from rockcheck.validation.studies.population import intensity_measures, plan
+from rockcheck.validation.studies.population.capacities import Capacity, capacities_of
 from rockcheck.validation.studies.population.levels import (
     CAPACITIES,
     Levels,
@@ -63,18 +64,20 @@ class Varied:
         typer.Option(
             "--levels",
             metavar="MEASURE[:LOW:HIGH:COUNT]",
-            help="The measure of intensity: pga (g), pgv (m/s), pga-ratio, pgv-ratio or sa:PERIOD"
-            " (g); with bounds, as pga:0.05:2:40, all records are scaled to these intensities, too."
+            help="The measure of intensity: pga (g), pgv (m/s), pga-ratio, pgv-ratio, sa:PERIOD"
+            " (g); pfa (g) on a storey; with bounds, as pga:0.05:2:40, all records are scaled to"
+            " these intensities, too."
             " Without records: pulses, over g tan(alpha).",
         ),
     ] = None
     capacity: Annotated[
-        list[float] | None,
+        list[str] | None,
         typer.Option(
             "--capacity",
-            help="Peak rotation (alpha) of a fragility curve; repeatable.",
-            min=1e-6,
-            max=1.0,
+            metavar="QUANTITY:VALUE",
+            help="What the block bears, for a fragility curve; repeatable. slip:0.05 (m), top:0.1"
+            " (m), wall_speed:1.0 (m/s), rotation:0.5 (alpha), overturns; a number alone is a"
+            " rotation.",
         ),
     ] = None
 
@@ -132,8 +135,7 @@ def assess(
     )
     if records:
         cases = {
-            str(getattr(case.scene.excitation, "source", name)): case
-            for name, case in cases.items()
+            str(getattr(case.ground_motion, "source", name)): case for name, case in cases.items()
         }
     check_varied(varied, next(iter(cases.values())), given, recorded=bool(records))
     measure = measure_of(varied.levels, recorded=bool(records))
@@ -145,6 +147,7 @@ def assess(
         draws=draws_of(varied.samples, cases, recorded=bool(records)),
         recorded=bool(records),
         measure=measure,
+        capacities=searched_capacities(varied, given.scene, measure),
         left_out=left_out,
     )
     if has_bounds(varied.levels, measure):
@@ -155,6 +158,22 @@ def assess(
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
     tell_record_notes(case.scene for case in cases.values())
     run_study(Assessment(plan=planned), played)
+
+
+def searched_capacities(
+    varied: Varied, scene: Scene, measure: intensity_measures.Measure
+) -> tuple[Capacity, ...]:
+    """The capacities of `--capacity` whose least intensities are searched. Raises `InputError`.
+
+    With bounds in `--levels` rotations are read off its runs in place of a search.
+    """
+    asked = capacities_of(varied.capacity or ())
+    for capacity in asked:
+        if capacity.quantity == "wall_speed" and not scene.walls:
+            raise InputError(f"{capacity.name}: the scene has no wall", "--capacity")
+    if has_bounds(varied.levels, measure):
+        return tuple(capacity for capacity in asked if capacity.quantity != "rotation")
+    return asked
 
 
 def draws_of(
@@ -186,8 +205,8 @@ def check_varied(
             " { value = 0.3, sd = 0.03 }",
             "--samples",
         )
-    if varied.capacity and not (recorded and varied.levels and varied.levels.count(":") > 1):
-        raise InputError("needs records and --levels MEASURE:LOW:HIGH:COUNT", "--capacity")
+    if rests and not recorded and varied.capacity:
+        raise InputError("needs a motion of the base: give records", "--capacity")
 
 
 def gap_ranges_of(text: str | None, scene: Scene) -> tuple[plan.GapRange, ...]:
@@ -270,9 +289,13 @@ def levels_of(
     values = np.linspace(low, high, int(count))
     model: dict[str, Any] = {"model": planned.batch_model, "settings": planned.batch_settings}
     if recorded:
-        capacities = varied.capacity or CAPACITIES
+        rotations = tuple(
+            capacity.value
+            for capacity in capacities_of(varied.capacity or ())
+            if capacity.quantity == "rotation"
+        )
         return levels_of_records(
-            planned.cases, values, measure, **model, capacities=tuple(capacities)
+            planned.cases, values, measure, **model, capacities=rotations or CAPACITIES
         )
     if measure.name != "pga-ratio":
         raise InputError(f"{measure.name} needs records; of pulses it is pga-ratio", "--levels")

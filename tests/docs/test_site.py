@@ -153,6 +153,7 @@ def test_the_api_page_has_every_public_name(site):
     assert set(rockcheck.__all__) - shown == {"__version__"}
 
 
+@pytest.mark.slow
 def test_pictures_of_the_gallery_are_those_that_the_code_makes():
     made = {f"{picture.__name__}.png" for picture in gallery.PICTURES}
     assert {path.name for path in GALLERY.iterdir()} == made

@@ -78,7 +78,9 @@ def integrated(scene, yield_displacement, z, t_end):
     )
 
 
-@pytest.mark.parametrize(("slip", "vertical"), [(0.6, 0.0), (-0.4, 4.0)])
+@pytest.mark.parametrize(
+    ("slip", "vertical"), [(0.6, 0.0), pytest.param(-0.4, 4.0, marks=pytest.mark.slow)]
+)
 def test_slip_yield_and_stick_agree_with_an_implicit_integration(slip, vertical):
     scene = pulse_scene(
         4.5,

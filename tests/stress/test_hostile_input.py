@@ -39,7 +39,7 @@ from rockcheck.validation.execute.store import (
 from rockcheck.validation.suite import results, suites
 
 fuzzed = settings(
-    max_examples=1000,
+    max_examples=400,
     deadline=5000,
     database=None,
     derandomize=True,

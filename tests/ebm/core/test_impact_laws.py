@@ -223,11 +223,11 @@ WALLS = {
 @lopsided_or_not
 @pytest.mark.parametrize("e", [0.0, 0.5])
 def test_contact_impact_leaves_no_approach(e, lopsided):
-    """Unilateral impacts at 1,000 random states: no touched contact still closes, without
+    """Unilateral impacts at 400 random states: no touched contact still closes, without
     restitution no energy is gained, and a corner alone is held by friction within its cone. Also
     where the approach is hardly more than rounding."""
     rng, held = np.random.default_rng(5), Counter()
-    for _ in range(1000):
+    for _ in range(400):
         alpha = rng.uniform(0.05, 0.9)
         block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
         mu = rng.uniform(0.0, min(1.2, 0.95 * block.least_painleve_friction))
@@ -255,7 +255,7 @@ def test_contact_impact_leaves_no_approach(e, lopsided):
             assert abs(along) <= mu * up + 1e-12
         else:
             assert along == approx(-math.copysign(mu * up, slip), abs=1e-12)
-    assert min(held[True], held[False]) > 20
+    assert min(held[True], held[False]) > 8
 
 
 def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
@@ -263,7 +263,7 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
     more restitution would add some."""
     rng = np.random.default_rng(21)
     capped = untouched = 0
-    for _ in range(3000):
+    for _ in range(1000):
         alpha, mu, e = rng.uniform(0.3, 1.2), rng.uniform(0.2, 1.33), rng.uniform(0.5, 0.99)
         phi, v = alpha * rng.uniform(0.05, 0.9), rng.normal(0.0, 0.5, 3)
 
@@ -288,8 +288,8 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
         assert 0.0 < used < e
         np.testing.assert_allclose(landing(used)[0], held, rtol=0.0, atol=1e-12)
         assert landing(used * (1.0 + 1e-9))[1] > 0.0
-    assert capped > 10
-    assert untouched > 1000
+    assert capped > 5
+    assert untouched > 300
 
 
 def test_the_energy_cap_leaves_an_elastic_impact_as_it_is():

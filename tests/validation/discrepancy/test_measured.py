@@ -180,6 +180,7 @@ def test_a_shift_in_time_is_found(delay, part):
     ] == pytest.approx([-delay, -delay, 0.0], abs=2e-3)
 
 
+@pytest.mark.slow
 def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     truth = swing().peak_rotation
     scales = 1.0 + 0.1 * np.random.default_rng(3).standard_normal((400, 4))

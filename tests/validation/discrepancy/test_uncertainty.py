@@ -152,6 +152,7 @@ def test_sobol_indices_agree_with_brute_force(written):
         assert shares[name] == pytest.approx(np.divide((first, total), np.var(found)), abs=0.06)
 
 
+@pytest.mark.slow
 def test_the_interval_of_the_share_that_falls_covers(uncertain):
     """Of few draws it holds what many say, and so does the interval of the draws' own peaks, as
     often as they should: some fall, and count as 1, so that only its lower end leaves draws out."""

@@ -64,6 +64,7 @@ def gathered(
     certainty=None,
     measure=None,
     bounds=(0.0, 0.05, 0.1),
+    capacities=(),
     **played,
 ):
     """The results of runs as they are, and of what else was `played`, by the plan's task groups."""
@@ -74,6 +75,7 @@ def gathered(
         draws=draws,
         measure=measure,
         gaps=[GapRange("left", bounds)],
+        capacities=capacities,
         models={"ebm-unilateral": {}, "cm": {}},
     )
     done = {
@@ -96,6 +98,8 @@ def gathered(
         done[plan.gap_tasks(done)["left"][case]] = search
     for case, search in played.get("factors", {}).items():
         done[plan.factors[case]] = search
+    for case, search in played.get("damage", {}).items():
+        done[plan.damage[case]] = search
     return Gathered(plan, done)
 
 

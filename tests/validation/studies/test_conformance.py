@@ -151,11 +151,16 @@ def test_the_engines_here_are_those_that_are_installed():
             {"RC-03", "RC-04", "RC-05", "RC-08", "RC-14", "RC-21", "RC-22", "RC-28"},
         ),
         *(
-            pytest.param(*row, marks=pytest.mark.needs(row[0]))
+            pytest.param(*row, marks=[pytest.mark.slow, pytest.mark.needs(row[0])])
             for row in (
                 ("pymunk", "best", 0, set()),
                 ("dart", "best", 0, {"RC-03"}),
                 ("box2d", "best", 0, {"RC-03", "RC-05", "RC-06", "RC-07", "RC-22", "RC-26"}),
+            )
+        ),
+        *(
+            pytest.param(*row, marks=pytest.mark.needs(row[0]))
+            for row in (
                 (
                     *("box2d", "default", 0),
                     {

@@ -354,7 +354,7 @@ def test_at_a_gap_where_no_wall_is_struck_there_is_no_speed():
 # At which intensity does it fall?
 
 PGA = measure_of("pga")
-SIZE = size_of(PGA, SCENE)
+SIZE = size_of(PGA, CERTAIN)
 
 
 def intensities_of(undecided=0, **searches):

@@ -107,6 +107,11 @@ class Gathered:
         return self._ended(self.plan.factors, results.FactorSearch)
 
     @cached_property
+    def damage(self) -> dict[str, results.DamageSearch]:
+        """By case, the search for the factors that exceed capacities."""
+        return self._ended(self.plan.damage, results.DamageSearch)
+
+    @cached_property
     def certainty(self) -> dict[str, results.Certainty]:
         """By case, how sure it is."""
         return self._ended(self.plan.certainty(self.done), results.Certainty)

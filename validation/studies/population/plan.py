@@ -19,6 +19,8 @@ from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
+from rockcheck.validation.studies.population.capacities import Capacity
+from rockcheck.validation.studies.population.damage_task import DamageTask
 from rockcheck.validation.studies.population.intensity_measures import Measure, size_of
 from rockcheck.validation.studies.population.levels import Levels
 from rockcheck.validation.studies.population.tasks import (
@@ -96,7 +98,8 @@ class Plan:
     their names; `recorded` where these are records. The first of `models`, with their settings,
     plays each case; the others are compared with it. `draws` numbers are drawn for each case. The
     walls of `gaps` are varied; `measure` sizes the motions, `levels` is a population over given
-    intensities. `left_out` says what of the records was not played.
+    intensities, and of `capacities` the intensities are found that exceed them. `left_out` says
+    what of the records was not played.
     """
 
     own: files.UncertainScene
@@ -107,6 +110,7 @@ class Plan:
     recorded: bool = False
     measure: Measure | None = None
     levels: Levels | None = None
+    capacities: Sequence[Capacity] = ()
     left_out: Sequence[str] = ()
 
     @property
@@ -245,6 +249,25 @@ class Plan:
         }
 
     @cached_property
+    def damage(self) -> dict[str, DamageTask]:
+        """By case whose base moves, the search for the factors that exceed capacities."""
+        if not self.capacities:
+            return {}
+        return {
+            case: DamageTask(
+                ("capacities", case),
+                search.scene,
+                self.batch_model,
+                self.batch_settings,
+                factors=factors_of(search.scene, search.scene.moving_acceleration),
+                both=search.both,
+                capacities=tuple(self.capacities),
+                **self._batch_effort(math.log(FACTOR_RANGE) / FACTOR_STEP),
+            )
+            for case, search in self.factors.items()
+        }
+
+    @cached_property
     def sensitivity(self) -> SensitivityTask | None:
         """Which uncertain number matters most, of a scene under its own motion."""
         if self.recorded or not self.draws or not self.own.independent:
@@ -267,6 +290,7 @@ class Plan:
             *self.drawn.values(),
             *(task for runs in self.free.values() for task in runs.values()),
             *self.factors.values(),
+            *self.damage.values(),
         ]
         if self.sensitivity is not None:
             tasks.append(self.sensitivity)
@@ -414,7 +438,8 @@ class Plan:
         """About how many runs there are, but for those of `levels`."""
         rows = 1.0 + max(map(len, self.numbers.values()), default=0)
         gaps = len(self.gaps) * (300.0 + COARSE_GAPS * rows)
-        factors = math.log(FACTOR_RANGE) / FACTOR_STEP if self.measure is not None else 0.0
+        searches = 1 + bool(self.capacities) if self.measure is not None else 0
+        factors = searches * math.log(FACTOR_RANGE) / FACTOR_STEP
         return len(self.cases) * (6.0 + rows + gaps + factors)
 
 
@@ -472,15 +497,18 @@ def gaps_looked_at(
     return tuple(looked.tolist()), tuple(np.unique(np.round(coarse, 12)).tolist())
 
 
-def factors_of(scene: Scene) -> tuple[float, ...]:
+def factors_of(scene: Scene, moving: float | None = None) -> tuple[float, ...]:
     """Factors on the base motion at which the scene as it is is looked at.
 
-    The first is where a block at rest begins to move, or a part of the motion as it is where it
-    moves without the base's horizontal acceleration.
+    The first is where a block at rest begins to move, that is to rock, or at an acceleration
+    `moving` (m/s^2) of the base; or a part of the motion as it is where it moves without the base's
+    horizontal acceleration.
     """
-    slopes = [pivot.arm / pivot.height for pivot in map(scene.block.pivot, results.SIDES)]
+    if moving is None:
+        slopes = [pivot.arm / pivot.height for pivot in map(scene.block.pivot, results.SIDES)]
+        moving = min(slopes) * scene.gravity
     motion = sampled(scene.excitation, scene.excitation.quiet_after)
-    moves = min(slopes) * scene.gravity / float(np.max(np.abs(motion.samples)))
+    moves = moving / float(np.max(np.abs(motion.samples)))
     begins_at_rest = not any(scene.initial_state[2:]) and scene.initial_height == 0.0
     first = moves if begins_at_rest and scene.vertical.kind == "rest" else 0.1 * min(moves, 1.0)
     count = math.ceil(math.log(FACTOR_RANGE) / FACTOR_STEP)

@@ -181,6 +181,18 @@ class FactorSearch(figures.Stored):
     runs: int
 
 
+class DamageSearch(figures.Stored):
+    """The search of a case over a factor on its motion, for several capacities.
+
+    `intervals` are those in which each capacity is exceeded, by its name.
+    """
+
+    kind: Literal["damage"] = "damage"
+    intervals: Mapping[str, tuple[FallInterval, ...]]
+    undecided: int
+    runs: int
+
+
 class Certainty(figures.Stored):
     """How sure a run is: its numerical uncertainty, and when it depends on the law of impacts.
 
@@ -208,7 +220,7 @@ class Peaks(figures.Stored):
     peaks: tuple[float, ...]
 
 
-Result = Shown | Drawn | GapSearch | FactorSearch | Certainty | Sensitivities | Peaks
+Result = Shown | Drawn | GapSearch | FactorSearch | DamageSearch | Certainty | Sensitivities | Peaks
 
 
 def counts_of(outcome: Any) -> dict[str, int]:

@@ -318,20 +318,38 @@ class IntensityAnswer:
 
 def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
     """The search over the factor on each motion; None where no motion was scaled."""
+    plan = gathered.plan
+    return least_intensities(
+        gathered,
+        {case: search.intervals for case, search in gathered.factors.items()},
+        {case: plan.factors[case].factors[-1] for case in gathered.factors},
+        sum(search.undecided for search in gathered.factors.values()),
+    )
+
+
+def least_intensities(
+    gathered: Gathered,
+    intervals: Mapping[str, Sequence[results.FallInterval]],
+    most: Mapping[str, float],
+    undecided: int,
+) -> IntensityAnswer | None:
+    """The intensities of each motion in the `intervals` of its factor, which went up to `most`.
+
+    None where no motion was scaled.
+    """
     measure = gathered.plan.measure
-    if measure is None or not gathered.factors:
+    if measure is None or not intervals:
         return None
     records = []
-    for case, search in gathered.factors.items():
+    for case, falls in intervals.items():
         size = size_of(measure, gathered.plan.cases[case])
-        falls = search.intervals
         islands = [fall for fall in falls if fall.stands_above is not None]
         records.append(
             RecordIntensity(
                 case=case,
                 as_it_is=size,
                 least=size * falls[0].low if falls else None,
-                beyond=size * gathered.plan.factors[case].factors[-1],
+                beyond=size * most[case],
                 islands=tuple((size * fall.low, size * fall.high) for fall in islands),
             )
         )
@@ -343,5 +361,5 @@ def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
         unit=measure.unit,
         records=tuple(records),
         fit=fit_least(least, beyond),
-        undecided=sum(search.undecided for search in gathered.factors.values()),
+        undecided=undecided,
     )

@@ -14,6 +14,9 @@ from rockcheck.validation.studies.population import (
     blocks,
     certainty,
     certainty_blocks,
+    damage,
+    damage_blocks,
+    damage_files,
     data,
     level_blocks,
     results,
@@ -24,6 +27,7 @@ from rockcheck.validation.studies.population import (
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.plan import Plan
 from rockcheck.validation.study import Study, Task
+from rockcheck.version import __version__
 
 #: The questions, in the order in which they are answered.
 FALL, MOVE, GAP, INTENSITY, SURE, HAND = (
@@ -63,6 +67,7 @@ def finding_of(gathered: Gathered) -> Finding:
     uncertainty = certainty.uncertainty_answer(gathered)
     events = [criterion.event for criterion in CRITERIA]
     scores = certainty.method_scores(gathered, [(one.name, one.event) for one in CRITERIA])
+    damages = damage.damage_answers(gathered)
     curves = plan.levels.curves(gathered.done) if plan.levels else []
 
     answers = {
@@ -73,6 +78,7 @@ def finding_of(gathered: Gathered) -> Finding:
         SURE: sentences.certainty_sentences(gathered, uncertainty),
         HAND: sentences.method_sentences(scores, events),
     }
+    answers[INTENSITY] += damage_blocks.damage_sentences(damages)
     if plan.levels:
         answers[INTENSITY].append(level_blocks.sentence_of(plan.levels, curves))
     page: list[Block] = [
@@ -84,6 +90,7 @@ def finding_of(gathered: Gathered) -> Finding:
         *blocks.strip_plot(quantities),
         *(block for answer in gaps for block in search_blocks.gap_blocks(answer, scene)),
         *search_blocks.intensity_blocks(intensity),
+        *damage_blocks.damage_blocks(damages),
     ]
     if plan.levels:
         page += level_blocks.blocks_of(plan.levels, curves, gathered.done)
@@ -112,6 +119,7 @@ def finding_of(gathered: Gathered) -> Finding:
             **data.quantity_data(quantities),
             **data.gap_data(gaps),
             **data.intensity_data(intensity),
+            **damage_blocks.damage_data(damages),
             **data.certainty_data(gathered, uncertainty),
             **data.method_data(scores),
             "left_out": list(plan.left_out),
@@ -122,7 +130,8 @@ def finding_of(gathered: Gathered) -> Finding:
             blocks.file_of(case): shown.history
             for case, shown in gathered.shown.items()
             if shown.history
-        },
+        }
+        | damage_files.pelicun_files(damages, scene, plan.batch_model, __version__),
     )
 
 

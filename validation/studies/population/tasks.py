@@ -180,7 +180,7 @@ class GapTask(DrawTask):
 
     def play(self) -> results.GapSearch:
         """The look, the bisection, and the table."""
-        counter = _Counter()
+        counter = Counter()
 
         def stands(which: NDArray[np.int64], gaps: Floats) -> NDArray[np.bool_]:
             return self._at(which, gaps, counter).stands
@@ -195,7 +195,7 @@ class GapTask(DrawTask):
         )
         if self.draws:
             seen = look.stands.reshape(len(counted), -1)
-            intervals += _narrowed(stands, counted, seen, grid, GAP_RESOLUTION)
+            intervals += narrowed(stands, counted, seen, grid, GAP_RESOLUTION)
         return results.GapSearch(
             intervals=tuple(intervals),
             rows=self._rows_of(look, grid),
@@ -207,7 +207,7 @@ class GapTask(DrawTask):
         self,
         which: NDArray[np.int64],
         gaps: Floats,
-        counter: "_Counter",
+        counter: "Counter",
         *,
         speeds: bool = False,
     ) -> "_AtGaps":
@@ -273,7 +273,7 @@ class FactorTask(DrawTask):
 
     def play(self) -> results.FactorSearch:
         """The look and the bisection, of the scene as it is."""
-        counter = _Counter()
+        counter = Counter()
 
         def stands(which: NDArray[np.int64], factor: Floats) -> NDArray[np.bool_]:
             upward = factor if self.both else 1.0
@@ -312,7 +312,7 @@ class PeaksTask(DrawTask):
 OVERTURNED = (fates.OVERTURNED_LEFT, fates.OVERTURNED_RIGHT)
 
 
-class _Counter:
+class Counter:
     """Counts the runs of a search, and those that nothing decided."""
 
     def __init__(self) -> None:
@@ -330,10 +330,10 @@ def _searched(
 ) -> list[results.FallInterval]:
     """The intervals of these runs in which they do not stand."""
     seen = stands(np.repeat(runs, len(grid)), np.tile(grid, len(runs))).reshape(len(runs), -1)
-    return _narrowed(stands, runs, seen, grid, resolution)
+    return narrowed(stands, runs, seen, grid, resolution)
 
 
-def _narrowed(
+def narrowed(
     stands: search.Stands,
     runs: NDArray[np.int64],
     seen: NDArray[np.bool_],

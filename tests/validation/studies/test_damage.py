@@ -1,0 +1,291 @@
+"""Capacities: what exceeds them, the least intensities, and the files that loss software reads."""
+
+import csv
+import io
+import json
+import math
+
+import numpy as np
+import pytest
+
+from rockcheck import EventBasedModel
+from rockcheck.ebm import fates
+from rockcheck.scenes import PAPER_BLOCK, Floor, InputError, Ricker, Scene
+from rockcheck.validation.finding import Table
+from rockcheck.validation.studies.population import damage, damage_blocks, damage_files, results
+from rockcheck.validation.studies.population.capacities import (
+    Capacity,
+    capacities_of,
+    capacity_of,
+)
+from rockcheck.validation.studies.population.damage_task import DamageTask
+from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
+from rockcheck.validation.studies.population.plan import factors_of
+from tests.validation.made_up.assessed import CERTAIN, RUNS, gathered, interval
+
+SLIP, FALL = Capacity("slip", 0.05), Capacity("overturns")
+PGA = measure_of("pga")
+SIZE = size_of(PGA, CERTAIN)
+
+
+@pytest.mark.parametrize(
+    ("word", "capacity"),
+    [
+        ("slip:0.05", SLIP),
+        ("top:0.1", Capacity("top", 0.1)),
+        ("wall_speed:1.0", Capacity("wall_speed", 1.0)),
+        ("rotation:0.5", Capacity("rotation", 0.5)),
+        ("0.5", Capacity("rotation", 0.5)),
+        ("overturns", FALL),
+    ],
+)
+def test_a_word_names_a_capacity(word, capacity):
+    assert capacity_of(word) == capacity
+
+
+def test_a_capacity_is_asked_for_once():
+    assert capacities_of(["slip:0.05", "overturns", "slip:0.050"]) == (SLIP, FALL)
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("slip", "give the slip in m, above 0, as in slip:0.05"),
+        ("slip:50mm", "'slip:50mm' is not allowed: give the slip in m"),
+        ("slip:0", "above 0"),
+        ("slip:-1", "above 0"),
+        ("slip:nan", "above 0"),
+        ("slip:inf", "above 0"),
+        ("rotation:1.5", "at most 1"),
+        ("slipp:0.05", "slip:VALUE"),
+        ("overturns:1", "unknown capacity 'overturns:1'"),
+        ("", "unknown capacity"),
+    ],
+)
+def test_what_is_no_capacity_is_refused(word, said):
+    with pytest.raises(InputError, match=r"^--capacity") as refused:
+        capacity_of(word)
+    assert said in str(refused.value)
+
+
+def test_thirteen_capacities_are_too_many():
+    with pytest.raises(InputError, match="13 is too many"):
+        capacities_of([f"slip:{0.01 * number:g}" for number in range(1, 14)])
+
+
+@pytest.mark.parametrize(
+    ("capacity", "exceeds"),
+    [
+        (SLIP, [False, True, True, True]),
+        (Capacity("top", 0.2), [True, False, True, True]),
+        (Capacity("wall_speed", 0.5), [False, True, True, True]),
+        (Capacity("wall_speed", 0.7), [False, False, True, True]),
+        (Capacity("rotation", 0.5), [True, False, True, True]),
+        (FALL, [False, False, True, True]),
+    ],
+    ids=lambda given: given.name if isinstance(given, Capacity) else "",
+)
+def test_what_exceeds_a_capacity(capacity, exceeds):
+    """Runs that stand by their extremes; one that overturns, or that nothing decides, always."""
+    nothing = np.zeros(4)
+    played = fates.Fates(
+        outcome=np.array([fates.AT_REST, fates.MOVING, fates.OVERTURNED_LEFT, fates.UNDECIDED]),
+        time_s=nothing,
+        peak=np.array([0.3, 0.1, 0.0, 0.0]),
+        extremes={
+            "slip": np.array([0.05, 0.06, 0.0, 0.0]),
+            "top_displacement": np.array([0.3, 0.1, 0.0, 0.0]),
+            "wall_left_strikes": np.array([math.nan, 2.0, 0.0, 0.0]),
+            "wall_left_speed": np.array([math.nan, 0.6, 9.0, 9.0]),
+            "wall_right_strikes": np.array([0.0, 1.0, 0.0, 0.0]),
+            "wall_right_speed": np.array([9.0, 0.4, 9.0, 9.0]),
+        },
+    )
+    assert capacity.exceeded(played, 0.5).tolist() == exceeds
+
+
+def sliding_scene(**change):
+    given = {
+        "name": "slides and rocks",
+        "block": PAPER_BLOCK,
+        "floor": Floor(friction=0.4),
+        "excitation": Ricker(amplitude=4.0, period=0.8),
+        "duration": 20.0,
+        "output_step": 0.05,
+    }
+    return Scene(**(given | change))
+
+
+def exceeds(scene, capacity):
+    """Whether a run of a scene exceeds a capacity, by its history alone."""
+    played = EventBasedModel(pivot="unilateral").simulate(scene)
+    values = {
+        "slip": played.extremes.slip,
+        "top": played.extremes.top_displacement,
+        "rotation": played.extremes.peak_rotation / scene.block.alpha,
+    }
+    return played.outcome.startswith("overturned") or values[capacity.quantity] > capacity.value
+
+
+def test_the_search_ends_between_a_run_that_bears_it_and_one_that_does_not():
+    scene = sliding_scene()
+    capacities = (Capacity("slip", 0.01), Capacity("top", 0.1), Capacity("rotation", 0.2))
+    task = DamageTask(
+        ("capacities", "own"),
+        scene,
+        "ebm-unilateral",
+        factors=factors_of(scene, scene.moving_acceleration),
+        capacities=capacities,
+    )
+    found = task.play()
+    for capacity in capacities:
+        first = found.intervals[capacity.name][0]
+        below, above = (
+            scene.replace(excitation=scene.excitation.scaled(factor))
+            for factor in (first.stands_below, first.low)
+        )
+        assert not exceeds(below, capacity), capacity.name
+        assert exceeds(above, capacity), capacity.name
+        assert first.low / first.stands_below - 1.0 <= 2.6e-3
+
+
+def answers_of(capacities=(SLIP,), **searches):
+    """Answers for the intervals of a capacity, by case; of one that is not named: none."""
+    found = {
+        case: results.DamageSearch(
+            intervals={
+                capacity.name: tuple(intervals if capacity == capacities[0] else ())
+                for capacity in capacities
+            },
+            undecided=0,
+            runs=9,
+        )
+        for case, intervals in searches.items()
+    }
+    runs = dict.fromkeys(searches, RUNS["a"])
+    everything = gathered(runs, measure=PGA, capacities=capacities, damage=found)
+    return damage.damage_answers(everything)
+
+
+def from_factor(factor):
+    return [interval(0, factor, 40.0, 0.99 * factor, None)]
+
+
+def test_the_curve_is_of_the_least_intensities_that_exceed():
+    (answer,) = answers_of(a=from_factor(1.0), b=from_factor(4.0))
+    assert answer.intensity.fit.median == pytest.approx(2.0 * SIZE)
+    assert answer.intensity.fit.dispersion == pytest.approx(math.log(2.0))
+    assert answer.exceeded_by == 2
+
+
+def test_motions_that_exceed_it_and_then_do_not_are_counted():
+    (answer,) = answers_of(a=[interval(0, 1.0, 1.1, 0.99, 1.11)], b=from_factor(2.0))
+    assert answer.islands == 1
+
+
+def test_a_capacity_that_nothing_exceeds_has_no_curve():
+    _, answer = answers_of((SLIP, FALL), a=from_factor(1.0), b=from_factor(2.0))
+    assert answer.capacity == FALL
+    assert answer.intensity.fit is None
+    assert answer.exceeded_by == 0
+    assert "Overturns: not up to PGA" in damage_blocks.damage_sentences([answer])[0]
+
+
+def test_without_capacities_there_is_no_answer():
+    assert damage.damage_answers(gathered(measure=PGA)) == []
+    assert damage_blocks.damage_blocks([]) == []
+
+
+def test_lognormal_values_are_not_told_from_a_lognormal():
+    quantiles = (np.arange(20) + 0.5) / 20.0
+    from scipy.special import ndtri
+
+    assert damage.likely_lognormal(np.exp(0.4 * ndtri(quantiles)).tolist()) > 0.9
+
+
+def test_two_clusters_are_not_lognormal():
+    values = [*np.linspace(1.0, 1.1, 10), *np.linspace(9.0, 10.0, 10)]
+    assert damage.likely_lognormal(values) < 0.01
+
+
+@pytest.mark.parametrize(
+    "values", [[1.0, 2.0, 3.0, 4.0], [1.0, 2.0, 3.0, 4.0, None], [2.0] * 5], ids=str
+)
+def test_what_cannot_be_tested_is_not(values):
+    assert damage.likely_lognormal(values) is None
+
+
+def curve_table(answers):
+    blocks = damage_blocks.damage_blocks(answers)
+    return next(block for block in blocks if isinstance(block, Table))
+
+
+def test_the_table_says_what_speaks_against_a_lognormal_curve():
+    clusters = {f"m{k}": from_factor(factor) for k, factor in enumerate([1.0] * 9 + [1.01, 30.0])}
+    clusters["m0"] = [interval(0, 1.0, 1.1, 0.99, 1.11)]
+    table = curve_table(answers_of(**clusters))
+    assert table.records()[0]["remark"] == (
+        "not lognormal; the curve counts the least intensity of each motion"
+    )
+
+
+def test_few_motions_are_said_to_be_too_few_to_test():
+    table = curve_table(answers_of(a=from_factor(1.0), b=from_factor(4.0)))
+    assert table.records()[0]["remark"] == "too few motions to test"
+
+
+# Files
+
+
+def library(measure="pga"):
+    """Pelicun's files of two curves."""
+    found = {
+        case: results.DamageSearch(
+            intervals={SLIP.name: from_factor(factor), FALL.name: from_factor(3.0 * factor)},
+            undecided=0,
+            runs=9,
+        )
+        for case, factor in {"a": 1.0, "b": 4.0}.items()
+    }
+    runs = dict.fromkeys(found, RUNS["a"])
+    everything = gathered(runs, measure=measure_of(measure), capacities=(SLIP, FALL), damage=found)
+    answers = damage.damage_answers(everything)
+    return damage_files.pelicun_files(answers, CERTAIN.scene, "ebm-unilateral", "1.2.3"), answers
+
+
+def test_a_component_has_the_median_and_the_dispersion_of_its_curve():
+    files, answers = library()
+    rows = list(csv.DictReader(io.StringIO(files["fragility_pelicun.csv"])))
+    assert [row["ID"] for row in rows] == ["rockcheck.slip.0_05", "rockcheck.overturns"]
+    for row, answer in zip(rows, answers, strict=True):
+        assert float(row["LS1-Theta_0"]) == answer.intensity.fit.median
+        assert float(row["LS1-Theta_1"]) == answer.intensity.fit.dispersion
+        assert row["LS1-Family"] == "lognormal"
+        assert row["Demand-Type"] == "Peak Ground Acceleration"
+        assert row["Demand-Unit"] == "g"
+
+
+@pytest.mark.parametrize(
+    ("measure", "demand"),
+    [
+        ("pfa", "Peak Floor Acceleration"),
+        ("pgv", "Peak Ground Velocity"),
+        ("sa:0.5", "Spectral Acceleration|0.5"),
+    ],
+)
+def test_a_measure_has_the_library_s_name(measure, demand):
+    files, _ = library(measure)
+    rows = list(csv.DictReader(io.StringIO(files["fragility_pelicun.csv"])))
+    assert rows[0]["Demand-Type"] == demand
+
+
+def test_a_ratio_has_no_name_in_the_library():
+    assert library("pga-ratio")[0] == {}
+
+
+def test_the_library_says_what_made_it():
+    described = json.loads(library()[0]["fragility_pelicun.json"])
+    assert described["_GeneralInformation"]["Version"] == "1.2.3"
+    assert "ebm-unilateral" in described["_GeneralInformation"]["Description"]
+    limit = described["rockcheck.slip.0_05"]["LimitStates"]["LS1"]["DS1"]["Description"]
+    assert limit == "slip above 0.05 m"
