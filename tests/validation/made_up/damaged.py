@@ -1,0 +1,48 @@
+"""Intensities that exceed capacities, made up: their answers, and the files of their curves."""
+
+from rockcheck.validation.studies.population import damage, damage_files, results
+from rockcheck.validation.studies.population.capacities import Capacity
+from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
+from tests.validation.made_up.assessed import CERTAIN, RUNS, gathered, interval
+
+SLIP, FALL = Capacity("slip", 0.05), Capacity("overturns")
+PGA = measure_of("pga")
+SIZE = size_of(PGA, CERTAIN)
+
+
+def answers_of(capacities=(SLIP,), **searches):
+    """Answers for the intervals of a capacity, by case; of one that is not named: none."""
+    found = {
+        case: results.DamageSearch(
+            intervals={
+                capacity.name: tuple(intervals if capacity == capacities[0] else ())
+                for capacity in capacities
+            },
+            undecided=0,
+            runs=9,
+        )
+        for case, intervals in searches.items()
+    }
+    runs = dict.fromkeys(searches, RUNS["a"])
+    everything = gathered(runs, measure=PGA, capacities=capacities, damage=found)
+    return damage.damage_answers(everything)
+
+
+def from_factor(factor):
+    return [interval(0, factor, 40.0, 0.99 * factor, None)]
+
+
+def library(measure="pga"):
+    """Pelicun's files of two curves."""
+    found = {
+        case: results.DamageSearch(
+            intervals={SLIP.name: from_factor(factor), FALL.name: from_factor(3.0 * factor)},
+            undecided=0,
+            runs=9,
+        )
+        for case, factor in {"a": 1.0, "b": 4.0}.items()
+    }
+    runs = dict.fromkeys(found, RUNS["a"])
+    everything = gathered(runs, measure=measure_of(measure), capacities=(SLIP, FALL), damage=found)
+    answers = damage.damage_answers(everything)
+    return damage_files.pelicun_files(answers, CERTAIN.scene, "ebm-unilateral", "1.2.3"), answers
