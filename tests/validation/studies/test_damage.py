@@ -12,8 +12,8 @@ from rockcheck import EventBasedModel
 from rockcheck.ebm import fates
 from rockcheck.scenes import PAPER_BLOCK, Block, Floor, InputError, Record, Ricker, Scene, files
 from rockcheck.scenes.buildings import Regular
-from rockcheck.validation.finding import Table
-from rockcheck.validation.studies.population import damage, damage_blocks
+from rockcheck.validation.finding import Plot, Table
+from rockcheck.validation.studies.population import damage, damage_blocks, damage_files
 from rockcheck.validation.studies.population.capacities import (
     Capacity,
     capacities_of,
@@ -23,7 +23,7 @@ from rockcheck.validation.studies.population.damage_task import DamageTask
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensity_measures import size_of
 from rockcheck.validation.studies.population.plan import Plan, factors_of
-from tests.validation.made_up.assessed import gathered, interval
+from tests.validation.made_up.assessed import CERTAIN, gathered, interval
 from tests.validation.made_up.damaged import (
     FALL,
     PGA,
@@ -102,7 +102,7 @@ def test_what_exceeds_a_capacity(capacity, exceeds):
         extremes={
             "slip": np.array([0.05, 0.06, 0.0, 0.0]),
             "top_displacement": np.array([0.3, 0.1, 0.0, 0.0]),
-            "wall_left_strikes": np.array([math.nan, 2.0, 0.0, 0.0]),
+            "wall_left_strikes": np.array([math.nan, 1.0, 0.0, 0.0]),
             "wall_left_speed": np.array([math.nan, 0.6, 9.0, 9.0]),
             "wall_right_strikes": np.array([0.0, 1.0, 0.0, 0.0]),
             "wall_right_speed": np.array([9.0, 0.4, 9.0, 9.0]),
@@ -136,26 +136,55 @@ def exceeds(scene, capacity):
     return values[capacity.quantity] > capacity.value
 
 
-def test_the_search_ends_between_a_run_that_bears_it_and_one_that_does_not():
-    scene = sliding_scene()
-    capacities = (Capacity("slip", 0.01), Capacity("top", 0.1), Capacity("rotation", 0.2))
+SEARCHED = (Capacity("slip", 0.01), Capacity("top", 0.1), Capacity("rotation", 0.2))
+
+
+def searched(scene, capacities=SEARCHED, *, both=False):
+    """The search of a scene as it is, and its factors."""
     task = DamageTask(
         ("capacities", "own"),
         scene,
         "ebm-unilateral",
         factors=factors_of(scene, scene.moving_acceleration),
+        both=both,
         capacities=capacities,
     )
-    found = task.play()
-    for capacity in capacities:
-        first = found.intervals[capacity.name][0]
-        below, above = (
-            scene.replace(excitation=scene.excitation.scaled(factor))
-            for factor in (first.stands_below, first.low)
-        )
-        assert not exceeds(below, capacity), capacity.name
-        assert exceeds(above, capacity), capacity.name
-        assert first.low / first.stands_below - 1.0 <= 2.6e-3
+    return task.play(), task.factors
+
+
+@pytest.fixture(scope="module")
+def pulse_search():
+    return searched(sliding_scene())
+
+
+@pytest.mark.parametrize("capacity", SEARCHED, ids=lambda capacity: capacity.name)
+def test_the_search_ends_between_a_run_that_bears_it_and_one_that_does_not(pulse_search, capacity):
+    scene, first = sliding_scene(), pulse_search[0].intervals[capacity.name][0]
+    below, above = (
+        scene.replace(excitation=scene.excitation.scaled(factor))
+        for factor in (first.stands_below, first.low)
+    )
+    assert not exceeds(below, capacity)
+    assert exceeds(above, capacity)
+    assert first.low - first.stands_below <= 2.5e-3 * first.stands_below
+    assert first.draw == 0
+
+
+def test_each_change_is_halved_three_times_after_a_look_of_one_percent(pulse_search):
+    search, factors = pulse_search
+    assert [len(found) for found in search.intervals.values()] == [1, 1, 1]
+    assert search.runs == len(factors) + 3 * 3
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_a_vertical_motion_is_scaled_with_a_record_that_has_it(both):
+    scene = sliding_scene(vertical=Ricker(amplitude=3.0, period=0.6))
+    top = Capacity("top", 0.1)
+    first = searched(scene, (top,), both=both)[0].intervals[top.name][0]
+    for factor, exceeded in ((first.stands_below, False), (first.low, True)):
+        upward = scene.vertical.scaled(factor if both else 1.0)
+        moved = scene.replace(excitation=scene.excitation.scaled(factor), vertical=upward)
+        assert exceeds(moved, top) == exceeded
 
 
 def test_the_curve_is_of_the_least_intensities_that_exceed():
@@ -175,6 +204,8 @@ def test_a_capacity_that_nothing_exceeds_has_no_curve():
     assert answer.capacity == FALL
     assert answer.intensity.fit is None
     assert answer.exceeded_by == 0
+    most = SIZE * factors_of(CERTAIN.scene, CERTAIN.scene.moving_acceleration)[-1]
+    assert answer.intensity.records[0].beyond == pytest.approx(most)
     assert "Overturns: not up to PGA" in damage_blocks.damage_sentences([answer])[0]
 
 
@@ -188,6 +219,10 @@ def test_lognormal_values_are_not_told_from_a_lognormal():
     from scipy.special import ndtri
 
     assert damage.likely_lognormal(np.exp(0.4 * ndtri(quantiles)).tolist()) > 0.9
+
+
+def test_five_values_are_enough_to_test():
+    assert damage.likely_lognormal([1.0, 1.3, 1.6, 2.0, 2.5]) > 0.5
 
 
 def test_two_clusters_are_not_lognormal():
@@ -214,6 +249,80 @@ def test_the_table_says_what_speaks_against_a_lognormal_curve():
     assert table.records()[0]["remark"] == (
         "not lognormal; the curve counts the least intensity of each motion"
     )
+
+
+def test_five_motions_are_not_said_to_be_too_few():
+    motions = {f"m{k}": from_factor(factor) for k, factor in enumerate([1.0, 1.3, 1.6, 2.0, 2.5])}
+    assert curve_table(answers_of(**motions)).records()[0]["remark"] == ""
+
+
+def test_the_table_has_the_numbers_of_the_curve():
+    answers = answers_of((SLIP, FALL), a=from_factor(1.0), b=from_factor(4.0))
+    fit = answers[0].intensity.fit
+    slip, fall = curve_table(answers).records()
+    assert [slip[name] for name in ("median", "low", "high", "dispersion")] == [
+        fit.median,
+        fit.low,
+        fit.high,
+        fit.dispersion,
+    ]
+    assert [slip[name] for name in ("exceeded_by", "motions", "islands")] == [2, 2, 0]
+    assert [fall[name] for name in ("median", "low", "high", "dispersion")] == [None] * 4
+
+
+def test_a_row_of_a_motion_has_its_least_intensities():
+    answers = answers_of((SLIP, FALL), a=from_factor(1.0), b=from_factor(4.0))
+    blocks = damage_blocks.damage_blocks(answers)
+    table = next(block for block in blocks if block.name == "damage")
+    assert [column.digits for column in table.columns[2:]] == [4, 4]
+    assert table.records()[1] == {
+        "record": "b",
+        "as_it_is": SIZE,
+        "slip:0.05": pytest.approx(4.0 * SIZE),
+        "overturns": None,
+    }
+
+
+def plots(answers):
+    return [block for block in damage_blocks.damage_blocks(answers) if isinstance(block, Plot)]
+
+
+def test_curves_are_drawn_over_two_and_a_half_dispersions():
+    answers = answers_of((SLIP, FALL), a=from_factor(1.0), b=from_factor(4.0))
+    fit = answers[0].intensity.fit
+    (plot,) = plots(answers)
+    (series,) = plot.panels[0].series
+    reach = math.exp(2.5 * fit.dispersion)
+    assert series.label == "slip above 0.05 m"
+    assert series.x[0] == pytest.approx(fit.median / reach)
+    assert series.x[-1] == pytest.approx(fit.median * reach)
+    assert np.interp(fit.median, series.x, series.y) == pytest.approx(0.5, abs=1e-3)
+    assert plot.y.limits == (0.0, 1.0)
+
+
+def test_a_curve_that_is_a_step_is_not_drawn():
+    assert plots(answers_of(a=from_factor(2.0), b=from_factor(2.0))) == []
+
+
+def test_programs_get_the_numbers_or_none():
+    answers = answers_of((SLIP, FALL), a=from_factor(1.0), b=from_factor(4.0))
+    slip, fall = damage_blocks.damage_data(answers)["fragility"]
+    fit = answers[0].intensity.fit
+    numbers = ("median", "dispersion", "low", "high")
+    assert [slip[name] for name in numbers] == [fit.median, fit.dispersion, fit.low, fit.high]
+    assert [fall[name] for name in numbers] == [None] * 4
+    assert slip["capacity"] == "slip:0.05"
+
+
+def test_a_few_motions_have_a_sentence_each_way():
+    one = answers_of(a=from_factor(2.0))
+    two = answers_of(a=from_factor(1.0), b=from_factor(4.0))
+    assert damage_blocks.damage_sentences(one) == [
+        f"Slip above 0.05 m: from PGA {2.0 * SIZE:.3g} g."
+    ]
+    assert damage_blocks.damage_sentences(two) == [
+        f"Slip above 0.05 m: median PGA {2.0 * SIZE:.3g} g, dispersion 0.69."
+    ]
 
 
 def test_few_motions_are_said_to_be_too_few_to_test():
@@ -250,12 +359,20 @@ def test_a_measure_has_the_library_s_name(measure, demand):
     assert rows[0]["Demand-Type"] == demand
 
 
+def test_one_curve_is_a_library_too():
+    _, answers = library()
+    files = damage_files.pelicun_files(answers[:1], CERTAIN.scene, "ebm-unilateral", "1.2.3")
+    assert len(files["fragility_pelicun.csv"].splitlines()) == 2
+
+
 def test_a_ratio_has_no_name_in_the_library():
     assert library("pga-ratio")[0] == {}
 
 
 def test_the_library_says_what_made_it():
-    described = json.loads(library()[0]["fragility_pelicun.json"])
+    text = library()[0]["fragility_pelicun.json"]
+    described = json.loads(text)
+    assert text == json.dumps(described, indent=2, ensure_ascii=False) + "\n"
     assert described["_GeneralInformation"]["Version"] == "1.2.3"
     assert "ebm-unilateral" in described["_GeneralInformation"]["Description"]
     limit = described["rockcheck.slip.0_05"]["LimitStates"]["LS1"]["DS1"]["Description"]
