@@ -147,7 +147,7 @@ def assess(
         draws=draws_of(varied.samples, cases, recorded=bool(records)),
         recorded=bool(records),
         measure=measure,
-        capacities=searched_capacities(varied, given.scene, measure),
+        capacities=searched_capacities(varied, given.scene, measure, recorded=bool(records)),
         left_out=left_out,
     )
     if has_bounds(varied.levels, measure):
@@ -161,17 +161,17 @@ def assess(
 
 
 def searched_capacities(
-    varied: Varied, scene: Scene, measure: intensity_measures.Measure
+    varied: Varied, scene: Scene, measure: intensity_measures.Measure, *, recorded: bool
 ) -> tuple[Capacity, ...]:
     """The capacities of `--capacity` whose least intensities are searched. Raises `InputError`.
 
-    With bounds in `--levels` rotations are read off its runs in place of a search.
+    With records and bounds in `--levels` rotations are read off its runs in place of a search.
     """
     asked = capacities_of(varied.capacity or ())
     for capacity in asked:
         if capacity.quantity == "wall_speed" and not scene.walls:
             raise InputError(f"{capacity.name}: the scene has no wall", "--capacity")
-    if has_bounds(varied.levels, measure):
+    if recorded and has_bounds(varied.levels, measure):
         return tuple(capacity for capacity in asked if capacity.quantity != "rotation")
     return asked
 

@@ -112,10 +112,8 @@ def test_an_option_without_its_value_says_what_it_is_for(words, said, refuses):
         ("validate scene.toml --history r", "--history: scene.toml is a scene, and"),
         ("validate scene.toml --read unit=g", "--read: needs records"),
         ("validate paper --quick", "--quick"),
-        *(
-            (f"assess bookcase {more} --capacity 0.5", "--capacity: needs records and --levels")
-            for more in ("one.AT2", "--levels 1:2:3", "")
-        ),
+        ("assess fig4a --capacity wall_speed:1", "--capacity: wall_speed:1: the scene has no wall"),
+        ("assess fig4a --capacity slip:5mm", "--capacity: 'slip:5mm' is not allowed"),
     ],
 )
 def test_an_option_is_refused_where_it_means_nothing(words, said, refuses):

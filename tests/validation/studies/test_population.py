@@ -437,6 +437,24 @@ def test_the_command_writes_curves_tables_and_page(records, tmp_path, told):
     }
 
 
+def test_capacities_have_curves_tables_and_a_library(records, tmp_path, told):
+    answer = told(
+        *("assess", "rack.toml", "records/H*.csv", "--levels", "pfa"),
+        *("--capacity", "top:0.1", "--capacity", "overturns"),
+    )
+    top, overturns = answer["fragility"]
+    assert top["capacity"] == "top:0.1"
+    assert top["measure"] == "pfa"
+    assert overturns["median"] == pytest.approx(answer["intensity"]["median"], rel=5e-3)
+    folder = tmp_path / "rockcheck-report" / "assess"
+    library = (folder / "fragility_pelicun.csv").read_text("utf-8").splitlines()
+    assert [line.partition(",")[0] for line in library[1:]] == [
+        "rockcheck.top.0_1",
+        "rockcheck.overturns",
+    ]
+    assert "top displacement above 0.1 m" in (folder / "index.html").read_text("utf-8")
+
+
 @pytest.mark.parametrize("model", ["ebm-unilateral", "ebm"])
 def test_without_records_pulses_of_the_scenes_kind_tell_the_probability(records, told, model):
     scene = load_scene(told("new", "pulse.toml")["file"])

@@ -70,7 +70,7 @@ def _curve_table(answers: Sequence[DamageAnswer]) -> Table:
             ]
         )
     return Table(
-        "fragility",
+        "capacities",
         columns,
         rows,
         "At which intensity a capacity is exceeded",
@@ -139,7 +139,7 @@ def _curve_plot(answers: Sequence[DamageAnswer]) -> list[Block]:
     head = f"{intensity.label}, {intensity.unit}" if intensity.unit else intensity.label
     return [
         Plot(
-            "fragility",
+            "capacities",
             "Probability that a capacity is exceeded",
             panels=[Panel("", series)],
             x=Axis(head, log=True),
