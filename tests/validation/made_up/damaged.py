@@ -1,9 +1,10 @@
 """Intensities that exceed capacities, made up: their answers, and the files of their curves."""
 
+from assessed import CERTAIN, RUNS, gathered, interval
+
 from rockcheck.validation.studies.population import damage, damage_files, results
 from rockcheck.validation.studies.population.capacities import Capacity
 from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
-from tests.validation.made_up.assessed import CERTAIN, RUNS, gathered, interval
 
 SLIP, FALL = Capacity("slip", 0.05), Capacity("overturns")
 PGA = measure_of("pga")

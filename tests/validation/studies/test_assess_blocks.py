@@ -4,8 +4,10 @@ import math
 from dataclasses import replace
 
 import pytest
-from assessed import FREE, RUNS, SCENE, UNCERTAIN, gathered, interval, judged, ran, search
+from assessed import CERTAIN, FREE, RUNS, SCENE, UNCERTAIN, gathered, interval, judged, ran, search
 
+from rockcheck.scenes import files
+from rockcheck.scenes.buildings import Regular
 from rockcheck.validation.finding import Mark, plain
 from rockcheck.validation.studies.population import (
     blocks,
@@ -54,6 +56,16 @@ def test_without_a_wall_there_is_none():
 
 def test_recorded_motions_are_counted():
     assert fact("base", everything=gathered()) == "3 recorded motions, listed below"
+
+
+def test_a_building_is_told():
+    building = Regular(storeys=8, storey=5, period=0.8, damping=0.05)
+    given = gathered(given=files.on_storey(CERTAIN, building))
+    assert fact("building", everything=given) == ("on storey 5 of 8, period 0.8 s, damping 0.05")
+
+
+def test_a_block_on_the_ground_has_no_building():
+    assert fact("building") is None
 
 
 # Outcomes and quantities

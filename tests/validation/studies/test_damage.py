@@ -7,6 +7,16 @@ import math
 
 import numpy as np
 import pytest
+from assessed import CERTAIN, gathered, interval
+from damaged import (
+    FALL,
+    PGA,
+    SIZE,
+    SLIP,
+    answers_of,
+    from_factor,
+    library,
+)
 
 from rockcheck import EventBasedModel
 from rockcheck.ebm import fates
@@ -23,16 +33,6 @@ from rockcheck.validation.studies.population.damage_task import DamageTask
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensity_measures import size_of
 from rockcheck.validation.studies.population.plan import Plan, factors_of
-from tests.validation.made_up.assessed import CERTAIN, gathered, interval
-from tests.validation.made_up.damaged import (
-    FALL,
-    PGA,
-    SIZE,
-    SLIP,
-    answers_of,
-    from_factor,
-    library,
-)
 
 
 @pytest.mark.parametrize(

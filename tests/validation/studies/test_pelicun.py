@@ -5,9 +5,8 @@ import io
 
 import numpy as np
 import pytest
+from damaged import library
 from scipy import stats
-
-from tests.validation.made_up.damaged import library
 
 assessment = pytest.importorskip("pelicun.assessment")
 COUNT = 2000

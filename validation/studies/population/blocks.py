@@ -52,7 +52,7 @@ def scene_plot(scene: Scene) -> Plot:
 
 def scene_text(scene: Scene, gathered: Gathered) -> Text:
     """Block, floor, walls and motions, in words."""
-    block, floor = scene.block, scene.floor
+    block, floor, building = scene.block, scene.floor, gathered.plan.own.building
     uncertain = next(iter(gathered.plan.cases.values())).names
     static = f", static {floor.mu_s:.3g}" if floor.mu_s != floor.friction else ""
     rebound = f", restitution {floor.restitution:.3g}" if floor.restitution else ""
@@ -66,6 +66,7 @@ def scene_text(scene: Scene, gathered: Gathered) -> Text:
         ("friction", f"{floor.friction:.3g}{static}{rebound}"),
         ("wall", "; ".join(walls) or "none"),
         ("uncertain", ", ".join(uncertain)),
+        ("building", building.words if building else ""),
         ("base", _base_words(gathered)),
         ("played by", gathered.plan.model),
     ]
