@@ -36,6 +36,7 @@ HERE: dict[str, bool] = {
     "Linux": Path("/proc/self/task").exists(),
     "git": shutil.which("git") is not None,
     "obspy": find_spec("obspy") is not None,
+    "pelicun": find_spec("pelicun") is not None,
 }
 #: What may be skipped while `CI` is set: how the reason begins, and where it is no fault of the
 #: job. All else that is skipped fails it.
@@ -43,6 +44,7 @@ MAY_BE_SKIPPED: dict[str, bool] = {
     "needs pybullet": sys.version_info >= (3, 12),  # which has wheels for 3.11 only
     "needs Linux": sys.platform != "linux",
     "needs obspy": True,  # the extra `seismology`
+    "needs pelicun": True,  # the extra `loss`
     "needs POSIX": sys.platform == "win32",
 }
 #: What a line of progress holds.

@@ -8,13 +8,14 @@ import pytest
 from damaged import library
 from scipy import stats
 
-assessment = pytest.importorskip("pelicun.assessment")
+pytestmark = pytest.mark.needs("pelicun")
 COUNT = 2000
 
 
 def damaged_share(path, component, intensity):
     """The share of components on storey 1 that Pelicun has damaged, at a floor acceleration (g)."""
     import pandas as pd
+    from pelicun import assessment
 
     model = assessment.Assessment({"PrintLog": False, "Seed": 1})
     model.stories = 1
