@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rockcheck.ebm import EventBasedModel
+from rockcheck.ebm import EventBasedModel, packing
 from rockcheck.ebm.core.decide import PATIENCE
 from rockcheck.ebm.fates import (
     AT_REST,
@@ -29,6 +29,7 @@ from rockcheck.scenes import (
     Ricker,
     Scene,
     Wall,
+    kinematics,
 )
 from rockcheck.scenes.history import OUTCOMES
 from tests.ebm.cases import pulse_scene, random_scene
@@ -280,3 +281,19 @@ def test_what_is_kept_of_a_run_changes_no_fate_and_no_peak(keeps):
     rich = play_fates(table_of(scenes), MODEL, keeps=keeps)
     assert rich.outcome.tolist() == lean.outcome.tolist()
     assert rich.peak.tolist() == pytest.approx(lean.peak.tolist(), rel=0.0, abs=0.0, nan_ok=True)
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+@pytest.mark.parametrize(("share", "inside"), [(0.0, False), (-0.5e-12, False), (-1e-9, True)])
+def test_a_corner_that_touches_a_wall_to_rounding_is_not_inside(size, share, inside):
+    """Of a block that is tilted to the left, by a share of its size."""
+    block = PAPER_BLOCK.scaled(size)
+    scene = resting(initial_rotation=0.1).replace(block=block)
+    touches = -kinematics.clearance(block, "left", 0.0, *scene.initial_state[:3:2])
+    gap = np.array([touches + share * block.half_diagonal])
+    assert packing.inside_a_wall(table_of([scene], gap_left=gap)).tolist() == [inside]
+
+
+def test_a_gap_of_zero_is_allowed():
+    table = table_of([resting()], gap_left=np.zeros(1))
+    assert table.gap_left.tolist() == [0.0]

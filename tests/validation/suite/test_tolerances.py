@@ -259,3 +259,11 @@ def test_a_better_figure_keeps_its_why_though_a_reason_is_given_for_others(accep
     assert refusals == []
     assert len(changes) == 1
     assert 'why = "a test"' in text
+
+
+@pytest.mark.parametrize(("value", "limit"), [(5.0, 4.5), (1.2345, 1.1), (0.0345, 0.031)])
+def test_what_is_to_be_at_least_so_large_has_a_limit_a_tenth_below(accepted, value, limit):
+    """Of two digits, rounded down."""
+    *_, text = accepted("", check(value, None, "events_agree_until"), reason="a test")
+    line = tomllib.loads(text)["s"]["m"]["r"]["events_agree_until"]
+    assert line["limit"] == limit
