@@ -87,3 +87,12 @@ def test_the_slowest_part_says_nothing_of_the_others(clock):
         clock.now = now
         pace.hear(done, 10)
     assert pace.left == pytest.approx(7.0)
+
+
+def test_of_what_is_done_nothing_is_left(clock):
+    pace = Pace(clock=clock)
+    pace.hear(0, 2)
+    clock.now = 4.0
+    pace.hear(2, 2)
+    clock.now = 9.0
+    assert pace.left == 0.0
