@@ -5,7 +5,7 @@ In: options, a scene, records. Out: a plan, which the study `population` plays a
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
@@ -18,6 +18,7 @@ from rockcheck.commands.notices import tell_left_out, tell_record_notes
 from rockcheck.commands.options import OUT, Played, model_names, scene_names
 from rockcheck.commands.record import ReadOption, record_sets
 from rockcheck.scenes import InputError, Scene, Side, files, printable
+from rockcheck.scenes.buildings import Regular
 from rockcheck.validation.execute import models
 from rockcheck.validation.paper import FREQUENCIES
 from rockcheck.validation.studies.population import intensity_measures, plan
@@ -28,6 +29,7 @@ from rockcheck.validation.studies.population.levels import (
     levels_of_pulses,
     levels_of_records,
 )
+from rockcheck.validation.studies.population.storeys import Storeys
 from rockcheck.validation.studies.population.study import Assessment
 from rockcheck.validation.suite import motions
 
@@ -68,6 +70,15 @@ class Varied:
             " (g); pfa (g) on a storey; with bounds, as pga:0.05:2:40, all records are scaled to"
             " these intensities, too."
             " Without records: pulses, over g tan(alpha).",
+        ),
+    ] = None
+    storeys: Annotated[
+        str | None,
+        typer.Option(
+            "--storeys",
+            metavar="LOW:HIGH",
+            help="Storeys of the scene's [building] on which the block is tried, with a page by"
+            " storey: 1:8.",
         ),
     ] = None
     capacity: Annotated[
@@ -154,10 +165,52 @@ def assess(
         planned = plan.with_levels(
             planned, levels_of(varied, measure, planned, recorded=bool(records))
         )
+    if varied.storeys is not None:
+        check_for_storeys(varied, given)
+        plans = {
+            number: on_storey(planned, given, number)
+            for number in storeys_of(varied.storeys, given)
+        }
+        run_study(Storeys(plans=plans), played)
     _ = planned.numbers  # names a draw that is no scene, before anything is played
     tell_left_out(left_out, "--read vertical=true plays such a component with the horizontal ones")
     tell_record_notes(case.scene for case in cases.values())
     run_study(Assessment(plan=planned), played)
+
+
+def storeys_of(text: str, given: files.UncertainScene) -> range:
+    """The storeys that `--storeys` asks for. Raises `InputError`."""
+    if not isinstance(given.building, Regular):
+        raise InputError("needs a [building] of storeys in the scene file", "--storeys")
+    most = given.building.storeys
+    low, _, high = text.partition(":")
+    if not (low.isdecimal() and high.isdecimal() and int(low) <= int(high) <= most):
+        raise InputError(
+            f"{printable(repr(text), 40)} is not allowed: LOW:HIGH within 0:{most}", "--storeys"
+        )
+    return range(int(low), int(high) + 1)
+
+
+def check_for_storeys(varied: Varied, given: files.UncertainScene) -> None:
+    """Raises `InputError` for what a page by storey does not have."""
+    if given.spreads:
+        raise InputError("needs a scene without uncertain numbers", "--storeys")
+    for option, value in (("--gaps", varied.gaps), ("--samples", varied.samples)):
+        if value is not None:
+            raise InputError(f"does not go with {option}", "--storeys")
+
+
+def on_storey(planned: plan.Plan, given: files.UncertainScene, number: int) -> plan.Plan:
+    """The plan with the block on another storey, under the same motions of the ground."""
+    assert isinstance(given.building, Regular)
+    building = given.building.replace(storey=number)
+
+    def moved(case: files.UncertainScene) -> files.UncertainScene:
+        scene = case.scene.replace(excitation=case.ground_motion)
+        return files.on_storey(replace(case, scene=scene), building)
+
+    cases = {name: moved(case) for name, case in planned.cases.items()}
+    return replace(planned, own=moved(planned.own), cases=cases, gaps=())
 
 
 def searched_capacities(

@@ -208,6 +208,20 @@ class Plan:
         return {case: self._draws(case) for case, numbers in self.numbers.items() if numbers}
 
     @cached_property
+    def undrawn(self) -> dict[str, Draws]:
+        """By case the run as it is, by the batch, without a history."""
+        return {
+            case: Draws(
+                ("as it is", case),
+                given.scene,
+                self.batch_model,
+                self.batch_settings,
+                **self._batch_effort(1),
+            )
+            for case, given in self.cases.items()
+        }
+
+    @cached_property
     def free(self) -> dict[Side, dict[str, Draws]]:
         """By side whose gap is varied, and by case, the runs without the wall there."""
         if not self.batch_plays:
