@@ -161,28 +161,36 @@ def storey_table(storeys: Sequence[Storey], plan: Plan) -> Table:
 
 def storey_plot(storeys: Sequence[Storey]) -> list[Block]:
     """The medians over the storeys; nothing where no curve fits."""
-    curves: dict[str, list[tuple[int, float]]] = {}
-    label = ""
-    for storey in storeys:
-        answers = [("overturns", storey.falls)] if storey.falls else []
-        answers += [(one.capacity.words, one.intensity) for one in storey.exceeded]
-        for words, answer in answers:
-            label = f"median {answer.label}, {answer.unit}".removesuffix(", ")
-            if answer.fit is not None:
-                curves.setdefault(words, []).append((storey.number, answer.fit.median))
-    if not curves:
-        return []
-    series = [
-        Series(words, [float(number) for number, _ in points], [value for _, value in points])
-        for words, points in curves.items()
+    answers = [
+        (storey.number, words, answer)
+        for storey in storeys
+        for words, answer in _answers_of(storey)
+        if answer.fit is not None
     ]
+    if not answers:
+        return []
+    series = []
+    for words in dict.fromkeys(words for _, words, _ in answers):
+        points = [
+            (float(number), answer.fit.median)
+            for number, of, answer in answers
+            if of == words and answer.fit is not None
+        ]
+        series.append(Series(words, [x for x, _ in points], [y for _, y in points]))
+    measured = answers[0][2]
     return [
         Plot(
             "storeys",
             "Which intensity each storey bears",
             panels=[Panel("", series)],
             x=Axis("storey"),
-            y=Axis(label),
+            y=Axis(f"median {measured.label}, {measured.unit}".removesuffix(", ")),
             live=True,
         )
     ]
+
+
+def _answers_of(storey: Storey) -> list[tuple[str, statistics.IntensityAnswer]]:
+    """The answers of a storey that have an intensity, with what happens there."""
+    falls = [] if storey.falls is None else [("overturns", storey.falls)]
+    return falls + [(answer.capacity.words, answer.intensity) for answer in storey.exceeded]
