@@ -1,6 +1,7 @@
 """`rockcheck record`: how a file of a recorded ground motion was read."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +14,7 @@ from rockcheck.commands.model_choice import settings_of
 from rockcheck.commands.notices import tell_left_out
 from rockcheck.commands.options import PlotOption
 from rockcheck.reports.style import save_as
-from rockcheck.scenes import InputError, printable, recordings
+from rockcheck.scenes import InputError, Record, files as scene_files, printable, recordings
 from rockcheck.scenes.recordings import sets
 from rockcheck.validation.finding import Column, Finding, Table, Text, text
 from rockcheck.validation.suite import motions
@@ -42,6 +43,15 @@ def run(
         typer.Argument(help='Record files, folders of them, or patterns such as "RSN1_H*.AT2".'),
     ],
     read: ReadOption = None,
+    building: Annotated[
+        str | None,
+        typer.Option(
+            "--building",
+            metavar="SCENE",
+            help="A scene file with a [building]: show the motion of its storey, and its floor"
+            " spectrum, in place of the ground's.",
+        ),
+    ] = None,
     plot: PlotOption = None,
 ) -> None:
     """Show what files of recorded ground motions hold.
@@ -57,8 +67,11 @@ def run(
     reading = recordings.Reading(**settings_of(read or (), "--read"))
     paths = sets.files_of(files)
     components, faults = sets.read_files(paths, reading, keep_going=True)
+    given = scene_with_building(building)
     motions = [
-        (path, name, recording) for path, pairs in components.items() for name, recording in pairs
+        (path, name, on_storey(recording, given) if given else recording)
+        for path, pairs in components.items()
+        for name, recording in pairs
     ]
     values = [_value(path, recording) for path, _, recording in motions]
     findings = [_overview([name for _, name, _ in motions], values)]
@@ -77,6 +90,28 @@ def run(
     if motions:
         answer(_result(values, faults))
     _tell_faults(paths, faults, is_empty=not motions)
+
+
+def scene_with_building(name: str | None) -> scene_files.UncertainScene | None:
+    """The scene that `--building` names. Raises `InputError` where it has no building."""
+    if name is None:
+        return None
+    given = scene_files.load_uncertain_scene(name)
+    if given.building is None:
+        raise InputError(f"{printable(name)} has no [building]", "--building")
+    return given
+
+
+def on_storey(
+    ground: recordings.Recording, given: scene_files.UncertainScene
+) -> recordings.Recording:
+    """The motion of the storey on which a scene's block stands, under one of the ground."""
+    scene = given.scene.replace(excitation=Record.from_samples(ground.samples, ground.time_step))
+    assert given.building is not None, "asked for"
+    storey = scene_files.on_storey(replace(given, scene=scene), given.building).scene.excitation
+    assert isinstance(storey, Record), "of a record"
+    notes = (*ground.notes, *storey.notes)
+    return replace(ground, samples=storey.samples, time_step=storey.time_step, notes=notes)
 
 
 def _result(values: Sequence[dict[str, Any]], faults: Sequence[InputError]) -> dict[str, Any]:
