@@ -74,13 +74,7 @@ def run(
         for name, recording in pairs
     ]
     values = [_value(path, recording) for path, _, recording in motions]
-    findings = [_overview([name for _, name, _ in motions], values)]
-    if len(components) < 2:
-        findings = [
-            _details(path, recording, value)
-            for (path, _, recording), value in zip(motions, values, strict=True)
-        ]
-    for finding in findings:
+    for finding in _findings(motions, values, has_several_files=len(components) > 1):
         terminal.show(finding, console())
     if plot is not None and motions:
         from rockcheck.reports.show.drawing import recordings_figure
@@ -90,6 +84,21 @@ def run(
     if motions:
         answer(_result(values, faults))
     _tell_faults(paths, faults, is_empty=not motions)
+
+
+def _findings(
+    motions: Sequence[tuple[Path, str, recordings.Recording]],
+    values: Sequence[dict[str, Any]],
+    *,
+    has_several_files: bool,
+) -> list[Finding]:
+    """All that is known of each motion of one file, or a row for each of several."""
+    if has_several_files:
+        return [_overview([name for _, name, _ in motions], values)]
+    return [
+        _details(path, recording, value)
+        for (path, _, recording), value in zip(motions, values, strict=True)
+    ]
 
 
 def scene_with_building(name: str | None) -> scene_files.UncertainScene | None:
