@@ -272,6 +272,7 @@ def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
             after, state = impact_of(
                 setting_of(alpha, mu, e, energy_cap=cap), phi, [Contact.FOOT], 0.0, v
             )
+            assert state.gains == (state.largest_gain > 0.0)
             return after, float(state.largest_gain)
 
         row = rows_of(setting_of(alpha, mu, e), 1.0, phi)[Contact.FOOT]
