@@ -43,6 +43,14 @@ def test_where_nothing_favours_a_side_the_left_one_is_tried_first():
     assert touching.first == 1
 
 
+@pytest.mark.parametrize(("x", "side"), [(0.1, 1), (-0.1, -1), (1e-15, 0), (-1e-15, 0)])
+def test_where_the_base_does_not_decide_the_block_s_place_does(x, side):
+    """A block that stands to the right tips to the left; a place of rounding is none."""
+    at = upright(0.0, 1.0, 0.3, 0.5, 0.5)
+    core, run = Core(at, "bilateral"), run_at((x, *at.state[1:]))
+    assert modes._touching(core.setting, core.base, run.state).favoured == side
+
+
 @pytest.mark.parametrize(
     ("guard", "winds", "violation"),
     [(Guard.SLIP, False, math.inf), (Guard.SLIP, True, 0.0), (Guard.CONE_PLUS, False, 0.0)],
