@@ -16,6 +16,7 @@ from rockcheck import Block, Floor, History, MuJoCo, Scene, Wall, load_scene
 from rockcheck.commands import console, progress_bar
 from rockcheck.commands.cli import COMMANDS, HIDDEN
 from rockcheck.scenes import progress
+from rockcheck.scenes.buildings import Regular
 
 STILL = "faulty:Still", "--allow-code", "faulty:Still"
 pytestmark = pytest.mark.usefixtures("in_an_empty_folder")
@@ -73,7 +74,8 @@ def mine(told):
 def test_a_new_scene_file_is_a_scene_with_every_setting(mine):
     assert load_scene("mine.toml").walls
     shown = set(re.findall(r"^(?:# )?\[*([a-z_]+)(?=\]| =)", mine, re.MULTILINE))
-    settings = {*Scene.model_fields, *Block.model_fields, *Floor.model_fields, *Wall.model_fields}
+    kinds = (Scene, Block, Floor, Wall, Regular)
+    settings = {name for kind in kinds for name in kind.model_fields}
     assert settings - shown == {"name"}  # by default the file's
     assert {"kind", "amplitude", "period", "symmetric", "cycles", "file", "scale"} <= shown
 
