@@ -134,6 +134,7 @@ def test_ctrl_c_while_a_command_begins_has_the_same_code():
     assert subprocess.run([sys.executable, "-c", INTERRUPTED], check=False).returncode == 130
 
 
+@pytest.mark.slow
 @pytest.mark.needs("box2d")
 def test_no_binding_tells_what_it_still_holds_at_the_end(tmp_path):
     done = subprocess.run(

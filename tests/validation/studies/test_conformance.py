@@ -114,9 +114,14 @@ class SinglePrecision(MuJoCo):
     [
         (without_restitution, {"RC-06", "RC-07"}),
         (CONVEX.simulate, {"RC-04"}),
-        (with_friction_doubled, {"RC-01", "RC-02", "RC-20", "RC-24"}),
-        (with_creep, {"RC-03"}),
-        (SinglePrecision(time_step=1e-3).simulate, {"RC-05"}),
+        *(
+            pytest.param(*fault, marks=pytest.mark.slow)
+            for fault in (
+                (with_friction_doubled, {"RC-01", "RC-02", "RC-20", "RC-24"}),
+                (with_creep, {"RC-03"}),
+                (SinglePrecision(time_step=1e-3).simulate, {"RC-05"}),
+            )
+        ),
     ],
     ids=["no restitution", "convex cone", "double friction", "creep", "single precision"],
 )

@@ -204,7 +204,7 @@ def test_who_has_no_restitution_plays_the_scenes_without_it(monkeypatch, line, s
 @pytest.mark.parametrize(
     ("model", "scene"),
     [
-        (line.label, scene)
+        pytest.param(line.label, scene, marks=[pytest.mark.slow] if line.family == "dart" else [])
         for line in LINES.values()
         for scene in TWO_WALLS
         if line.converge
