@@ -14,8 +14,9 @@ from rockcheck.scenes.recordings.stated import Fact, Stated, Value
 
 NumberedLines = list[tuple[int, str]]
 
-#: Longest line that is searched.
-_WIDE = 300
+#: Longest line that is searched; in a longer one what ends so near to the cut is left out, for a
+#: number or its unit may go on behind it.
+_WIDE, _NEAR_THE_CUT = 300, 40
 _IS = r"\s*+(?:\([^)]{0,20}\)\s*+)?(?:[:=]|\bof\b|\bis\b)\s*+(?:of\s*+)?[:=]?\s*+"
 _COUNTS = (
     rf"\b(?:npts|ndata|(?:no\.?|number|num)\s*+of\s*+(?:data\s*+)?(?:points|samples|values))"
@@ -49,7 +50,7 @@ def facts_of(header: Iterable[tuple[int, str]], given_unit: str = "") -> Stated:
     A fact counts where it has a label, and where all lines that state it agree. A peak without a
     unit has that of the header, or else `given_unit`.
     """
-    lines = [(n, line[:_WIDE]) for n, line in header]
+    lines = list(header)
     counts = [
         Fact(int(match[1]), "the header", n)
         for n, match in _matches(_COUNTS, lines)
@@ -89,7 +90,8 @@ def _matches(patterns: Iterable[str], lines: NumberedLines) -> list[tuple[int, r
         (n, match)
         for pattern in patterns
         for n, line in lines
-        for match in re.finditer(pattern, line, re.IGNORECASE)
+        for match in re.finditer(pattern, line[:_WIDE], re.IGNORECASE)
+        if len(line) <= _WIDE or match.end() <= _WIDE - _NEAR_THE_CUT
     ]
 
 

@@ -84,3 +84,25 @@ def test_lines_that_do_not_agree_state_nothing():
 def test_a_line_is_searched_up_to_its_three_hundredth_character():
     assert value(stated(" " * 290 + "NPTS: 4000").count) == 4000
     assert stated(" " * 300 + "NPTS: 4000").count is None
+
+
+@pytest.mark.parametrize("before", range(250, 300))
+def test_where_a_long_line_is_cut_no_number_is_read_short(before):
+    line = "-" * before + " DT = 0.0123456 s" + " and more of it" * 20
+    assert value(stated(line).time_step) in (None, 0.0123456)
+
+
+@pytest.mark.parametrize("before", range(250, 300))
+def test_where_a_long_line_is_cut_a_number_keeps_its_unit(before):
+    """Milliseconds are not read as seconds."""
+    line = "-" * before + " DT = 5 ms" + " and more of it" * 20
+    assert stated(line).time_step is None
+
+
+def test_what_a_long_line_states_before_its_cut_is_read():
+    assert value(stated("DT = 0.01 s" + " and more of it" * 40).time_step) == 0.01
+
+
+def test_what_ends_forty_characters_before_the_cut_is_read():
+    assert value(stated("-" * 250 + " DT = 0.01" + " s" + "-" * 60).time_step) == 0.01
+    assert stated("-" * 251 + " DT = 0.01" + " s" + "-" * 60).time_step is None
