@@ -22,7 +22,7 @@ from pydantic import Field, Strict, model_validator
 
 from rockcheck.scenes.base import Finite, Floats, Frozen
 from rockcheck.scenes.errors import InputError
-from rockcheck.scenes.excitations import Excitation, Record
+from rockcheck.scenes.excitations import MOST_NOTES, Excitation, Record
 
 #: A storey's motion is a record of straight lines: they leave it by this part of its peak at most.
 LINE_ERROR = 1e-3
@@ -30,7 +30,7 @@ LINE_ERROR = 1e-3
 FIRST_STEPS = 6
 #: A mode of a shorter period (s) moves with the ground; the longest period, s; the least damping.
 RIGID_BELOW, LONGEST, LEAST_DAMPING = 0.005, 100.0, 1e-3
-#: Most samples of a storey's motion, and the most storeys of a building.
+#: Most samples while the ground moves, and after it; the most storeys of a building.
 MOST_SAMPLES, MOST_STOREYS = 1_000_000, 200
 #: Longest free vibration that is played after the ground has come to rest, s.
 MOST_TAIL = 600.0
@@ -157,7 +157,7 @@ def storey_motion(building: Building, ground: Excitation, quiet_below: float) ->
         time_step=step,
         source=f"{name}, {building.words}"[:200],
         notes=(
-            *getattr(ground, "notes", ()),
+            *getattr(ground, "notes", ())[: MOST_NOTES - 1],
             f"{building.words}: lines every {step:.3g} s leave the motion by {error:.1e} of its"
             f" peak; after the ground {lasts:.3g} s of free vibration",
         ),
@@ -196,10 +196,7 @@ class _Storey:
         """
         half, quiet_after = 0.5 * step, self.ground.quiet_after
         count = 2 * round(quiet_after / step)
-        if count > MOST_SAMPLES:
-            raise InputError(
-                f"a motion of {quiet_after:g} s would need more than {MOST_SAMPLES} samples"
-            )
+        _check_count(count, quiet_after)
         times = np.minimum(half * np.arange(count + 1), quiet_after)
         shaken = self.rigid_share * self.ground.acceleration(times)
         last_states = []
@@ -240,11 +237,19 @@ class _Storey:
                 f"the building vibrates for {lasts:.3g} s after the ground, more than"
                 f" {MOST_TAIL:g} s: give it more damping"
             )
-        times = step * np.arange(1, 2 * math.ceil(0.5 * lasts / step) + 1)
+        steps = 2 * math.ceil(0.5 * lasts / step)
+        _check_count(steps, lasts)
+        times = step * np.arange(1, steps + 1)
         felt = np.zeros(len(times))
         for mode, state in zip(self.modes, states, strict=True):
             felt += _felt(mode, state * np.exp(mode.pole * times))
         return felt
+
+
+def _check_count(count: int, lasts: float) -> None:
+    """Raises `InputError` where a motion that lasts so long (s) has too many samples."""
+    if count > MOST_SAMPLES:
+        raise InputError(f"a motion of {lasts:g} s would need more than {MOST_SAMPLES} samples")
 
 
 def _felt(mode: Mode, states: NDArray[np.complex128]) -> Floats:

@@ -23,8 +23,8 @@ from rockcheck.scenes.base import Finite, Floats, Frozen, Positive
 from rockcheck.scenes.errors import InputError
 from rockcheck.scenes.recordings import GRAVITY_OF_RECORDS, Reading, read_record
 
-#: Largest peak acceleration that a record may be scaled to, g.
-MOST_PGA = 1000.0
+#: Largest peak acceleration that a record may be scaled to, g; and most notes of a record.
+MOST_PGA, MOST_NOTES = 1000.0, 20
 
 
 #: Samples a period of a pulse: between them it is a straight line to 1e-5 of its amplitude, and a
@@ -331,7 +331,7 @@ class Record(Motion):
     scale: Finite = 1.0
     source: str = "samples"
     notes: Annotated[
-        tuple[Annotated[str, StringConstraints(max_length=300)], ...], Field(max_length=20)
+        tuple[Annotated[str, StringConstraints(max_length=300)], ...], Field(max_length=MOST_NOTES)
     ] = ()
 
     @model_validator(mode="before")

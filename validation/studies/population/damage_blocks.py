@@ -135,14 +135,12 @@ def _curve_plot(answers: Sequence[DamageAnswer]) -> list[Block]:
         Series(answer.capacity.words, x.tolist(), fit.probability(x).tolist(), style="smooth")
         for answer, fit in drawn
     ]
-    intensity = answers[0].intensity
-    head = f"{intensity.label}, {intensity.unit}" if intensity.unit else intensity.label
     return [
         Plot(
             "capacities",
             "Probability that a capacity is exceeded",
             panels=[Panel("", series)],
-            x=Axis(head, log=True),
+            x=Axis(answers[0].intensity.head, log=True),
             y=Axis("probability", limits=(0.0, 1.0)),
             live=True,
         )

@@ -192,13 +192,12 @@ def _curve_plot(answer: IntensityAnswer) -> list[Block]:
         ),
         Series("records", [float(x[0]), *least], [0.0, *steps], style="step"),
     ]
-    head = f"{answer.label}, {answer.unit}" if answer.unit else answer.label
     return [
         Plot(
             "intensity",
             "Probability of overturning",
             panels=[Panel("", series)],
-            x=Axis(head, log=True),
+            x=Axis(answer.head, log=True),
             y=Axis("probability", limits=(0.0, 1.0)),
             note="Share of the records that have overturned it, and the lognormal curve with its"
             " 95 % band.",

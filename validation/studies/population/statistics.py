@@ -315,6 +315,11 @@ class IntensityAnswer:
     fit: Lognormal | None
     undecided: int
 
+    @property
+    def head(self) -> str:
+        """The measure with its unit, as a heading: "PGA, g"."""
+        return f"{self.label}, {self.unit}" if self.unit else self.label
+
 
 def intensity_answer(gathered: Gathered) -> IntensityAnswer | None:
     """The search over the factor on each motion; None where no motion was scaled."""

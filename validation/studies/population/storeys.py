@@ -177,14 +177,13 @@ def storey_plot(storeys: Sequence[Storey]) -> list[Block]:
             if of == words and answer.fit is not None
         ]
         series.append(Series(words, [x for x, _ in points], [y for _, y in points]))
-    measured = answers[0][2]
     return [
         Plot(
             "storeys",
             "Which intensity each storey bears",
             panels=[Panel("", series)],
             x=Axis("storey"),
-            y=Axis(f"median {measured.label}, {measured.unit}".removesuffix(", ")),
+            y=Axis(f"median {answers[0][2].head}"),
             live=True,
         )
     ]
