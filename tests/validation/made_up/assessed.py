@@ -98,8 +98,6 @@ def gathered(
         done[plan.gap_tasks(done)["left"][case]] = search
     for case, search in played.get("factors", {}).items():
         done[plan.factors[case]] = search
-    for case, search in played.get("damage", {}).items():
-        done[plan.damage[case]] = search
     return Gathered(plan, done)
 
 

@@ -14,8 +14,9 @@ SIZE = size_of(PGA, CERTAIN)
 def answers_of(capacities=(SLIP,), **searches):
     """Answers for the intervals of a capacity, by case; of one that is not named: none."""
     found = {
-        case: results.DamageSearch(
-            intervals={
+        case: results.FactorSearch(
+            intervals=(),
+            exceeded={
                 capacity.name: tuple(intervals if capacity == capacities[0] else ())
                 for capacity in capacities
             },
@@ -25,7 +26,7 @@ def answers_of(capacities=(SLIP,), **searches):
         for case, intervals in searches.items()
     }
     runs = dict.fromkeys(searches, RUNS["a"])
-    everything = gathered(runs, measure=PGA, capacities=capacities, damage=found)
+    everything = gathered(runs, measure=PGA, capacities=capacities, factors=found)
     return damage.damage_answers(everything)
 
 
@@ -36,14 +37,15 @@ def from_factor(factor):
 def library(measure="pga"):
     """Pelicun's files of two curves."""
     found = {
-        case: results.DamageSearch(
-            intervals={SLIP.name: from_factor(factor), FALL.name: from_factor(3.0 * factor)},
+        case: results.FactorSearch(
+            intervals=(),
+            exceeded={SLIP.name: from_factor(factor), FALL.name: from_factor(3.0 * factor)},
             undecided=0,
             runs=9,
         )
         for case, factor in {"a": 1.0, "b": 4.0}.items()
     }
     runs = dict.fromkeys(found, RUNS["a"])
-    everything = gathered(runs, measure=measure_of(measure), capacities=(SLIP, FALL), damage=found)
+    everything = gathered(runs, measure=measure_of(measure), capacities=(SLIP, FALL), factors=found)
     answers = damage.damage_answers(everything)
     return damage_files.pelicun_files(answers, CERTAIN.scene, "ebm-unilateral", "1.2.3"), answers

@@ -29,7 +29,7 @@ from rockcheck.validation.studies.population.capacities import (
     capacities_of,
     capacity_of,
 )
-from rockcheck.validation.studies.population.damage_task import DamageTask
+from rockcheck.validation.studies.population.factor_task import FactorTask
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensity_measures import size_of
 from rockcheck.validation.studies.population.plan import Plan, factors_of
@@ -141,11 +141,11 @@ SEARCHED = (Capacity("slip", 0.01), Capacity("top", 0.1), Capacity("rotation", 0
 
 def searched(scene, capacities=SEARCHED, *, both=False):
     """The search of a scene as it is, and its factors."""
-    task = DamageTask(
+    task = FactorTask(
         ("capacities", "own"),
         scene,
         "ebm-unilateral",
-        factors=factors_of(scene, scene.moving_acceleration),
+        factors=factors_of(scene, slides=True),
         both=both,
         capacities=capacities,
     )
@@ -159,7 +159,7 @@ def pulse_search():
 
 @pytest.mark.parametrize("capacity", SEARCHED, ids=lambda capacity: capacity.name)
 def test_the_search_ends_between_a_run_that_bears_it_and_one_that_does_not(pulse_search, capacity):
-    scene, first = sliding_scene(), pulse_search[0].intervals[capacity.name][0]
+    scene, first = sliding_scene(), pulse_search[0].exceeded[capacity.name][0]
     below, above = (
         scene.replace(excitation=scene.excitation.scaled(factor))
         for factor in (first.stands_below, first.low)
@@ -172,15 +172,28 @@ def test_the_search_ends_between_a_run_that_bears_it_and_one_that_does_not(pulse
 
 def test_each_change_is_halved_three_times_after_a_look_of_one_percent(pulse_search):
     search, factors = pulse_search
-    assert [len(found) for found in search.intervals.values()] == [1, 1, 1]
-    assert search.runs == len(factors) + 3 * 3
+    changes = 2 + len(SEARCHED)  # it overturns, and stands again
+    assert [len(found) for found in search.exceeded.values()] == [1, 1, 1]
+    assert search.runs == len(factors) + 3 * changes
+
+
+def test_capacities_do_not_change_where_it_overturns(pulse_search):
+    alone, _ = searched(sliding_scene(), ())
+    assert alone.intervals == pulse_search[0].intervals
+    assert alone.exceeded == {}
+
+
+def test_overturning_as_a_capacity_costs_no_run(pulse_search):
+    with_it, _ = searched(sliding_scene(), (*SEARCHED, FALL))
+    assert with_it.exceeded["overturns"] == pulse_search[0].intervals
+    assert with_it.runs == pulse_search[0].runs
 
 
 @pytest.mark.parametrize("both", [False, True])
 def test_a_vertical_motion_is_scaled_with_a_record_that_has_it(both):
     scene = sliding_scene(vertical=Ricker(amplitude=3.0, period=0.6))
     top = Capacity("top", 0.1)
-    first = searched(scene, (top,), both=both)[0].intervals[top.name][0]
+    first = searched(scene, (top,), both=both)[0].exceeded[top.name][0]
     for factor, exceeded in ((first.stands_below, False), (first.low, True)):
         upward = scene.vertical.scaled(factor if both else 1.0)
         moved = scene.replace(excitation=scene.excitation.scaled(factor), vertical=upward)
@@ -204,7 +217,7 @@ def test_a_capacity_that_nothing_exceeds_has_no_curve():
     assert answer.capacity == FALL
     assert answer.intensity.fit is None
     assert answer.exceeded_by == 0
-    most = SIZE * factors_of(CERTAIN.scene, CERTAIN.scene.moving_acceleration)[-1]
+    most = SIZE * factors_of(CERTAIN.scene, slides=True)[-1]
     assert answer.intensity.records[0].beyond == pytest.approx(most)
     assert "Overturns: not up to PGA" in damage_blocks.damage_sentences([answer])[0]
 
@@ -424,7 +437,7 @@ def test_medians_and_dispersions_are_those_of_a_loop_of_ones_own():
         measure=PGA,
         capacities=capacities,
     )
-    done = {task: task.play() for task in plan.damage.values()}
+    done = {task: task.play() for task in plan.factors.values()}
     for answer in damage.damage_answers(Gathered(plan, done)):
         logarithms = np.log(least[answer.capacity.name])
         fit = answer.intensity.fit

@@ -7,7 +7,7 @@ import pytest
 from assessed import interval, ran, search
 
 from rockcheck import Rest, Ricker, Wall, load_scene
-from rockcheck.scenes import files
+from rockcheck.scenes import Floor, files
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.intensity_measures import measure_of
@@ -409,6 +409,18 @@ def test_factors_begin_where_a_block_at_rest_begins_to_move():
 def test_factors_end_beyond_32_times_that():
     factors = factors_of(SCENE.replace(excitation=PUSH))
     assert 32.0 <= factors[-1] / factors[0] < 32.0 * math.exp(0.01)
+
+
+def test_a_search_of_what_slides_begins_lower_at_the_same_factors():
+    slippery = SCENE.replace(excitation=PUSH, floor=Floor(friction=0.5 * BLOCK.slope))
+    rocks, slides = factors_of(slippery), factors_of(slippery, slides=True)
+    assert slides[0] == pytest.approx(2.0, rel=0.01)
+    assert slides[-len(rocks) :] == rocks
+
+
+def test_a_search_of_what_rocks_first_begins_no_lower():
+    rocking = SCENE.replace(excitation=PUSH, floor=Floor(friction=2.0 * BLOCK.slope))
+    assert factors_of(rocking, slides=True) == factors_of(rocking)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from assessed import SCENE
 
 from rockcheck import Record, Rest
 from rockcheck.ebm import fates
+from rockcheck.validation.studies.population.factor_task import FactorTask
 from rockcheck.validation.studies.population.rows import table_of
 from rockcheck.validation.studies.population.tasks import (
     DrawTask,
-    FactorTask,
     PeaksTask,
     effort,
     history_text,

@@ -1,6 +1,6 @@
 """The intensities at which capacities are exceeded.
 
-In: the searches of all motions (`damage_task`). Out: for each capacity the least intensity of each
+In: the searches of all motions (`factor_task`). Out: for each capacity the least intensity of each
 motion, their lognormal curve, and whether they are lognormal at all. The study asks for it.
 """
 
@@ -45,12 +45,12 @@ class DamageAnswer:
 
 def damage_answers(gathered: Gathered) -> list[DamageAnswer]:
     """An answer a capacity; none where no motion was scaled."""
-    searches, tasks = gathered.damage, gathered.plan.damage
+    searches, tasks = gathered.factors, gathered.plan.factors
     most = {case: tasks[case].factors[-1] for case in searches}
     undecided = sum(search.undecided for search in searches.values())
     answers = []
     for capacity in gathered.plan.capacities:
-        intervals = {case: search.intervals[capacity.name] for case, search in searches.items()}
+        intervals = {case: search.exceeded[capacity.name] for case, search in searches.items()}
         intensity = least_intensities(gathered, intervals, most, undecided)
         if intensity is not None:
             least = [record.least for record in intensity.records]

@@ -103,13 +103,8 @@ class Gathered:
 
     @cached_property
     def factors(self) -> dict[str, results.FactorSearch]:
-        """By case, the search over the factor on its motion."""
+        """By case, the search over the factor on its motion, also for capacities."""
         return self._ended(self.plan.factors, results.FactorSearch)
-
-    @cached_property
-    def damage(self) -> dict[str, results.DamageSearch]:
-        """By case, the search for the factors that exceed capacities."""
-        return self._ended(self.plan.damage, results.DamageSearch)
 
     @cached_property
     def certainty(self) -> dict[str, results.Certainty]:

@@ -20,13 +20,12 @@ from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.capacities import Capacity
-from rockcheck.validation.studies.population.damage_task import DamageTask
+from rockcheck.validation.studies.population.factor_task import FactorTask
 from rockcheck.validation.studies.population.intensity_measures import Measure, size_of
 from rockcheck.validation.studies.population.levels import Levels
 from rockcheck.validation.studies.population.tasks import (
     CertaintyTask,
     Draws,
-    FactorTask,
     GapTask,
     Numbers,
     SensitivityTask,
@@ -245,7 +244,7 @@ class Plan:
 
     @cached_property
     def factors(self) -> dict[str, FactorTask]:
-        """By case whose base moves, the search over the factor on its motion."""
+        """By case whose base moves, the search over the factor, for falls and capacities."""
         if not self.batch_plays:
             return {}
         return {
@@ -254,31 +253,13 @@ class Plan:
                 given.scene,
                 self.batch_model,
                 self.batch_settings,
-                factors=factors_of(given.scene),
+                factors=factors_of(given.scene, slides=bool(self.capacities)),
                 both=given.scene.vertical != self.own.scene.vertical,
+                capacities=tuple(self.capacities),
                 **self._batch_effort(math.log(FACTOR_RANGE) / FACTOR_STEP),
             )
             for case, given in self.cases.items()
             if self.measure is not None and size_of(self.measure, given) > 0.0
-        }
-
-    @cached_property
-    def damage(self) -> dict[str, DamageTask]:
-        """By case whose base moves, the search for the factors that exceed capacities."""
-        if not self.capacities:
-            return {}
-        return {
-            case: DamageTask(
-                ("capacities", case),
-                search.scene,
-                self.batch_model,
-                self.batch_settings,
-                factors=factors_of(search.scene, search.scene.moving_acceleration),
-                both=search.both,
-                capacities=tuple(self.capacities),
-                **self._batch_effort(math.log(FACTOR_RANGE) / FACTOR_STEP),
-            )
-            for case, search in self.factors.items()
         }
 
     @cached_property
@@ -304,7 +285,6 @@ class Plan:
             *self.drawn.values(),
             *(task for runs in self.free.values() for task in runs.values()),
             *self.factors.values(),
-            *self.damage.values(),
         ]
         if self.sensitivity is not None:
             tasks.append(self.sensitivity)
@@ -452,8 +432,7 @@ class Plan:
         """About how many runs there are, but for those of `levels`."""
         rows = 1.0 + max(map(len, self.numbers.values()), default=0)
         gaps = len(self.gaps) * (300.0 + COARSE_GAPS * rows)
-        searches = 1 + bool(self.capacities) if self.measure is not None else 0
-        factors = searches * math.log(FACTOR_RANGE) / FACTOR_STEP
+        factors = (self.measure is not None) * math.log(FACTOR_RANGE) / FACTOR_STEP
         return len(self.cases) * (6.0 + rows + gaps + factors)
 
 
@@ -511,19 +490,27 @@ def gaps_looked_at(
     return tuple(looked.tolist()), tuple(np.unique(np.round(coarse, 12)).tolist())
 
 
-def factors_of(scene: Scene, moving: float | None = None) -> tuple[float, ...]:
+def factors_of(scene: Scene, *, slides: bool = False) -> tuple[float, ...]:
     """Factors on the base motion at which the scene as it is is looked at.
 
-    The first is where a block at rest begins to move, that is to rock, or at an acceleration
-    `moving` (m/s^2) of the base; or a part of the motion as it is where it moves without the base's
-    horizontal acceleration.
+    The first is where a block at rest begins to rock, with `slides` to rock or slide; or a part of
+    the motion as it is where it moves without the base's horizontal acceleration. Those at which it
+    may rock are the same in both cases.
     """
-    if moving is None:
-        slopes = [pivot.arm / pivot.height for pivot in map(scene.block.pivot, results.SIDES)]
-        moving = min(slopes) * scene.gravity
+    slopes = [pivot.arm / pivot.height for pivot in map(scene.block.pivot, results.SIDES)]
     motion = sampled(scene.excitation, scene.excitation.quiet_after)
-    moves = moving / float(np.max(np.abs(motion.samples)))
+    largest = float(np.max(np.abs(motion.samples)))
     begins_at_rest = not any(scene.initial_state[2:]) and scene.initial_height == 0.0
-    first = moves if begins_at_rest and scene.vertical.kind == "rest" else 0.1 * min(moves, 1.0)
+
+    def first_at(moving: float) -> float:
+        moves = moving / largest
+        is_still = begins_at_rest and scene.vertical.kind == "rest"
+        return moves if is_still else 0.1 * min(moves, 1.0)
+
+    rocks = first_at(min(slopes) * scene.gravity)
+    below = 0
+    if slides:
+        slide = first_at(scene.moving_acceleration)
+        below = math.ceil(math.log(rocks / slide) / FACTOR_STEP) if slide < rocks else 0
     count = math.ceil(math.log(FACTOR_RANGE) / FACTOR_STEP)
-    return tuple((first * np.exp(FACTOR_STEP * np.arange(count + 1))).tolist())
+    return tuple((rocks * np.exp(FACTOR_STEP * np.arange(-below, count + 1))).tolist())

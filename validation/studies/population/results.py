@@ -173,22 +173,15 @@ class GapSearch(figures.Stored):
 
 
 class FactorSearch(figures.Stored):
-    """The search of a case over a factor on its motion: intervals in which it does not stand."""
+    """The search of a case over a factor on its motion.
+
+    `intervals` are those in which it does not stand, `exceeded` those in which each capacity is
+    exceeded, by its name.
+    """
 
     kind: Literal["factors"] = "factors"
     intervals: tuple[FallInterval, ...]
-    undecided: int
-    runs: int
-
-
-class DamageSearch(figures.Stored):
-    """The search of a case over a factor on its motion, for several capacities.
-
-    `intervals` are those in which each capacity is exceeded, by its name.
-    """
-
-    kind: Literal["damage"] = "damage"
-    intervals: Mapping[str, tuple[FallInterval, ...]]
+    exceeded: Mapping[str, tuple[FallInterval, ...]] = Field(default_factory=dict)
     undecided: int
     runs: int
 
@@ -220,7 +213,7 @@ class Peaks(figures.Stored):
     peaks: tuple[float, ...]
 
 
-Result = Shown | Drawn | GapSearch | FactorSearch | DamageSearch | Certainty | Sensitivities | Peaks
+Result = Shown | Drawn | GapSearch | FactorSearch | Certainty | Sensitivities | Peaks
 
 
 def counts_of(outcome: Any) -> dict[str, int]:

@@ -38,11 +38,11 @@ class Storeys(Study):
     record = results.Result
 
     def tasks(self, done: Mapping[Any, Any]) -> Sequence[Task]:
-        """Of each storey the runs as they are, and the searches over the factor."""
+        """Of each storey the runs as they are, and the search over the factor."""
         return [
             task
             for plan in self.plans.values()
-            for tasks in (plan.undrawn, plan.factors, plan.damage)
+            for tasks in (plan.undrawn, plan.factors)
             for task in tasks.values()
         ]
 

@@ -34,8 +34,8 @@ Settings = tuple[tuple[str, Any], ...]
 COMPILED_RUN, OTHER_RUN, SHORT_STUDY = 5e-4, 1.0, 60.0
 #: Rows of a history that is kept, at the most.
 MOST_ROWS = 2000
-#: A gap (m) and a factor are known to this much: 0.1 mm, and a quarter of a percent.
-GAP_RESOLUTION, FACTOR_RESOLUTION = 1e-4, 2.5e-3
+#: A gap is known to so many m.
+GAP_RESOLUTION = 1e-4
 
 
 @dataclass(frozen=True)
@@ -262,33 +262,6 @@ class _AtGaps:
 
 
 @dataclass(frozen=True)
-class FactorTask(DrawTask):
-    """The search over a factor on the base motion, looked at in `factors` (increasing).
-
-    With `both` the vertical motion is scaled, too.
-    """
-
-    factors: tuple[float, ...] = field(default=(), repr=False)
-    both: bool = False
-
-    def play(self) -> results.FactorSearch:
-        """The look and the bisection, of the scene as it is."""
-        counter = Counter()
-
-        def stands(which: NDArray[np.int64], factor: Floats) -> NDArray[np.bool_]:
-            upward = factor if self.both else 1.0
-            return counter.standing(self.batch(which, factor=factor, vertical_factor=upward))
-
-        grid = np.array(self.factors)
-        resolution = FACTOR_RESOLUTION * grid[:-1]
-        return results.FactorSearch(
-            intervals=tuple(_searched(stands, np.array([0]), grid, resolution)),
-            undecided=counter.undecided,
-            runs=counter.runs,
-        )
-
-
-@dataclass(frozen=True)
 class PeaksTask(DrawTask):
     """The peak rotations of the scene as it is at factors of its base motion.
 
@@ -343,14 +316,22 @@ def narrowed(
     """The same, where it is `seen` (runs x values) which of them stand at the grid's values."""
     found = search.falls_within(lambda which, at: stands(runs[which], at), seen, grid, resolution)
     return [
+        interval
+        for run, falls in zip(runs.tolist(), found, strict=True)
+        for interval in fall_intervals(run, falls)
+    ]
+
+
+def fall_intervals(run: int, falls: Sequence[search.Fall]) -> list[results.FallInterval]:
+    """The intervals in which a run does not stand, as they are kept."""
+    return [
         results.FallInterval(
-            draw=int(run),
+            draw=run,
             low=fall.low,
             high=fall.high,
             stands_below=fall.stands_below,
             stands_above=fall.stands_above,
         )
-        for run, falls in zip(runs, found, strict=True)
         for fall in falls
     ]
 
