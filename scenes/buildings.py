@@ -199,9 +199,13 @@ class _Storey:
         _check_count(count, quiet_after)
         times = np.minimum(half * np.arange(count + 1), quiet_after)
         shaken = self.rigid_share * self.ground.acceleration(times)
+        points, weights = np.polynomial.legendre.leggauss(_POINTS)
+        left = 0.5 * half * (1.0 - points)  # of a step, after each point
+        pushed = self.ground.acceleration(half * np.arange(1, count + 1)[:, None] - left)
+        pushed *= 0.5 * half * weights
         last_states = []
         for mode in self.modes:
-            states = self._states(mode.pole, half, count)
+            states = _states(mode.pole, half, pushed, left)
             shaken += _felt(mode, states)
             last_states.append(complex(states[-1]))
         free = self._free_vibration(last_states, half)
@@ -209,21 +213,6 @@ class _Storey:
         lines = 0.5 * (ends[:-1] + ends[1:])
         error = float(np.max(np.abs(middles - lines)) / np.max(np.abs(shaken)))
         return _Sampled(np.concatenate([ends, free[1::2]]), error)
-
-    def _states(self, pole: complex, step: float, count: int) -> NDArray[np.complex128]:
-        """States z of a mode every `step`, from rest: z' = pole z + a, and q = -Im(z)/omega_D.
-
-        A step adds the integral of exp(pole (step - s)) a(s), by Gauss's rule: exact but for
-        rounding.
-        """
-        from scipy.signal import lfilter
-
-        points, weights = np.polynomial.legendre.leggauss(_POINTS)
-        inside, shares = 0.5 * step * (points + 1.0), 0.5 * step * weights
-        seen = self.ground.acceleration(step * np.arange(count)[:, None] + inside)
-        added = seen @ (shares * np.exp(pole * (step - inside)))
-        states = lfilter([1.0], [1.0, -np.exp(pole * step)], added)
-        return np.concatenate([[0.0], states])
 
     def _free_vibration(self, states: Sequence[complex], step: float) -> Floats:
         """What is felt after the ground has come to rest, in an even number of steps."""
@@ -244,6 +233,20 @@ class _Storey:
         for mode, state in zip(self.modes, states, strict=True):
             felt += _felt(mode, state * np.exp(mode.pole * times))
         return felt
+
+
+def _states(pole: complex, step: float, pushed: Floats, left: Floats) -> NDArray[np.complex128]:
+    """States z of a mode every `step`, from rest: z' = pole z + a, and q = -Im(z)/omega_D.
+
+    A step adds the integral of exp(pole (step - s)) a(s), by Gauss's rule: exact but for rounding.
+    `pushed` has the ground's acceleration times the weight of each of its points (steps x points),
+    which are so much time before the end of a step as `left` says.
+    """
+    from scipy.signal import lfilter
+
+    added = pushed @ np.exp(pole * left)
+    states = lfilter([1.0], [1.0, -np.exp(pole * step)], added)
+    return np.concatenate([[0.0], states])
 
 
 def _check_count(count: int, lasts: float) -> None:

@@ -3,7 +3,8 @@
 A corner's place, the slip and the height of a hop are linear in the series of a step, as a guard
 is. Within a step they are largest at its ends or where their rate turns; a bound comes first, a
 root is looked for only where the bound does not exclude one. While the block rocks, every corner's
-place is monotone in the rotation, so that only this is looked at. Natural units.
+place is monotone in the rotation, so that only this is looked at, and a step in which it does not
+turn need not be met at its end. Natural units.
 
 The place of a corner is told *outward*: how far it is, toward its own side, from the mass's centre
 as it first stood. That of the corner at height z over the mass's centre on the side `sign` (+1
@@ -18,7 +19,7 @@ from rockcheck.ebm.core import lanes, series
 from rockcheck.ebm.core.block import side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
 from rockcheck.ebm.core.motion import motion_at
-from rockcheck.ebm.core.names import Family, Kind, Pivot, Row
+from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
 from rockcheck.ebm.core.state import mode_code, rocks, stands_still
 from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
@@ -89,9 +90,12 @@ def follow(block, run, began):
     state, mode = run.state, run.state.mode
     _note_first(state, began)
     if rocks(mode):
-        for sign in (1.0, -1.0):
-            _combine(run.a, constant=0.0, of_phi=sign, of_s=0.0, of_c=0.0, of_xi=0.0, of_y=0.0)
-            _look(block, run, began, -np.inf)
+        if _may_turn(run):
+            for sign in (1.0, -1.0):
+                _combine(run.a, constant=0.0, of_phi=sign, of_s=0.0, of_c=0.0, of_xi=0.0, of_y=0.0)
+                _look(block, run, began, -np.inf)
+        elif state.guard == Guard.NONE and state.t < state.quiet_from:
+            return  # An arc is met at its ends; on a quiet base what is known decides when it ends.
     elif mode.family == Family.TILT and not stands_still(mode):
         _follow_tilted(block, run, began)
     elif mode.family == Family.FLAT and mode.pivot == Pivot.OFF:
@@ -101,6 +105,17 @@ def follow(block, run, began):
         _combine(run.a, -block.height, 0.0, 0.0, 0.0, 0.0, 1.0)
         _look(block, run, began, state.extremes.hop)
     meet(block, state, state.motion, state.t)
+
+
+@inner_kernel
+def _may_turn(run):
+    """Whether the rate of rotation may change its sign in the step."""
+    state, a = run.state, run.a
+    sign = math.copysign(1.0, a[Row.OMEGA, 0])
+    low, high = series.halves(a, Row.OMEGA, state.order - 1)
+    return (
+        not sign * a[Row.OMEGA, 0] + series.least_change(low * sign, high * sign, state.tau) > 0.0
+    )
 
 
 @inner_kernel

@@ -10,7 +10,7 @@ from stepping import run_at, setting_of
 
 from rockcheck.ebm.core import extremes, motion, series
 from rockcheck.ebm.core.ground import ground_of
-from rockcheck.ebm.core.names import Family, Keep, Pivot, Row
+from rockcheck.ebm.core.names import Family, Guard, Keep, Pivot, Row
 from rockcheck.ebm.core.state import Base
 from rockcheck.scenes import Rest, Sine, Wall
 
@@ -141,6 +141,51 @@ def test_the_extremes_of_a_step_are_those_of_a_dense_look(name, sense):
         if family == Family.TILT:
             at = record.turned_at[0 if sense > 0 else 1]
             assert at == pytest.approx(expected["turned_at"], abs=2e-4)
+
+
+def rocking_steps(*, guard=Guard.NONE, quiet_from=math.inf):
+    """The records of rocking steps that begin at t = 0, the figures of each by a dense look, and
+    whether it turns; some turn, others do not."""
+    rng, pulse = np.random.default_rng(5), Sine(amplitude=0.4, period=3.0)
+    base = Base(ground_of(pulse, 1.0, 1.0), ground_of(Rest(), 1.0, 1.0))
+    block = setting_of(RACK, 0.2)
+    for number in range(40):
+        sense, tau = (1, -1)[number % 2], rng.uniform(0.05, 0.4)
+        start = random_motion(rng, Family.TILT, Pivot.STICK, sense, 0, False)
+        run = begun(start, family=Family.TILT, pivot=Pivot.STICK, sense=sense, pull=1)
+        state = run.state
+        state.order = motion.mode_series(block, base, run, series.ORDER, 0.0, tau)
+        state.tau = state.length = state.t = tau
+        state.guard, state.quiet_from = guard, quiet_from
+        motion.motion_at(block, state, run.a, tau, state.motion)
+        extremes.follow(block, run, 0.0)
+        phi = run.a[Row.PHI, : state.order + 1][::-1]
+        rates = np.polyval(np.polyder(phi), np.linspace(0.0, tau, 4000))
+        yield state.extremes, look(run, sense, "rocks", tau), np.min(rates) * np.max(rates) < 0.0
+
+
+def test_where_rocking_turns_is_met():
+    turning = [(record, dense) for record, dense, turns in rocking_steps() if turns]
+    assert len(turning) > 5
+    for record, dense in turning:
+        assert record.turned == pytest.approx(dense["turned"], abs=1e-8)
+        np.testing.assert_allclose(record.tops, dense["tops"], rtol=0.0, atol=1e-8)
+
+
+def test_a_rocking_step_that_does_not_turn_is_left_to_the_end_of_its_arc():
+    """But for a few that a bound cannot tell from one that turns."""
+    onward = [(record, dense) for record, dense, turns in rocking_steps() if not turns]
+    left = [record for record, dense in onward if np.max(dense["tops"] - record.tops) > 1e-6]
+    assert len(left) > 0.8 * len(onward) > 5
+
+
+@pytest.mark.parametrize(
+    "ends", [{"guard": Guard.PHI}, {"quiet_from": 0.0}], ids=["with its arc", "on a quiet base"]
+)
+def test_the_end_of_a_rocking_step_is_met_where_it_ends(ends):
+    for record, dense, _ in rocking_steps(**ends):
+        assert record.turned == pytest.approx(dense["turned"], abs=1e-8)
+        np.testing.assert_allclose(record.tops, dense["tops"], rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.parametrize("weight", [1.0, -2.0])
