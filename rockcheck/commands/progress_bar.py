@@ -50,7 +50,7 @@ def progress(
         BarColumn(20),
         TaskProgressColumn(),
         TimeElapsedColumn(),
-        _TimeLeft(pace),
+        TimeLeft(pace),
         console=screen,
         transient=True,
         disable=mode.get() != "tables" or not screen.is_terminal,
@@ -70,7 +70,7 @@ def progress(
 
     over = threading.Event()
     if bar.disable and mode.get() != "quiet":
-        threading.Thread(target=_tell_lines, args=[title, task, pace, over], daemon=True).start()
+        threading.Thread(target=tell_lines, args=[title, task, pace, over], daemon=True).start()
     with nullcontext() if bar.disable else bar:
         try:
             yield on_progress
@@ -78,7 +78,7 @@ def progress(
             over.set()
 
 
-def _tell_lines(title: str, task: ProgressTask, pace: Pace, over: threading.Event) -> None:
+def tell_lines(title: str, task: ProgressTask, pace: Pace, over: threading.Event) -> None:
     """Print lines of progress for a log until the work is `over`.
 
     None for a work of a few seconds.
@@ -86,22 +86,22 @@ def _tell_lines(title: str, task: ProgressTask, pace: Pace, over: threading.Even
     wait = EARLY
     while not over.wait(wait):
         left = pace.left
-        if wait == EVERY or (left or 0.0) > EVERY:
+        if wait == EVERY or (left is not None and left > EVERY):
             parts = f"{pace.done:.0f} of {pace.total:.0f}, " if pace.total else ""
             what = f" ({printable(task.fields['what'], 60)})" if task.fields["what"] else ""
-            words = f"{parts}{_time_words(pace)}{what}"
+            words = f"{parts}{time_words(pace)}{what}"
             print(f"rockcheck: {title}: {words}", file=sys.stderr, flush=True)
         wait = EVERY
 
 
-def _time_words(pace: Pace) -> str:
+def time_words(pace: Pace) -> str:
     """The time left, as "2:05 left"; before that is known the time so far."""
     left = pace.left
     minutes, seconds = divmod(int(pace.elapsed if left is None else left), 60)
     return f"{minutes}:{seconds:02d} {'so far' if left is None else 'left'}"
 
 
-class _TimeLeft(ProgressColumn):
+class TimeLeft(ProgressColumn):
     """The time left in a bar."""
 
     def __init__(self, pace: Pace) -> None:
@@ -109,4 +109,5 @@ class _TimeLeft(ProgressColumn):
         self.pace = pace
 
     def render(self, task: ProgressTask) -> Text:
-        return Text("" if self.pace.left is None else _time_words(self.pace), style="cyan")
+        """The words of the time left; none before it is known."""
+        return Text("" if self.pace.left is None else time_words(self.pace), style="cyan")

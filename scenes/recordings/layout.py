@@ -77,14 +77,14 @@ def is_ambiguous_comma(line: str, head: list[str]) -> bool:
     """
     if "." in line or len(line.split()) != 1:
         return False
-    return all("," not in other or is_decimal_comma(other.strip()[:60]) for other in head)
+    return all("," not in other or is_decimal_comma(other.strip()) for other in head)
 
 
 def layout_of(rows: NumberedLines, reading: Reading) -> Layout:
     """The layout of a table, from its first line of numbers, else from its first line."""
     head = [line for _, line in rows[:MOST_HEADER]]
     lines_of_numbers = (line for line in head if _BEGINS_WITH_NUMBER.match(line))
-    line = next(lines_of_numbers, head[0])[:10_000]
+    line = next(lines_of_numbers, head[0])
     for sign in ";\t":
         if sign in line:
             return Layout(sign, _takes_commas_for_decimals(line, reading))

@@ -390,11 +390,11 @@ def _step_of(
     """The time step of a column of times, within the digits printed, and notes on it.
 
     It is the first of these that all times agree with: the mean step as printed; a whole number of
-    samples a second, each time within its last digit; the mean step, each time within its last
-    digit or 1 % of a step. If `reading` gives a time step, only that one is tried. Raises
-    `InputError` where none fits.
+    samples a second, each time within its last digit; the mean step to twelve digits, each time
+    within its last digit or 1 % of a step. If `reading` gives a time step, only that one is tried.
+    Raises `InputError` where none fits.
     """
-    mean = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    mean = float(f"{float(time[-1] - time[0]) / max(len(time) - 1, 1):.12g}")
     if len(words) < 2:
         raise fault(f"{len(words)} sample(s); at least 2 are needed to know the time step")
     if not mean > LEAST:
@@ -423,4 +423,4 @@ def _step_of(
             f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first]
         )
     notes = [f"the first time is {time[0]:g} s; it is 0 here"] if abs(time[0]) > rounding else []
-    return float(f"{step:.12g}") if step == mean and reading.time_step is None else step, notes
+    return step, notes

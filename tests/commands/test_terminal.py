@@ -151,18 +151,6 @@ FOUR_DONE = r"validate: 4 of 40, \d+:\d\d left \(fig4a\?, cm\)"
         ("tables", FOUR, 0.2, 0.15, 2, FOUR_DONE),
         ("json", FOUR, 0.2, 0.15, 2, FOUR_DONE),
         ("quiet", FOUR, 0.2, 0.15, 0, ""),
-        # Of unknown length: how long it has gone on. Nothing of a short one.
-        ("tables", [0.3], 0.1, 0.01, 1, "validate: 0:00 so far"),
-        ("tables", [(1, 2)], 0.1, 0.01, 0, ""),
-        # 400 cells were read back at once: the others take as long as the first of them, 0.1 s.
-        (
-            "tables",
-            [(400, 800), 0.1, (401, 800), 0.3],
-            10.0,
-            0.2,
-            1,
-            r"validate: 401 of 800, (0:39|0:[45]\d|[1-9]\d*:\d\d) left",
-        ),
     ],
 )
 def test_a_long_work_tells_a_log_how_far_it_is(

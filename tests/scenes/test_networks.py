@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.scenes import Floats, InputError, recordings
-from rockcheck.scenes.recordings import sets
+from rockcheck.scenes.recordings import network_columns, networks, sets
 
 GRAVITY = recordings.GRAVITY_OF_RECORDS
 
@@ -476,6 +476,130 @@ def test_a_digit_that_is_lost_is_told_or_changes_nothing(name, data, written):
     assert said or is_right(components, original)
 
 
+#: Whose last block holds no accelerations.
+OTHER_END = ("GeoNet V2A",)
+
+
+@pytest.mark.parametrize("name", [name for name in FORMATS if name not in (*FREE, *OTHER_END)])
+def test_the_line_that_lost_a_digit_is_named(name, written):
+    lines, first = sample_lines(FORMATS[name][0](96, 0.01, 3.0))
+    row = first + 2
+    short = lines[row].rstrip()[:-1] + "\n"
+    _, said = answers(name, "".join([*lines[:row], short, *lines[row + 1 :]]), written)
+    assert f"line {row + 1}" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "stated", "message"),
+    [
+        ("China", "DURATION: 0.96", "line 8: DURATION says 9.06 s"),
+        ("CWB", "#RecordLength(sec): 0.96", "line 3: #RecordLength says 9.06 s"),
+        ("RENADIC", "RECORD LENGTH =  0.950", "line 11: the header says 9.05 s"),
+        ("USC", f"{0.95:10.3f}", "line 21: the header says 9.05 s"),
+        ("UNAM", "C1-C6 : /0.96/0.96", "line 11: DURACION says 9.06 s"),
+        ("AFAD", "DURATION_S: 0.96", "line 6: DURATION_S says 9.06 s"),
+    ],
+)
+def test_a_length_that_contradicts_count_and_step_is_refused(name, stated, message, written):
+    text = FORMATS[name][0](96, 0.01, 3.0)
+    assert stated in text
+    wrong = stated.replace("0.9", "9.0")
+    assert message in answers(name, text.replace(stated, wrong), written)[1]
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("China", "   AT   1.30 SEC    DURATION: 0.96 SEC"),
+        ("CWB", "#RecordLength(sec): 0.96\n"),
+        ("UNAM", "DURACION DEL REGISTRO (s), C1-C6 : /0.96/0.96/0.96\n"),
+        ("UNAM", "ACEL. MAX.(Gal), C1-C6 : /300.00/150.00/75.00\n"),
+        ("AFAD", "DURATION_S: 0.96\n"),
+        ("AFAD", "PGA_CM/S^2: 300.000000\n"),
+    ],
+)
+def test_a_length_or_a_peak_may_be_missing(name, line, written):
+    text = FORMATS[name][0](96, 0.01, 3.0)
+    assert line in text
+    components, said = answers(name, text.replace(line, ""), written)
+    assert is_right(components, answers(name, text, written)[0])
+    assert said == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "line", "said"),
+    [
+        ("NSMN", "NUMBER OF DATA  : 96\n", "no header line that states NUMBER OF DATA"),
+        ("UNAM", "NUM. TOTAL DE MUESTRAS, C1-C6 : /96/96/96\n", "NUM. TOTAL DE MUESTRAS"),
+        (
+            "UNAM",
+            "INTERVALO DE MUESTREO, C1-C6 (s) : /0.01/0.01/0.01\n",
+            "no header line that states INTERVALO DE MUESTREO",
+        ),
+        ("AFAD", "NDATA: 96\n", "no header line that states NDATA"),
+    ],
+)
+def test_a_count_and_a_step_may_not_be_missing(name, line, said, written):
+    text = FORMATS[name][0](96, 0.01, 3.0)
+    assert line in text
+    assert said in answers(name, text.replace(line, ""), written)[1]
+
+
+@pytest.mark.parametrize(
+    ("volume", "stated", "swapped", "said"),
+    [
+        (1, "units of 1.00", "units of 2.00", "line 11: units of 2 mm/s/s"),
+        (1, "intervals of 0.0100", "intervals of 0.0000", "line 11: at intervals of 0.0000 is not"),
+        (1, "Peak   3000.0", "Peak   9000.0", "line 14: Peak says a peak of 9000 mm/s2"),
+        (1, f"{96:12.4f}", f"{0:12.4f}", "line 20: the count of samples 0 is not in"),
+        (2, f"{96:12.4f}", f"{0:12.4f}", "line 20: the count of samples 0 is not in"),
+        (2, f"{0.01:12.4f}", f"{0:12.4f}", "line 23: the time step 0.0 is not positive"),
+    ],
+)
+def test_geonet_names_the_line_of_a_fault(volume, stated, swapped, said, written):
+    text = geonet(volume)(96, 0.01, 3.0)
+    assert stated in text
+    assert said in answers("GeoNet V1A", text.replace(stated, swapped), written)[1]
+
+
+@pytest.mark.parametrize(
+    ("upward", "azimuth", "name"),
+    [(0, 90, "up"), (180, 90, "down"), (90, 90, "90 deg"), (-32768, 0, "0 deg"), (90, -32768, "")],
+)
+def test_the_angles_of_an_smc_file_name_its_component(upward, azimuth, name, written):
+    text = smc(96, 0.01, 3.0).replace(f"{90:10d}{360:10d}", f"{upward:10d}{azimuth:10d}")
+    assert recordings.read_record(written("a.smc", text.encode())).component == name
+
+
+@pytest.mark.parametrize(
+    ("second", "third", "fits"),
+    [
+        ("2 0.01", "0.1", True),
+        ("9 1.0", "0.1 0.2 0.3", True),
+        ("1 0.01", "0.1", False),  # of one sample
+        ("9 0.01", "0.1 0.2", False),  # a table of two columns
+        ("9 1.5", "0.1", False),  # no step of a record
+        ("9 0", "0.1", False),
+    ],
+)
+def test_a_second_line_of_a_count_and_a_step_stands_above_lines_of_other_width(second, third, fits):
+    reader = networks.network_reader(["made-up motion", second, third])
+    assert reader is (networks.read_count_and_step if fits else None)
+
+
+@pytest.mark.parametrize(
+    ("line", "bbp"),
+    [
+        ("# time(sec) N-S(cm/s/s)", True),
+        ("# time(s)  N-S(cm/s/s)  E-W(cm/s/s)", True),
+        ("# time(s)  N-S(cm/s)  E-W(cm/s)", False),
+        ("# time(s)  N-S", False),
+    ],
+)
+def test_a_bbp_file_names_times_and_a_unit_of_acceleration(line, bbp):
+    assert network_columns.is_bbp([line]) == bbp
+
+
 @pytest.mark.parametrize(
     ("name", "stated", "swapped"),
     [
@@ -517,6 +641,23 @@ def test_a_unit_that_is_swapped_is_told(name, stated, swapped, written):
 def test_raw_counts_are_refused_by_name(name, stated, counts, written):
     text = FORMATS[name][0](96, 0.01, 3.0)
     assert "raw counts of the digitiser" in answers(name, text.replace(stated, counts), written)[1]
+
+
+def test_a_peak_in_an_unknown_unit_counts_for_nothing(written):
+    text = FORMATS["RENADIC"][0](96, 0.01, 3.0)
+    components, said = answers("RENADIC", text.replace(" G, AT", " VOLT, AT"), written)
+    assert is_right(components, answers("RENADIC", text, written)[0])
+    assert said == ""
+
+
+@pytest.mark.parametrize(
+    ("form", "said"),
+    [("8f1.0", "numbers go on behind the 8 fields of 1 "), ("8f0.0", "a format without fields")],
+)
+def test_a_field_has_at_least_one_character(form, said, written):
+    name = "CSMIP RAW, fields in words"
+    text = FORMATS[name][0](96, 0.01, 3.0).replace("8f11.6", form)
+    assert said in answers(name, text, written)[1]
 
 
 def test_words_and_integers_of_a_header_that_differ_are_named(written):

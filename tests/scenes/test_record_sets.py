@@ -252,7 +252,15 @@ def test_times_are_judged_by_their_digits(rate, decimals, written, fault_of):
         said = str(fault_of(recordings.read_record, path)).split("is off the uniform step ")[1]
         assert "; times of 0.01 s may hide it: --read time_step" in said
     reading = recordings.Reading(time_step=1 / rate) if hidden else recordings.Reading()
-    assert recordings.read_record(path, reading).time_step == pytest.approx(1 / rate, rel=1e-12)
+    assert recordings.read_record(path, reading).time_step == 1 / rate
+
+
+def test_a_step_of_no_whole_rate_is_the_mean_to_twelve_digits(written):
+    rows = "".join(f"{n * 0.01371:.4f},0.1\n" for n in range(1000))
+    path = written("a.csv", "time_s,acceleration_g\n" + rows)
+    step = recordings.read_record(path).time_step
+    assert step == pytest.approx(0.01371, rel=1e-5)
+    assert step == float(f"{step:.12g}")
 
 
 def test_a_late_start_is_zero_for_the_scene_and_a_note_says_so(written):

@@ -215,12 +215,24 @@ def test_several_components_in_one_file(write, names, written, told, fault_of):
 RAW, OWN, UNKNOWN = (b"%13.6f" % value for value in (2 * STEP, 1000 * STEP, -999))
 
 
+OWN_LINE = cosmos("N-S").split(OWN)[0].count(b"\n") + 1
+
+
 @pytest.mark.parametrize(
     ("raw", "own"), [(RAW, OWN), (b"%13.6f" % STEP, OWN), (b"%13.6f" % STEP, UNKNOWN)]
 )
 def test_a_v2_file_has_its_own_time_step_not_that_of_the_raw_record(written, raw, own):
     path = written("a.V2", cosmos("N-S").replace(RAW, raw).replace(OWN, own))
     assert recordings.read_record(path).time_step == STEP
+
+
+def test_header_values_of_a_v2_file_may_be_of_one_digit(written):
+    wide = b"100 Integer-header values follow on  10 lines, Format= (10I8)\n"
+    head, tail = cosmos("N-S").split(wide)
+    narrow = b"100 Integer-header values follow on   2 lines, Format= (60I1)\n"
+    digits = b"0" * 53 + b"9" + b"0" * 6 + b"\n" + b"0" * 40 + b"\n"
+    path = written("a.V2", head + narrow + digits + tail.split(b"\n", 10)[-1])
+    assert recordings.read_record(path).component == "9 deg"
 
 
 def test_k_net_takes_out_the_offset_and_says_so(written):
@@ -261,6 +273,7 @@ def test_k_net_takes_out_the_offset_and_says_so(written):
             {},
             r"Duration Time\(s\) 4 is 400 samples, the file has 336",
         ),
+        ("a.V2", cosmos("N-S").replace(OWN, b"%13s" % b"ten"), {}, f"line {OWN_LINE}: 'ten' is"),
         *(
             ("a.AT2", at2("N-S"), option, "leave the option")
             for option in (

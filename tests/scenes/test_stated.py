@@ -5,7 +5,7 @@ import pytest
 
 from rockcheck.scenes import Record, recordings
 from rockcheck.scenes.recordings import Reading
-from rockcheck.scenes.recordings.stated import Fact, Stated, recording_of
+from rockcheck.scenes.recordings.stated import Fact, Stated, last_digit, recording_of
 
 G = 9.80665
 VALUES = [0.0, 0.1, -0.3, 0.2]
@@ -35,9 +35,16 @@ def test_an_option_that_says_the_same_is_fine(options):
     assert read(**options).notes == ()
 
 
-@pytest.mark.parametrize("seconds", [0.06, 0.08, 0.1])
+@pytest.mark.parametrize("seconds", [0.05, 0.06, 0.08, 0.1, 0.11])
 def test_a_duration_may_count_samples_or_steps(seconds):
     assert read(changes={"duration": Fact(seconds)}).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("word", "half"), [("0.058", 5e-4), ("58", 0.5), ("5.8E-2", 5e-4), ("5.8D+03", 50.0)]
+)
+def test_the_last_digit_leaves_half_of_its_unit_open(word, half):
+    assert last_digit(word) == pytest.approx(half)
 
 
 def test_a_peak_may_differ_by_its_tolerance():

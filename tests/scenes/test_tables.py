@@ -7,7 +7,12 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from rockcheck.scenes import InputError, Record, recordings
 from rockcheck.scenes.recordings import Reading, sets
 from rockcheck.scenes.recordings.headers import facts_of
-from rockcheck.scenes.recordings.layout import has_decimal_commas, is_ambiguous_comma
+from rockcheck.scenes.recordings.layout import (
+    Layout,
+    has_decimal_commas,
+    is_ambiguous_comma,
+    layout_of,
+)
 from rockcheck.scenes.recordings.order import Shape, are_times, runs_along_rows
 from rockcheck.scenes.recordings.recording import known_unit
 from rockcheck.scenes.recordings.tables import unit_of_name
@@ -146,6 +151,11 @@ def test_what_a_header_states_is_held_against_the_table(header, message, written
     assert message in str(fault_of(read, written, with_times(header), unit="m/s2"))
 
 
+@pytest.mark.parametrize("step", ["0.01", "0.0100999", "0.0099001"])
+def test_a_time_step_of_the_header_is_that_of_the_times_within_a_hundredth(step, written):
+    assert read(written, with_times(f"# dt = {step} s\n"), unit="m/s2").time_step == 0.01
+
+
 def test_a_header_that_is_right_needs_no_option(written):
     header = "NPTS: 100\nDT = 0.01 s\nUnits: cm/s/s\nPGA = 1.0 cm/s2\n"
     recording = read(written, header + along_lines())
@@ -205,6 +215,18 @@ def test_decimal_commas(line, decimal):
 @pytest.mark.parametrize(("head", "ambiguous"), [(["0,5"], True), (["t,a", "0,5"], False)])
 def test_an_ambiguous_comma(head, ambiguous):
     assert is_ambiguous_comma("0,5", head) == ambiguous
+
+
+@pytest.mark.parametrize(
+    ("line", "decimal_comma"), [("0;1", False), ("0;1,5", True), ("0.5;1.5", False)]
+)
+def test_between_semicolons_a_comma_stands_before_decimals(line, decimal_comma):
+    assert layout_of([(1, line)], Reading()) == Layout(";", decimal_comma)
+
+
+def test_decimal_commas_are_known_on_a_line_of_any_length():
+    line = "1,234 " * 2000
+    assert layout_of([(1, line)], Reading()) == Layout(None, True)
 
 
 @pytest.mark.parametrize(
@@ -286,6 +308,29 @@ def test_a_record_tells_of_no_period_beyond_its_length(written, fault_of):
     assert "sa:99 is not resolved" in str(fault_of(value, recording, None))
     value = measure_of("sa:1").of
     assert value(recording, None) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("unit", "size"),
+    [("mg", 9.80665e-3), ("gal", 0.01), ("mm/s2", 1e-3), ("ft/s2", 0.3048), ("g", 9.80665)],
+)
+def test_a_unit_has_its_size_in_m_s2(unit, size, written):
+    recording = read(written, with_times(), unit=unit)
+    np.testing.assert_allclose(recording.samples, size * VALUES, atol=1e-5 * size)
+
+
+@pytest.mark.parametrize(
+    ("most", "beyond"),
+    [
+        ({"column": 1000}, {"column": 1001}),
+        ({"component": 1000}, {"component": 1001}),
+        ({"column": "a" * 100}, {"column": "a" * 101}),
+        ({"header_lines": 10_000}, {"header_lines": 10_001}),
+    ],
+)
+def test_an_option_has_a_largest_value(most, beyond, fault_of):
+    assert Reading(**most)
+    fault_of(Reading, **beyond)
 
 
 def test_a_scale_of_nothing_is_refused(written, fault_of):
