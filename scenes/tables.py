@@ -68,7 +68,7 @@ def read(path: Path) -> Table:
         names=numbered,
         skiprows=below[0],
         sep=separator or r"\s+",
-        decimal=_decimal(lines[below[0]], separator),
+        decimal=decimal_of(lines[below[0]], separator),
         encoding=encoding,
     )
     return Table(names, units, frame, remarks)
@@ -117,7 +117,7 @@ def _are_units(fields: Sequence[str], count: int) -> bool:
     return len(fields) == count and any(known) and all(field in ("", "-") for field in others)
 
 
-def _decimal(line: str, separator: str | None) -> str:
+def decimal_of(line: str, separator: str | None) -> str:
     """What stands before the decimals of a line of numbers."""
     content = _content(line)
     return "," if separator != "," and "," in content and "." not in content else "."

@@ -46,7 +46,7 @@ def read_waveforms(content: bytes, form: str, reading: Reading) -> list[Recordin
     words = "a SAC file" if form == "SAC" else "a miniSEED file"
     if find_spec("obspy") is None:
         raise fault(f"{words}: install ObsPy, the extra seismology: pip install obspy")
-    traces = _traces(content, form, words)
+    traces = traces_of(content, form, words)
     channels = [trace.id for trace in traces]
     if not channels:
         raise fault(f"{words} without samples")
@@ -56,7 +56,7 @@ def read_waveforms(content: bytes, form: str, reading: Reading) -> list[Recordin
     return [_recording(trace, words, reading) for trace in traces]
 
 
-def _traces(content: bytes, form: str, words: str) -> list[Any]:
+def traces_of(content: bytes, form: str, words: str) -> list[Any]:
     """ObsPy's traces, those that follow each other joined."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from rockcheck.scenes import History, InputError
+from rockcheck.scenes import History, InputError, tables
 
 #: theta of all tables below, rad.
 THETA = [0.0, math.radians(1.5), math.radians(-0.25)]
@@ -38,6 +38,32 @@ def test_a_table_of_another_program_is_read(form, written):
     np.testing.assert_allclose(history.channels["theta"], THETA, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("head", "factor"),
+    [("time_ms,theta_rad", 1.0), ("t_ms,theta_mrad", 1e-3), ("t_ms,theta_deg", math.pi / 180)],
+)
+def test_angles_and_times_have_their_units(head, factor, written):
+    history = History.load(written("run.csv", f"{head}\n0,0\n500,0.25\n"))
+    assert history.channels["t"].tolist() == [0.0, 0.5]
+    assert history.channels["theta"][1] == pytest.approx(0.25 * factor)
+
+
+@pytest.mark.parametrize(
+    ("line", "separator", "sign"),
+    [
+        ("0,5;1,5", ";", ","),
+        ("0.5;1.5", ";", "."),
+        ("1;2", ";", "."),
+        ("0,5", ",", "."),
+        ("0.5,1.5", ",", "."),
+        ("1,234.5;2", ";", "."),
+        ("0,5 1,5", None, ","),
+    ],
+)
+def test_what_stands_before_the_decimals(line, separator, sign):
+    assert tables.decimal_of(line, separator) == sign
+
+
 def test_a_degree_sign_in_latin_1_is_read(written):
     text = "Time (s),Rotation (\u00b0)\n0,0\n0.5,1.5\n1,-0.25\n"
     history = History.load(written("run.csv", text.encode("latin-1")))
@@ -48,6 +74,8 @@ def test_a_degree_sign_in_latin_1_is_read(written):
     ("name", "quantity", "factor"),
     [
         ("Slip (mm)", "slip", 1e-3),
+        ("theta_dot_rad_s", "theta_dot", 1.0),
+        ("y_in", "y", 0.0254),
         ("x [cm]", "x", 1e-2),
         ("Angular velocity (deg/s)", "theta_dot", math.radians(1.0)),
         ("Rotation rate [mrad/s]", "theta_dot", 1e-3),

@@ -172,6 +172,39 @@ def test_a_plain_table_is_a_measured_history(written):
         assert History.load(written("table.csv", rows)).outcome == outcome
 
 
+@pytest.mark.parametrize(
+    ("end", "outcome"),
+    [
+        ("1.1,0,0,0", "moving"),
+        ("1.53,0,0,0", "overturned left"),
+        ("-1.53,0,0,0", "overturned right"),
+        ("0.001,0,0,0", "moving"),
+        ("0,0.001,0,0", "moving"),
+        ("0,0,0.001,0", "moving"),
+        ("0,0,0,-0.001", "moving"),
+        ("0.00005,0.00005,0.00005,0.00005", "at rest"),
+    ],
+)
+def test_the_outcome_is_that_of_the_last_row(end, outcome, written):
+    text = f"t,theta,theta_dot,x_dot,y_dot\n0,0,0,0,0\n1,{end}\n"
+    assert History.load(written("run.csv", text)).outcome == outcome
+
+
+@pytest.mark.parametrize(("angles", "time"), [((0.1, 1.53, 1.56), 1.0), ((0.1, 1.2, 1.4), 2.0)])
+def test_without_an_event_a_block_is_down_once_it_lies(angles, time):
+    channels = {"t": np.arange(3.0), "theta": np.array(angles)}
+    history = History(
+        name="a", model="b", channels=channels, event_list=(), outcome="overturned left"
+    )
+    assert history.overturned_at == time
+    assert history.fate == f"overturned left at {time:g} s"
+
+
+def test_a_measured_history_has_cost_nothing(written):
+    history = History.load(written("run.csv", "t,theta\n0,0\n1,0.1\n"))
+    assert not any(vars(history.cost).values())
+
+
 def rows_about(text: str) -> str:
     """Rows with a column in which the first says this of the history."""
     return 't,theta,rockcheck_history\n0,0,"{}"\n1,0.1,\n'.format(text.replace('"', '""'))

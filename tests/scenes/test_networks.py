@@ -580,11 +580,41 @@ def test_the_angles_of_an_smc_file_name_its_component(upward, azimuth, name, wri
         ("9 0.01", "0.1 0.2", False),  # a table of two columns
         ("9 1.5", "0.1", False),  # no step of a record
         ("9 0", "0.1", False),
+        ("", "0.1", False),
     ],
 )
 def test_a_second_line_of_a_count_and_a_step_stands_above_lines_of_other_width(second, third, fits):
     reader = networks.network_reader(["made-up motion", second, third])
     assert reader is (networks.read_count_and_step if fits else None)
+
+
+@pytest.mark.parametrize("title", ["", "1 2 3"])
+def test_above_a_count_and_a_step_stands_a_title(title):
+    assert networks.network_reader([title, "9 0.01", "0.1"]) is None
+
+
+def test_one_step_of_a_unam_file_holds_for_all_channels(written):
+    text = unam(96, 0.01, 3.0)
+    components, _ = answers("UNAM", text.replace("(s) : /0.01/0.01/0.01", "(s) : /0.01"), written)
+    assert is_right(components, answers("UNAM", text, written)[0])
+
+
+def test_a_geonet_file_that_ends_with_its_header_is_refused(written):
+    text = "".join(geonet(1)(96, 0.01, 3.0).splitlines(keepends=True)[:26])
+    assert "line 26: the file ends within a header" in answers("GeoNet V1A", text, written)[1]
+
+
+def test_one_sample_in_some_seconds_has_no_step(written):
+    text = bhrc(1, 0.013, 3.0)
+    assert "the time step 0.0 is not positive" in answers("BHRC", text, written)[1]
+
+
+@pytest.mark.parametrize("name", [name for name in FORMATS if name not in OTHER_END])
+def test_the_line_of_a_word_that_is_no_number_is_named(name, written):
+    lines, first = sample_lines(FORMATS[name][0](96, 0.01, 3.0))
+    row = first + 2
+    lines[row] = lines[row].rstrip()[:-1] + "x\n"
+    assert f"line {row + 1}: " in answers(name, "".join(lines), written)[1]
 
 
 @pytest.mark.parametrize(

@@ -333,6 +333,47 @@ def test_output_times(duration, step, rows):
     )
 
 
+@pytest.mark.parametrize(
+    ("duration", "step", "last"),
+    [
+        (1.0, 0.1, [0.9, 1.0]),
+        (0.3, 0.1, [0.2, 0.3]),
+        (1.0, 0.3, [0.9, 1.0]),
+        (0.05, 0.1, [0, 0.05]),
+    ],
+)
+def test_a_run_goes_to_the_scene_s_end(duration, step, last):
+    times = scene(duration=duration, output_step=step).run_times
+    np.testing.assert_allclose(times[-2:], last, rtol=1e-9)
+
+
+def test_a_scene_begins_at_rest_and_upright_and_nothing_bounces_unless_it_says_so():
+    made = scene(walls=[{"side": "left", "gap": 0.053}])
+    assert made.initial_state == (0.0, 1.555, 0.0, 0.0, 0.0, 0.0)
+    assert made.floor.restitution == made.walls[0].restitution == 0.0
+
+
+def test_a_block_starts_tilted_by_less_than_a_right_angle(fault_of):
+    for side in (1.0, -1.0):
+        assert scene(walls=[], initial_rotation=side * 1.57).initial_rotation == side * 1.57
+        fault_of(scene, walls=[], initial_rotation=side * 1.571)
+
+
+@pytest.mark.parametrize(("friction", "share"), [(0.2, 0.2), (0.9, 0.397 / 1.555), (0.0, 0.01)])
+def test_a_block_is_moved_by_sliding_or_by_uplift_and_on_ice_by_little(friction, share):
+    made = scene(floor={"friction": friction})
+    assert made.moving_acceleration == pytest.approx(9.81 * share)
+
+
+def test_the_mirrored_scene_is_shaken_the_other_way():
+    made = scene(initial_rotation=-0.1, initial_angular_velocity=0.2, initial_velocity=0.3)
+    other = made.mirrored()
+    assert other.excitation.acceleration(0.1) == -made.excitation.acceleration(0.1) != 0.0
+    assert [wall.side for wall in other.walls] == ["right"]
+    x, y, theta, x_dot, y_dot, theta_dot = made.initial_state
+    assert other.initial_state == pytest.approx((-x, y, -theta, -x_dot, y_dot, -theta_dot))
+
+
 @pytest.mark.parametrize("tilt", [0.0, 0.04, -0.2])
 def test_initial_state_stands_on_its_pivot(tilt):
     made = scene(

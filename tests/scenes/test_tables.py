@@ -237,6 +237,14 @@ def test_which_lines_run_along(widths, along):
 
 
 @pytest.mark.parametrize(
+    ("widths", "even"),
+    [([5], True), ([5, 5, 2], True), ([5, 5, 7], False), ([5, 2, 5], False), ([5, 5, 2, 5], False)],
+)
+def test_lines_are_even_but_for_a_shorter_last_one(widths, even):
+    assert Shape(widths, first_line=1).is_even == even
+
+
+@pytest.mark.parametrize(
     ("values", "times"),
     [
         (0.01 * np.arange(50), True),

@@ -2,6 +2,7 @@
 
 import io
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -126,3 +127,130 @@ def test_without_obspy_the_extra_is_named(written, monkeypatch):
     struct.pack_into("<i", header, 304, 6)
     with pytest.raises(InputError, match="the extra seismology: pip install obspy"):
         recordings.read_record(written("a.sac", bytes(header)), GAL)
+
+
+class Stats(dict):
+    """What a trace of ObsPy says of itself."""
+
+    __getattr__ = dict.__getitem__
+
+
+def trace(channel="HNE", values=VALUES, dtype=np.float32, **sac):
+    stats = Stats(channel=channel, delta=0.01, sac=sac)
+    return SimpleNamespace(id=channel, data=np.asarray(values, dtype=dtype), stats=stats)
+
+
+@pytest.fixture
+def read(monkeypatch):
+    """Reads what ObsPy would have made of a file: these traces."""
+
+    def read(*traces, form="SAC", **options):
+        monkeypatch.setattr(waveforms, "find_spec", lambda name: name)
+        monkeypatch.setattr(waveforms, "traces_of", lambda *file: list(traces))
+        return waveforms.read_waveforms(b"", form, recordings.Reading(**{"unit": "gal", **options}))
+
+    return read
+
+
+@pytest.mark.parametrize(
+    ("start", "form"),
+    [
+        (b"000001D " + bytes(40), "MSEED"),
+        (b"000001M\0" + bytes(40), "MSEED"),
+        (b"000001D " + bytes(39), ""),
+        (b"000001X " + bytes(40), ""),
+        (b"000001Dx" + bytes(40), ""),
+        (b"00000xD " + bytes(40), ""),
+        (bytes(304) + struct.pack("<i", 6) + bytes(324), "SAC"),
+        (bytes(304) + struct.pack(">i", 6) + bytes(324), "SAC"),
+        (bytes(304) + struct.pack("<i", 7) + bytes(324), ""),
+        (bytes(304) + struct.pack("<i", 6) + bytes(323), ""),
+    ],
+)
+def test_a_format_is_known_by_its_first_bytes(start, form):
+    assert waveforms.waveform_format(start) == form
+
+
+@pytest.mark.parametrize(("form", "name"), [("SAC", "SAC"), ("MSEED", "miniSEED")])
+def test_a_trace_is_a_recording_in_the_unit_that_is_given(form, name, read):
+    (recording,) = read(trace(), form=form)
+    np.testing.assert_allclose(recording.samples, 0.01 * VALUES, rtol=1e-6)
+    assert recording.time_step == 0.01
+    assert recording.form == name
+    assert recording.notes == ()
+    assert not recording.borehole
+
+
+def test_each_channel_is_a_recording_and_one_in_parts_has_gaps(read, fault_of):
+    assert [one.component for one in read(trace("HNE"), trace("HNN"))] == ["HNE", "HNN"]
+    assert "the channel HNE has gaps" in str(fault_of(read, trace(), trace()))
+    assert "a SAC file without samples" in str(fault_of(read))
+    assert "a miniSEED file without samples" in str(fault_of(read, form="MSEED"))
+
+
+def test_whole_numbers_are_read_where_a_mark_says_so(read, fault_of):
+    assert "raw counts of the digitiser" in str(fault_of(read, trace(dtype=np.int32)))
+    (recording,) = read(trace(dtype=np.int32), unit="gal!")
+    np.testing.assert_allclose(recording.samples, 0.01 * np.trunc(VALUES))
+
+
+def test_samples_that_are_not_finite_are_refused(read, fault_of):
+    assert "samples that are not finite" in str(fault_of(read, trace(values=[0.0, np.inf, 1.0])))
+
+
+@pytest.mark.parametrize(("kind", "said"), [(6, "displacement"), (7, "velocity")])
+def test_the_header_says_what_the_samples_are(kind, said, read, fault_of):
+    assert f"the header says {said}; only" in str(fault_of(read, trace(idep=kind)))
+    assert len(read(trace(idep=8))) == 1
+
+
+@pytest.mark.parametrize(("channel", "told"), [("HHE", True), ("BLZ", True), ("HN", False)])
+def test_the_code_of_a_seismometer_is_told(channel, told, read):
+    (recording,) = read(trace(channel))
+    assert bool(recording.notes) == told
+
+
+@pytest.mark.parametrize(
+    ("angles", "name"),
+    [
+        ({"cmpinc": 0.0, "cmpaz": 45.0}, "up"),
+        ({"cmpinc": 180.0}, "down"),
+        ({"cmpinc": 90.0, "cmpaz": 45.0}, "45 deg"),
+        ({"cmpinc": -12345.0, "cmpaz": 45.0}, "45 deg"),
+        ({"cmpinc": 90.0, "cmpaz": -12345.0}, ""),
+        ({"cmpinc": 90.0, "cmpaz": np.nan}, ""),
+        ({}, ""),
+    ],
+)
+def test_angles_name_a_trace_without_a_channel(angles, name, read):
+    (recording,) = read(trace("", **angles))
+    assert recording.component == name
+
+
+@pytest.mark.parametrize(("depth", "borehole"), [(100.0, True), (0.0, False), (-12345.0, False)])
+def test_a_depth_of_the_station_is_that_of_a_borehole(depth, borehole, read):
+    (recording,) = read(trace(stdp=depth))
+    assert recording.borehole == borehole
+
+
+@pytest.mark.parametrize(
+    ("least", "largest", "said"),
+    [
+        (-500.0, 90.0, "DEPMIN, DEPMAX says a peak of 500 gal"),
+        (-90.0, 500.0, "DEPMIN, DEPMAX says a peak of 500 gal"),
+        (VALUES.min(), VALUES.max(), ""),
+        (-500.0, -12345.0, ""),
+        (-12345.0, 500.0, ""),
+    ],
+)
+def test_the_larger_extreme_of_the_header_is_the_peak(least, largest, said, read, fault_of):
+    one = trace(depmin=least, depmax=largest)
+    if said:
+        assert said in str(fault_of(read, one))
+    else:
+        assert len(read(one)) == 1
+
+
+def test_without_a_unit_a_trace_has_no_peak(read, fault_of):
+    said = str(fault_of(read, trace(depmin=-500.0, depmax=90.0), unit=None))
+    assert "the unit of acceleration is not stated" in said
