@@ -106,6 +106,8 @@ def read_components(path: Path, reading: Reading | None = None) -> list[Recordin
     except Contradiction as error:
         raise Contradiction(_placed(path, error), error.option, file=path) from None
     except InputError as error:
+        if error.file is not None:  # named already
+            raise
         raise InputError(_placed(path, error), file=path) from None
 
 

@@ -152,4 +152,4 @@ def test_a_shell_is_offered_names_and_files_here(files, offered, tmp_path, monke
 
 
 def test_there_is_at_least_one_worker(refused):
-    assert "--jobs" in refused("warm", "--jobs", "0")
+    assert "greater than or equal to 1" in refused("warm", "--jobs", "0")
