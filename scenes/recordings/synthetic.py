@@ -15,7 +15,7 @@ from pydantic import Field, Strict
 
 from rockcheck.scenes.base import Floats, Frozen
 from rockcheck.scenes.recordings import intensity
-from rockcheck.scenes.recordings.recording import GRAVITY_OF_RECORDS, Recording
+from rockcheck.scenes.recordings.recording import Recording
 
 Ground = Literal["A", "B", "C", "D", "E"]
 GROUNDS: tuple[Ground, ...] = get_args(Ground)
@@ -75,7 +75,7 @@ class _Times:
     @property
     def frequencies(self) -> Floats:
         """The frequencies of the Fourier series, Hz."""
-        return np.fft.rfftfreq(self.count, self.step)
+        return np.asarray(np.fft.rfftfreq(self.count, self.step), dtype=float)
 
     @property
     def shares(self) -> Floats:

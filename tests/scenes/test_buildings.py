@@ -193,6 +193,22 @@ def test_the_building_vibrates_on_until_it_is_quiet() -> None:
     assert np.max(np.abs(free)) * decay == pytest.approx(0.02, rel=0.1)
 
 
+def test_free_vibration_is_the_answer_to_ground_at_rest() -> None:
+    """As under the same record with zeros after its end."""
+    ground = Record.from_samples(np.append(RANDOM.samples, 0.0), RANDOM.time_step)
+    longer = Record.from_samples(np.append(ground.samples, np.zeros(20)), RANDOM.time_step)
+    found, played = sampled(one_mode(), ground), sampled(one_mode(), longer)
+    assert found.time_step == played.time_step
+    ends = round(ground.quiet_after / found.time_step)
+    tail = slice(ends, ends + round(20 * RANDOM.time_step / found.time_step))
+    assert found.samples[tail] == pytest.approx(played.samples[tail], abs=1e-12)
+
+
+def test_a_storey_that_is_quiet_at_once_has_no_free_vibration() -> None:
+    found = sampled(one_mode(), RANDOM, quiet=100.0)
+    assert found.quiet_after == pytest.approx(RANDOM.quiet_after, rel=1e-12)
+
+
 def test_a_record_with_all_its_notes_leaves_room_for_that_of_the_storey():
     full = RANDOM.replace(notes=tuple(f"note {number}" for number in range(20)))
     found = sampled(one_mode(), full)

@@ -80,6 +80,12 @@ INVARIANTS = {
             "what is not said, or wrongly, of a scene on a knife edge and of scenes beside it",
             0.0,
         ),
+        (
+            "storey",
+            "what does not hold of a storey's motion: a rigid building's is the ground's, it is"
+            " linear, has its mirror image, and does not depend on its steps",
+            0.0,
+        ),
         # of models that approximate contact
         (
             "depth",

@@ -18,7 +18,7 @@ from rockcheck.scenes import (
     Scene,
 )
 from rockcheck.validation.execute import models
-from rockcheck.validation.studies.stress import extremes, ties
+from rockcheck.validation.studies.stress import extremes, storeys, ties
 from rockcheck.validation.studies.stress.checks import check_run
 from rockcheck.validation.studies.stress.energy import energy_without_source
 from rockcheck.validation.studies.stress.generator import Kind, exact_scene, random_scene
@@ -131,6 +131,22 @@ class Tied(EventBased):
         unsaid = ties.unsaid(model, scene, number)
         return CheckedRun(
             figures={"ends": 0.0, "ties": float(len(unsaid))}, failure="; ".join(unsaid)
+        )
+
+
+@dataclass(frozen=True)
+class OnStorey(EventBased):
+    """The event-based model on storeys of random buildings; the scene's base is the ground."""
+
+    def check(self, scene: Scene, seed: int, number: int, only: str = "") -> CheckedRun:
+        """Checks the storey's motion, and every invariant of the run under it."""
+        building = storeys.random_building(scene, seed, number)
+        faults = [] if only not in ("", "storey") else [*storeys.faults(building, scene)]
+        played = super().check(storeys.stood(building, scene), seed, number, only)
+        return replace(
+            played,
+            figures=played.figures | {"storey": float(len(faults))},
+            failure="; ".join(filter(None, [played.failure, *faults])),
         )
 
 
@@ -269,6 +285,7 @@ _EVERY: tuple[EventBased | Approximate, ...] = (
     EventBased("ebm-unilateral exact", 20_000, 200, ROUNDING, "unilateral", exact=True),
     EventBased("ebm-bouc-wen exact", 5000, 50, ROUNDING, "bouc-wen", exact=True),
     Tied("ebm-unilateral ties", 2000, 20, "scenes on a knife edge: what is said", "unilateral"),
+    OnStorey("ebm-unilateral storeys", 2000, 20, "on storeys of buildings", "unilateral"),
     Approximate("cm", 2000, 40, "continuous model, standing 1e-8 R deep"),
     *(
         Approximate(facts.name, 2000, 40, f"{facts.label}, best settings, steps of 0.002 sqrt(R/g)")
