@@ -29,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 LANGUAGES = {"python", "bash", "toml", "csv", "yaml", "text"}
 #: Pages whose commands take half a minute and more: every night.
-LATE = ("ci", "conformance", "running")
+LATE = ("ci", "conformance", "running", "storeys")
 #: Commands that take minutes, and the form of them that takes less, where there is one.
 LONG = {"benchmark": "--quick", "spectrum": "", "validate": "", "stress": "--quick"}
 

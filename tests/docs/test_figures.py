@@ -8,15 +8,19 @@ import experience
 import gallery
 import hostile
 import numpy as np
+import pandas
 import planted
 import pytest
 import whole_runs
 from cases import kept_spectra
 
 from rockcheck import ContinuousModel, EventBasedModel, MuJoCo, compare, load_scene
+from rockcheck.commands.cli import main
 from rockcheck.ebm.core import block, contacts, names, series, settle, state
+from rockcheck.scenes import recordings
 from rockcheck.scenes.experience import Experience
 from rockcheck.scenes.kinematics import pivot_height
+from rockcheck.scenes.recordings import intensity, synthetic
 from rockcheck.validation.studies.work_precision.runs import LINES
 from rockcheck.validation.suite import suites
 from rockcheck.validation.suite.runner import run_suite
@@ -75,6 +79,59 @@ def test_the_tutorials_bookcase(tmp_path, told):
     assert rounded(error["mujoco"]) == 9e-4
     assert rounded(error["ebm"], 2) == 0.2
     assert max(error["cm"], error["mujoco"]) < 0.004
+
+
+@pytest.fixture(scope="module")
+def fifth_floor(tmp_path_factory):
+    """The folder of the page about storeys: its scene, and its twelve motions."""
+    folder = tmp_path_factory.mktemp("storeys")
+    page = (DOCS / "storeys.md").read_text("utf-8")
+    scene = re.search(r'```toml title="bookcase.toml"\n(.*?)```', page, re.DOTALL)
+    assert scene is not None
+    (folder / "bookcase.toml").write_text(scene[1], encoding="utf-8")
+    main(["motions", str(folder / "records"), "-q"])
+    return folder
+
+
+def test_the_bookcase_on_the_fifth_floor(fifth_floor):
+    scene = load_scene(fifth_floor / "bookcase.toml")
+    ground = recordings.read_record(fifth_floor / "records" / "synthetic-01.csv")
+    assert rounded(scene.excitation.peak, 2) == 0.61
+    assert rounded(intensity.peak_acceleration(ground), 2) == 0.47
+    found = UNILATERAL.simulate(scene)
+    assert found.outcome == "at rest"
+    assert rounded(found.peak_rotation / found.alpha, 2) == 0.84
+    assert rounded(found.extremes.walls["left"].speed, 2) == 1.7
+    assert rounded(found.extremes.slip, 1) == scene.walls[0].gap
+
+
+def test_the_mean_of_the_twelve_motions_is_within_8_percent():
+    target = synthetic.Target(ground="B", acceleration=0.3)
+    found = synthetic.synthetic_motions(target)
+    spectra = [
+        [intensity.spectral_acceleration(motion, period) for period in synthetic.PERIODS.tolist()]
+        for motion in found
+    ]
+    ratios = np.mean(spectra, axis=0) / target.spectral_acceleration(synthetic.PERIODS)
+    assert np.max(np.abs(ratios - 1.0)) < 0.085
+
+
+@pytest.mark.slow
+def test_the_curve_on_the_fifth_floor(fifth_floor, told, tmp_path):
+    scene, records = str(fifth_floor / "bookcase.toml"), str(fifth_floor / "records")
+    capacities = ("--capacity", "wall_speed:1.0", "--capacity", "overturns")
+    told("assess", scene, records, *capacities, "--out", str(tmp_path))
+    damage = pandas.read_csv(tmp_path / "capacities.csv")
+    assert [rounded(value, 2) for value in damage["median"]] == [0.22, 0.36]
+    assert [rounded(value, 2) for value in damage["dispersion"]] == [0.24, 0.24]
+    assert damage["islands"].tolist()[1] == 11
+
+
+@pytest.mark.slow
+def test_the_floors_on_which_the_bookcase_falls(fifth_floor, told, tmp_path):
+    scene, records = str(fifth_floor / "bookcase.toml"), str(fifth_floor / "records")
+    found = told("assess", scene, records, "--storeys", "1:8", "--out", str(tmp_path))
+    assert [storey["overturned"] for storey in found["storeys"]] == [0, 0, 0, 0, 6, 10, 11, 11]
 
 
 def settings() -> dict[str, list[tuple[float, float]]]:

@@ -34,6 +34,7 @@ from rockcheck.validation.studies.population.statistics import (
     value_of,
 )
 from rockcheck.validation.studies.population.tasks import MOST_ROWS
+from rockcheck.version import __version__
 
 #: Points of a history, and of a curve, on the page.
 POINTS = 400
@@ -68,7 +69,7 @@ def scene_text(scene: Scene, gathered: Gathered) -> Text:
         ("uncertain", ", ".join(uncertain)),
         ("building", building.words if building else ""),
         ("base", _base_words(gathered)),
-        ("played by", gathered.plan.model),
+        ("played by", f"{gathered.plan.model}, rockcheck {__version__}"),
     ]
     return Text(facts=[fact for fact in facts if fact[1]])
 
