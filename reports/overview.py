@@ -209,7 +209,7 @@ def accuracy(run: results.Run) -> list[Block]:
     if not any(here.values()) and not any(in_all.values()):
         return []
     looks_of = looks(run.models)
-    ends = _decades([value for model in models for pair in pairs[model] for value in pair])
+    ends = decades([value for model in models for pair in pairs[model] for value in pair])
     panels = [
         _predicted(looks_of[model], pairs[model], in_all[model] or here[model], ends)
         for model in models
@@ -250,7 +250,7 @@ def _trust_cells(trust: experience.Trust | None) -> list[float | None]:
     return [None, None] if trust is None else [trust.bias, trust.scatter]
 
 
-def _decades(values: Sequence[float]) -> tuple[float, float]:
+def decades(values: Sequence[float]) -> tuple[float, float]:
     """Whole powers of ten around values, with room at both ends."""
     lowest, highest = math.log10(0.8 * min(values)), math.log10(1.25 * max(values))
     return 10.0 ** math.floor(lowest), 10.0 ** math.ceil(highest)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import Event
+from rockcheck.validation.finding import Finding
+from rockcheck.validation.studies.conformance import changes
 
 T = 0.01 * np.arange(400)
 
@@ -23,7 +25,13 @@ def saved(tmp_path, monkeypatch, made):
 
 def test_what_matters_stands_first(saved, typed, told):
     a, b = saved("a"), saved("b", size=0.31)
-    out, _ = typed("compare", a, b, holds=["b against a, 0 to 3.99 s"], lacks=["shifted", "hint"])
+    out, _ = typed(
+        "compare",
+        a,
+        b,
+        holds=["b against a, 0 to 3.99 s"],
+        lacks=["shifted", "hint", "not the whole"],
+    )
     assert out.startswith("same outcome, moving; rotations ")
     found = told("compare", a, b)
     assert found["headline"] == out.splitlines()[0]
@@ -100,6 +108,23 @@ def test_runs_have_no_options_of_histories(words, files, saved, refused):
 def test_a_run_is_compared_with_a_run(files, saved, refused):
     saved("a")
     assert "no finished run here" in refused("compare", *files)
+
+
+@pytest.mark.parametrize(
+    ("reference", "wrote", "compared"),
+    [(".", True, True), ("kept.json", True, True), ("a.csv", True, False), (".", False, False)],
+)
+def test_what_conformance_wrote_is_compared_as_such(
+    reference, wrote, compared, saved, monkeypatch, typed
+):
+    heard = []
+    monkeypatch.setattr(changes, "wrote", lambda path: wrote)
+    monkeypatch.setattr(
+        changes, "changes", lambda *runs: heard.append(runs) or Finding("changes", "", "")
+    )
+    saved("a")
+    typed("compare", reference, "a.csv", code=0 if compared or reference != "." else 2)
+    assert bool(heard) == compared
 
 
 def test_notes_are_those_of_each_history(saved, typed, made):

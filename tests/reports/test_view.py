@@ -11,6 +11,7 @@ import pytest
 from matplotlib.colors import to_rgb
 from scipy.integrate import trapezoid
 
+from rockcheck.reports import payload
 from rockcheck.reports.histories_figure import histories_figure
 from rockcheck.reports.overview import accuracy, glance, matrix, why_apart
 from rockcheck.reports.show.words import duration, number, ratio, readable, window
@@ -144,12 +145,28 @@ def test_data_are_the_histories(site):
         assert [event[1] for event in model["events"]] == [
             event.kind for event in history.event_list
         ]
+    assert data["duration"] == 12.0
+    assert data["step"] == view.scene.output_step
+    units = {channel["name"]: channel["unit"] for channel in data["channels"]}
+    assert "1" not in units.values()
+    assert units["hop"] == "mm"
+    assert {band["kind"] for band in data["bands"] if "running" in band} == {"rms"}
     assert data["horizon"] == 10.0
     assert {
         (band["model"], band["limit"], band["until"])
         for band in data["bands"]
         if band["against"] == "ebm"
     } == {(model, 2e-3, 8.0) for model in view.run.models if model != "ebm"}
+
+
+def test_a_scene_is_summed_up_in_words(site):
+    said = payload.summary_of(view_of(site, "beside a wall"))
+    assert said.startswith("ebm-unilateral: peak 0.278 \u03b1, 15 impacts, moving; ebm: peak ")
+    fallen = payload.summary_of(view_of(site, "Free"))
+    assert "ebm-unilateral: 10 impacts, overturned left at " in fallen
+    view = view_of(site, "beside a wall")
+    vars(view)["histories"] = {"cm": replace(view.histories["cm"], event_list=())}
+    assert payload.summary_of(view).startswith("cm: peak 0.278 \u03b1, ")
 
 
 def test_a_history_that_ends_early_is_padded(site):
@@ -165,6 +182,12 @@ def test_a_large_run_shows_every_nth_row(site, run):
     )
     assert fine.stride == 1
     assert coarse.stride == 5
+    step = payload.payload_of(coarse)["step"]
+    assert (
+        step
+        == pytest.approx(coarse.t[1] - coarse.t[0])
+        == pytest.approx(5 * coarse.scene.output_step)
+    )
     assert coarse.values["cm"]["theta"] == pytest.approx(fine.values["cm"]["theta"][::5], abs=0.0)
 
 
@@ -238,6 +261,24 @@ def test_a_fall_is_drawn_up_to_one_and_a_half_alpha(site):
 def test_plots_open_where_something_happens(tmp_path, finished, least, most):
     start, end = view_of(tmp_path, "free").active
     assert 0.0 == start < least <= end <= most
+
+
+def test_modes_of_motion_are_told_from_change_to_change(site):
+    view = view_of(site, "beside a wall")
+    spells = view.spells("ebm-unilateral")
+    assert spells[0][0] == view.t[0]
+    assert spells[-1][1] == view.t[-1]
+    assert [end for _, end, _ in spells[:-1]] == [start for start, _, _ in spells[1:]]
+    assert {mode for _, _, mode in spells} >= {"flight"}
+    assert view.spells("nobody") == []
+
+
+def test_a_model_without_a_history_is_told(site):
+    view = view_of(site, "beside a wall")
+    vars(view)["cells"] = [
+        cell.model_copy(update={"history": None, "reason": ""}) for cell in view.cells
+    ]
+    assert set(view.missing.values()) == {"no history"}
 
 
 def test_missing_and_foreign_histories_are_told(site, run):

@@ -131,6 +131,22 @@ def test_a_wall_is_struck_with_the_speed_just_before():
     assert found.walls["left"].speed == pytest.approx(0.375, rel=1e-9)
 
 
+def test_a_wall_is_struck_by_the_corner_that_is_nearest_though_another_is_faster():
+    """Tilted to the right, the block turns to the left: its top corner is the faster one."""
+    t, spin, wide, high = np.array([0.0, 0.01, 0.02, 0.03]), 0.2, 0.397, 1.555
+    theta, x = spin * t - 0.1, -t
+    zero = np.zeros(4)
+    channels = {"t": t, "x": x, "y": zero + high, "theta": theta}
+    channels |= {"x_dot": zero - 1.0, "y_dot": zero, "theta_dot": zero + spin}
+    at = -0.1 + spin * 0.025
+    lower = -0.025 - wide * math.cos(at) + high * math.sin(at)
+    speed = 1.0 - spin * (wide * math.sin(at) + high * math.cos(at))
+    event = Event(t=0.025, kind="wall impact")
+    wall = WALL.replace(gap=-lower - wide)
+    found = interpolation.from_rows(channels, [event], PAPER_BLOCK, "moving", [wall])
+    assert found.walls["left"].speed == pytest.approx(speed, rel=1e-4)
+
+
 def test_a_wall_that_is_never_struck_has_no_first_time():
     history = swing(0.1)
     rows = history.channels

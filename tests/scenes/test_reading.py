@@ -39,3 +39,22 @@ def test_a_line_may_be_as_long_as_a_megabyte(written, fault_of):
     assert len(reading.first_lines(written("a.csv", longest), 9)[0][0]) == reading.MOST_LINE - 1
     for read in (lambda path: reading.first_lines(path, 9), reading.read_table):
         assert "line 1: longer than " in str(fault_of(read, written("b.csv", "x" + longest)))
+
+
+@pytest.mark.parametrize(
+    ("content", "latin", "text"),
+    [
+        (b"M\xe9xico\r\n", True, "M\xe9xico\n"),
+        (b"M\xe9xico\n", False, None),
+        (b"M\xe9xico\x00\n", True, None),
+        ("M\xe9xico\n".encode("utf-16"), True, "M\xe9xico\n"),
+        ("M\xe9xico\n".encode("utf-16"), False, None),
+        (b"\xef\xbb\xbfM\xc3\xa9xico\r", False, "M\xe9xico\n"),
+    ],
+)
+def test_text_is_utf_8_or_where_it_may_be_latin_1(content, latin, text, written, fault_of):
+    path = written("a.txt", content)
+    if text is None:
+        assert "not a text file" in str(fault_of(reading.read_text, path, latin=latin))
+    else:
+        assert reading.read_text(path, latin=latin) == text
