@@ -2,8 +2,11 @@
 steers nothing. Reading is bounded: whatever a file holds, and whatever it is, it is read or refused
 within seconds and with little memory."""
 
+import json
+import math
 import os
 import re
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -332,3 +335,38 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, fault_of):
     (tmp_path / "a.toml").touch()
     os.truncate(tmp_path / "a.toml", 10_000_001)
     assert "larger than 10000000 bytes" in str(fault_of(files.read_toml, tmp_path / "a.toml"))
+
+
+@pytest.mark.needs("POSIX")
+def test_into_a_pipe_that_was_named_is_written(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    end = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    writing.write_whole(pipe, "words", named=True)
+    assert os.read(end, 99) == b"words"
+    os.close(end)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    writing.write_whole(pipe, "words")
+    assert pipe.read_text() == "words"
+
+
+def test_a_folder_is_not_written_over(tmp_path):
+    for named in (True, False):
+        with pytest.raises(IsADirectoryError, match="directory"):
+            writing.write_whole(tmp_path, "words", named=named)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_in_markdown_has_its_rows_between_bars():
+    rows = [["1", "a|b"], ["22", "c"]]
+    assert writing.markdown_table(["n", "word"], rows).splitlines()[2:] == [
+        "| 1 | a\\|b |",
+        "| 22 | c |",
+    ]
+
+
+def test_what_is_not_finite_is_null_in_json():
+    value = {"a": [1.5, math.nan, "nan", 3, None], "b": (math.inf, True)}
+    plain = {"a": [1.5, None, "nan", 3, None], "b": [None, True]}
+    assert json.loads(writing.json_text(value)) == plain
+    assert json.loads(writing.json_text(writing.finite(value))) == plain

@@ -118,10 +118,14 @@ def time_shift(reference: History, candidate: History) -> float:
     of_longer = np.maximum(beside[len(second) > len(first)], 1.0)
     lags = scipy.signal.correlation_lags(len(first), len(second))
     top, between = int(np.argmax(product / np.sqrt(of_longer))), 0.0
-    if 0 < top < len(product) - 1:
-        left, middle, right = (product / np.sqrt(np.multiply(*beside)))[top - 1 : top + 2]
-        bend = left - 2.0 * middle + right
-        between = np.clip(0.5 * (left - right) / bend, -0.5, 0.5) if bend < 0.0 else 0.0
+    shares = product / np.sqrt(np.multiply(*beside))
+    while 0 < top < len(shares) - 1:
+        left, middle, right = shares[top - 1 : top + 2]
+        if middle >= max(left, right):
+            bend = left - 2.0 * middle + right
+            between = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+            break
+        top += 1 if right > left else -1
     return float((lags[top] + between) * step + grids[0][0] - grids[1][0])
 
 

@@ -180,6 +180,25 @@ def test_a_shift_in_time_is_found(delay, part):
     ] == pytest.approx([-delay, -delay, 0.0], abs=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("delay", "part"),
+    [
+        (0.0033, slice(None)),
+        (-0.0268, slice(None)),
+        (0.2739, slice(107, 204)),
+        (0.2308, slice(153, 305)),
+        (0.3711, slice(260, 380)),
+        (0.7296, slice(23, 163)),
+    ],
+)
+def test_a_shift_is_found_within_a_part_of_a_step(delay, part):
+    candidate = replace(
+        swing(),
+        channels={name: column[part] for name, column in swing(delay=delay).channels.items()},
+    )
+    assert measured.time_shift(swing(), candidate) == pytest.approx(-delay, abs=6e-4)
+
+
 @pytest.mark.slow
 def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     truth = swing().peak_rotation
