@@ -21,6 +21,16 @@ def test_a_long_text_has_a_wide_column(rows, kind):
     assert templates.text_class(Table("t", [text("words")], rows), 0) == kind
 
 
+def test_a_library_of_a_page_comes_with_its_licence(tmp_path):
+    templates.write_assets(tmp_path)
+    names = {path.name for path in (tmp_path / "pages" / "assets").iterdir()}
+    assert "LICENSE" not in names
+    vendors = [path.parent.name for path in (templates.DATA / "vendor").glob("*/LICENSE")]
+    assert vendors
+    assert {f"LICENSE.{vendor}.txt" for vendor in vendors} <= names
+    assert "models.css" in names
+
+
 @pytest.mark.parametrize(
     ("folder", "word"), [("runs/a b", "'runs/a b'"), ("/home/me/run", "run"), ("run", "run")]
 )
