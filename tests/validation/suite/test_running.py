@@ -284,6 +284,33 @@ def test_a_pool_whose_processes_are_lost_begins_anew():
         assert {first, *(one.outcome for one in ended)} == set(range(20))
 
 
+MEASURED = """
+reference = "first"
+[models.first]
+model = "measured"
+files = { swing = "first.csv" }
+[models.second]
+model = "measured"
+files = { swing = "second.csv" }
+[require]
+difference = ["theta_rms"]
+[[scene]]
+name = "swing"
+duration = 3.0
+output_step = 0.01
+block = { half_width = 0.3, half_height = 1.0 }
+floor = { friction = 0.9 }
+"""
+
+
+def test_a_measured_history_that_starts_late_is_advised_an_offset(written, run):
+    for name, start in (("first", 1.0), ("second", 1.2)):
+        swing = [(n / 100, 0.1 * math.exp(-((n / 20 - 5 * start) ** 2))) for n in range(301)]
+        written(f"{name}.csv", "\n".join(["t,theta", *(f"{t},{theta}" for t, theta in swing)]))
+    (line,) = run(written("mine.toml", MEASURED)).by_scene["swing"]["second"].notes
+    assert line.endswith("offset = -0.2")
+
+
 @pytest.mark.needs("pybullet")
 def test_what_takes_longest_begins_before_the_quick_rest(tmp_path):
     """One cell of each code that is compiled, and the engines before the quick models; walls take
