@@ -1,5 +1,7 @@
 """The scenes of the stress study: what a seed gives, and what occurs among them."""
 
+import math
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +96,56 @@ def test_exact_scenes_hold_what_they_are_for():
     scenes = [exact_scene(5, number) for number in range(400)]
     assert max(len(repr(one)) for s in scenes for one in (s.block.half_width, s.gravity)) < 8
     assert [name for name, has in EXACT.items() if not any(map(has, scenes))] == []
+
+
+def test_random_starts_are_to_both_sides_and_of_the_block_s_own_size():
+    """Rates of a slender block up to those of its size or, in half of them, of its angle."""
+    scenes = [random_scene(2, n) for n in range(600)]
+    units = [(scene, math.sqrt(scene.block.radius / scene.gravity)) for scene in scenes]
+    speeds = [s.initial_velocity * unit / s.block.radius for s, unit in units if s.initial_velocity]
+    assert -1.0 <= min(speeds) < -0.8 < 0.8 < max(speeds) <= 1.0
+    rates = [
+        (s.initial_angular_velocity * unit, s.block.alpha)
+        for s, unit in units
+        if s.initial_angular_velocity and s.block.alpha < 0.5
+    ]
+    assert -1.5 <= min(rates)[0] < -1.0 < 1.0 < max(rates)[0] <= 1.5
+    slow = np.mean([abs(rate) <= 1.5 * alpha for rate, alpha in rates])
+    assert 0.5 < slow < 0.95
+
+
+def test_a_scene_has_a_hundred_rows_after_the_first():
+    assert {len(random_scene(2, n).output_times) for n in range(100)} == {101}
+
+
+def test_some_records_are_spikes_in_silence():
+    records = [s.excitation for s in map(partial(random_scene, 2), range(600))]
+    silent = [
+        np.mean(np.array(one.unscaled) == 0.0)
+        for one in records
+        if one.kind == "record" and len(one.unscaled) > 50
+    ]
+    assert 0.1 < np.mean([0.8 < share < 0.99 for share in silent]) < 0.5
+
+
+def test_exact_scenes_are_of_round_numbers_up_to_a_thousand():
+    scenes = [exact_scene(5, number) for number in range(400)]
+    assert {scene.gravity for scene in scenes} == {9.81, 10.0, 1.0}
+    starts = [abs(scene.initial_angular_velocity) for scene in scenes]
+    assert max(starts) == 1e3
+
+
+def test_an_exact_scene_moves_or_is_shaken():
+    scenes = [exact_scene(5, number) for number in range(400)]
+    long = [scene for scene in scenes if scene.duration == 1e4]
+    assert {scene.excitation.kind for scene in long} == {"rest"}
+    alone = [scene for scene in scenes if not scene.walls]
+    tilted = {
+        kind: np.mean([s.initial_rotation != 0.0 for s in alone if s.excitation.kind == kind])
+        for kind in ("rest", "record")
+    }
+    assert tilted["rest"] == 1.0
+    assert 0.2 < tilted["record"] < 0.6
 
 
 FOLDER = Path(__file__).parents[1] / "data" / "found_faults"
