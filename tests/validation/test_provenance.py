@@ -1,8 +1,10 @@
 """A key changes with all that a result depends on, and with nothing else."""
 
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -150,3 +152,52 @@ def test_a_new_version_of_a_models_library_is_another_key(monkeypatch):
     newer = provenance.cell_key(scene, "mujoco", {})
     monkeypatch.setattr(provenance, "version_of", lambda library: "1")
     assert len({before, newer, provenance.cell_key(scene, "mujoco", {})}) == 3
+
+
+def test_a_measured_history_depends_on_its_tables_and_their_events(tmp_path):
+    scene, table = load_scene("bookcase"), tmp_path / "run.csv"
+    table.write_text("t,theta\n0,0\n1,0\n")
+
+    def key(files):
+        return provenance.cell_key(scene, "measured", {"files": {scene.name: files}})
+
+    before = key(str(table))
+    (tmp_path / "run.events.csv").write_text("t,kind\n")
+    with_events = key(str(table))
+    table.write_text("t,theta\n0,0\n1,0.1\n")
+    assert len({before, with_events, key(str(table))}) == 3
+    repeats = key([str(table)] * 2)
+    assert repeats != key(str(table))
+
+
+def test_a_user_s_package_is_what_it_imports_from_beside_it(theirs):
+    code = theirs(__init____in__theirs="import beside\n", beside="one = 1\n")
+    assert sorted(code.files) == ["beside", "theirs"]
+
+
+def test_a_script_is_its_file_and_what_that_imports(tmp_path, monkeypatch):
+    script = tmp_path / "script.py"
+    script.write_text("import beside, numpy\n")
+    (tmp_path / "beside.py").write_text("one = 1\n")
+    main = SimpleNamespace(__file__=str(script), __spec__=None)
+    monkeypatch.setitem(sys.modules, "__main__", main)
+    provenance.read_code_again()
+    code = provenance.user_code("__main__")
+    provenance.read_code_again()
+    assert sorted(path.name for path in code.files.values()) == ["beside.py", "script.py"]
+    assert code.libraries == ("numpy",)
+
+
+def test_a_machine_that_says_little_of_itself_is_described_by_its_kind(monkeypatch):
+    monkeypatch.setattr(provenance.re, "search", lambda *_: None)
+    monkeypatch.setattr(provenance.platform, "processor", lambda: "")
+    monkeypatch.setattr(provenance.platform, "machine", lambda: "abacus")
+    monkeypatch.setattr(provenance.os, "cpu_count", lambda: 7)
+    told = provenance.hardware()
+    assert told["processor"] == "abacus"
+    assert told["cores"] == "7"
+    monkeypatch.setattr(provenance.platform, "processor", lambda: "of wood")
+    monkeypatch.setattr(provenance.os, "cpu_count", lambda: None)
+    told = provenance.hardware()
+    assert told["processor"] == "of wood"
+    assert told["cores"] == "1"

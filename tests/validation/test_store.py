@@ -52,3 +52,52 @@ def test_a_record_of_another_layout_is_none(tmp_path):
     store.put(COMPARISONS, "run", {"outcome": "at rest"})
     (tmp_path / COMPARISONS / "run.json").write_text('{"version": 9, "files": ["a", "list"]}')
     assert store.get(COMPARISONS, "run") is None
+
+
+def test_a_history_has_a_table_and_may_have_events(tmp_path):
+    store = Store(tmp_path)
+    both = {".csv.gz": b"rows", ".events.csv.gz": b"events"}
+    store.put(HISTORIES, "both", {"outcome": "at rest"}, both)
+    assert store.get(HISTORIES, "both") == {"outcome": "at rest"}
+    store.put(HISTORIES, "none", {"outcome": "at rest"})
+    assert store.get(HISTORIES, "none") is None
+
+
+def test_a_table_is_as_old_as_its_record(tmp_path):
+    """What is read is the record, whose use keeps its tables; a table alone is old by itself."""
+    store, now = Store(tmp_path), time.time()
+    both = {".csv.gz": b"rows", ".events.csv.gz": b"events"}
+    store.put(HISTORIES, "used", {"outcome": "at rest"}, both)
+    store.put(HISTORIES, "lost", {"outcome": "at rest"}, both)
+    (tmp_path / HISTORIES / "lost.json").unlink()
+    for path in (tmp_path / HISTORIES).glob("*.csv.gz"):
+        os.utime(path, (now - 15 * 86400.0,) * 2)
+    store.prune()
+    assert {path.name.partition(".")[0] for path in (tmp_path / HISTORIES).iterdir()} == {"used"}
+    assert store.get(HISTORIES, "used") is not None
+
+
+@pytest.mark.parametrize(("days", "left"), [(0.9, 1), (1.1, 0)])
+def test_a_temporary_file_is_removed_after_a_day(tmp_path, days, left):
+    store, part = Store(tmp_path), tmp_path / HISTORIES / "half.part"
+    part.write_text("")
+    os.utime(part, (time.time() - days * 86400.0,) * 2)
+    store.prune()
+    assert len(list((tmp_path / HISTORIES).iterdir())) == left
+
+
+def test_a_history_put_lately_is_in_memory_and_another_is_read(made, tmp_path):
+    rows, store = made(np.array([0.0, 0.1, 0.2])), Store(tmp_path)
+    store.put(HISTORIES, "run", {}, rows.packed(), rows)
+    assert store.load("run") is rows
+    read = Store(tmp_path)
+    assert read.load("run") is read.load("run")
+
+
+def test_the_seal_of_a_history_is_of_its_content_and_its_files(tmp_path):
+    store, seals = Store(tmp_path), []
+    for outcome, rows in (("at rest", b"1"), ("at rest", b"1"), ("moving", b"1"), ("moving", b"2")):
+        store.put(HISTORIES, "run", {"outcome": outcome}, {".csv.gz": rows})
+        seals.append(store.seal_of(HISTORIES, "run"))
+    assert seals[0] == seals[1]
+    assert len(set(seals)) == 3
