@@ -113,7 +113,7 @@ def run(
     models.check_allowed(model, allow_code or ())
     given = settings_of(settings or ())
     simulate = (
-        partial(_played_apart, model, given)
+        partial(played_apart, model, given)
         if models.is_own(model)
         else models.build(model, given).simulate
     )
@@ -165,7 +165,7 @@ def run(
     )
 
 
-def _played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
+def played_apart(model: str, settings: dict[str, Any], scene: Scene) -> History:
     """The history by a user-defined model, whose code is imported in a separate process."""
     work = models.Work(label=model, family=model, settings=settings, search_path=(str(Path.cwd()),))
     with pool.Pool(1) as apart:

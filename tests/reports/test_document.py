@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from rockcheck.reports import document
+from rockcheck.reports import document, style
 from rockcheck.validation.finding import Axis, Column, Finding, Panel, Plot, Series, Table
 
 
@@ -57,7 +57,7 @@ def test_a_figure_is_drawn_again_where_it_shows_other_things(tmp_path, drawn):
 def test_a_figure_goes_with_its_data_but_not_one_that_somebody_drew(tmp_path, drawn):
     document.publish(found(plot("one"), plot("two"), TABLE), tmp_path)
     own = tmp_path / "figures" / "two.svg"
-    own.write_text("<dc:identifier>mine</dc:identifier>")
+    own.write_text(f"<dc:identifier>mine {style.drawn_by()}</dc:identifier>")
     (tmp_path / "numbers.svg").write_text((tmp_path / "figures" / "one.svg").read_text())
     document.publish(found(), tmp_path)
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["two.svg"]
