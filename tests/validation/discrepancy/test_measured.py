@@ -199,6 +199,15 @@ def test_a_shift_is_found_within_a_part_of_a_step(delay, part):
     assert measured.time_shift(swing(), candidate) == pytest.approx(-delay, abs=6e-4)
 
 
+def test_three_rows_can_be_aligned_and_two_cannot(fault_of):
+    def part(rows):
+        channels = {name: one[80:160:20][:rows] for name, one in swing().channels.items()}
+        return replace(swing(), channels=channels)
+
+    assert abs(measured.time_shift(part(3), part(3))) < 1e-9
+    assert "no rotation by which" in str(fault_of(measured.time_shift, part(3), part(2)))
+
+
 @pytest.mark.slow
 def test_the_interval_of_a_mean_covers_as_often_as_it_says():
     truth = swing().peak_rotation
