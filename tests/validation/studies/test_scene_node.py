@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from rockcheck import EventBasedModel
+from rockcheck import EventBasedModel, Record, Rest, Spectrum
+from rockcheck.ebm.spectrum import node_scene
 from rockcheck.scenes import files
 from rockcheck.validation.paper import Panel
 from rockcheck.validation.studies.spectrum import scene_node
@@ -49,3 +50,63 @@ def test_the_nearest_change_is_that_of_the_nearest_node(letters, nearest):
     axis = np.array([0.5, 0.75, 1.0, 1.5, 2.0])
     change = scene_node.nearest_change("amplitude", axis, np.array(list(letters)), 2)
     assert (change and change.other) == nearest
+
+
+def test_the_node_of_a_scene_is_the_node_that_plays_it():
+    assert scene_node.ratios(node_scene(SCENE, 3.0, 2.5)) == pytest.approx((2.5, 3.0))
+
+
+@pytest.mark.parametrize(
+    ("excitation", "node"),
+    [(Record.from_samples([0.0, 1.0], 0.1), (1.0, 1.0)), (Rest(), None)],
+)
+def test_a_record_s_node_is_itself(excitation, node):
+    assert scene_node.ratios(SCENE.replace(excitation=excitation)) == node
+
+
+@pytest.mark.parametrize(
+    ("scene", "axes"),
+    [
+        (SCENE, ["amplitude", "frequency"]),
+        (SCENE.replace(excitation=Record.from_samples([0.0, 1.0], 0.1)), ["scale", "size"]),
+    ],
+)
+def test_changes_are_told_along_the_axes_of_the_spectrum(scene, axes):
+    """Of the node in the middle: it falls to the right above, and to the left beside it."""
+    spectrum = Spectrum(
+        outcomes=np.array([[0, 0, 0], [-1, 0, 0], [0, 1, 0]], dtype=np.int8),
+        frequency_ratios=np.array([1.0, 2.0, 3.0]),
+        amplitude_ratios=np.array([1.0, 2.0, 4.0]),
+        evaluations=9,
+        undecided=np.zeros((0, 2), dtype=np.int64),
+        scene=scene,
+        model=None,
+    )
+    found = scene_node.within(spectrum, (2.0, 2.0))
+    assert [change.axis for change in found.changes] == axes
+    assert [change.letter for change in found.changes] == ["R", "L"]
+    assert [(change.other, change.same) for change in found.changes] == [(2.0, 1.0), (0.5, 1.0)]
+    assert scene_node.within(spectrum, (2.5, 2.0)) is None
+    assert scene_node.within(spectrum, (2.0, 2.5)) is None
+
+
+@pytest.mark.parametrize(("letters", "same"), [("SSSLL", 1.0), ("LSSSS", 0.75), ("SSSSR", 1.5)])
+def test_the_last_node_before_a_change_is_told(letters, same):
+    axis = np.array([0.5, 0.75, 1.0, 1.5, 2.0])
+    assert scene_node.nearest_change("size", axis, np.array(list(letters)), 2).same == same
+
+
+@pytest.mark.parametrize(
+    ("node", "words"),
+    [
+        (scene_node.NodeAnswer("U", True), "failed"),
+        (scene_node.NodeAnswer("S", True), "wider"),
+        (scene_node.NodeAnswer("S", False), "beyond"),
+        (
+            scene_node.NodeAnswer("S", True, (scene_node.Change("size", "L", 1.5, 1.2),)),
+            "at 1.5 times the size (not yet at 1.2)",
+        ),
+    ],
+)
+def test_the_answer_tells_what_is_known_of_a_change(node, words):
+    assert words in scene_node.answer(node, SCENE)
