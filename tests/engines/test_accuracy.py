@@ -155,6 +155,22 @@ def test_cone_correction(step):
     assert plain == pytest.approx(0.400, abs=3e-3)
 
 
+def test_a_block_that_slides_on_little_friction_stays_on_the_floor():
+    scene = Scene(
+        name="slide",
+        block=Block(half_width=0.4, half_height=1.2),
+        floor=Floor(friction=0.05),
+        initial_velocity=0.5,
+        duration=0.4,
+    )
+    lifts = [
+        np.max(MuJoCo(time_step=1e-3, **settings).simulate(scene).channels["y"]) - 1.2
+        for settings in ({}, {"cone_correction": False})
+    ]
+    assert lifts[0] < 1e-9
+    assert lifts[1] > 1e-5
+
+
 def theta_rms(one, other) -> float:
     return float(np.sqrt(np.mean((one.channels["theta"] - other.channels["theta"]) ** 2)))
 

@@ -190,3 +190,10 @@ def test_models_are_listed_without_reading_records():
     loaded = loaded_after("from rockcheck.validation.execute import models; list(models.FAMILIES)")
     assert "rockcheck.engines.registry" in loaded
     assert "rockcheck.engines.engine" not in loaded
+
+
+def test_the_limits_of_a_contact_parameter_are_in_order():
+    for facts in registry.every():
+        if parameters := getattr(facts.engine, "contact_parameters", None):
+            low, high = parameters.range
+            assert 0.0 <= low < high
