@@ -116,6 +116,25 @@ def test_costs_are_those_of_runs_that_were_done():
     assert len(ensemble.columns) == len(table.columns) - 2
 
 
+def test_a_ratio_is_to_the_reference_s_time():
+    cells = [cell("ebm", seconds=0.5), cell("cm", seconds=2.0)]
+    rows = tables.runs_table(run(*cells), cells).rows
+    assert rows[1][3] == tables.ratio(4.0)
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({}, "nothing judged"),
+        ({"checks": (check("pass"),)}, "within tolerance"),
+        ({"checks": (check("fail", 3.0),)}, "out of tolerance"),
+        ({"status": "failed"}, "failed"),
+    ],
+)
+def test_a_cell_with_nothing_to_judge_says_so(more, words):
+    assert words in tables.verdict_mark(cell(**more)).value.lower()
+
+
 def test_without_the_reference_s_time_there_is_no_ratio():
     cells = [cell("cm", seconds=8.0)]
     assert tables.runs_table(run(*cells), cells).rows[0][3] == tables.ratio(None)

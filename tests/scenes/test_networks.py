@@ -599,6 +599,22 @@ def test_one_step_of_a_unam_file_holds_for_all_channels(written):
     assert is_right(components, answers("UNAM", text, written)[0])
 
 
+def test_the_count_of_a_file_with_a_count_and_a_step_is_named_with_its_line(written):
+    text = count_and_step(96, 0.01, 3.0).replace("\n96 ", "\n99999999 ")
+    said = answers("count and step", text, written)[1]
+    assert "line 2: the count 99999999 is not in" in said
+
+
+def test_a_peak_of_a_unam_file_is_right_within_its_last_digit(written):
+    """So small a motion is stated by two digits."""
+    text = unam(96, 0.01, 5e-4)
+    assert "/0.05/" in text
+    assert answers("UNAM", text, written)[1] == ""
+    wrong = text.replace("/0.05/0.03/0.01", "/0.07/0.03/0.01")
+    assert wrong != text
+    assert "ACEL. MAX. says a peak" in answers("UNAM", wrong, written)[1]
+
+
 def test_a_geonet_file_that_ends_with_its_header_is_refused(written):
     text = "".join(geonet(1)(96, 0.01, 3.0).splitlines(keepends=True)[:26])
     assert "line 26: the file ends within a header" in answers("GeoNet V1A", text, written)[1]
