@@ -158,7 +158,7 @@ def storey_motion(building: Building, ground: Excitation, quiet_below: float) ->
         source=f"{name}, {building.words}"[:200],
         notes=(
             *getattr(ground, "notes", ())[: MOST_NOTES - 1],
-            f"a storey: lines every {step:.3g} s leave the motion by {error:.1e} of its"
+            f"{building.words}: lines every {step:.3g} s leave the motion by {error:.1e} of its"
             f" peak; after the ground {lasts:.3g} s of free vibration",
         ),
     )

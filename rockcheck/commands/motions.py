@@ -34,11 +34,11 @@ def run(
         int, typer.Option("--seed", min=0, max=2**31, help="Other seeds make other motions.")
     ] = 1,
 ) -> None:
-    """Write synthetic ground motions that follow a spectrum of EN 1998-1.
+    """Write synthetic ground motions.
 
-    The target is the horizontal elastic spectrum of type 1, 5 % damped. Each motion is a CSV file
-    that all commands read, the same on every call. Such motions differ less from each other than
-    recorded ones do.
+    They follow the horizontal elastic spectrum of EN 1998-1, type 1, 5 % damped. Each motion is a
+    CSV file that all commands read, the same on every call. Such motions differ less from each
+    other than recorded ones do.
     """
     if ground not in synthetic.GROUNDS:
         raise InputError(
