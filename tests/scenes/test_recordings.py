@@ -235,6 +235,48 @@ def test_header_values_of_a_v2_file_may_be_of_one_digit(written):
     assert recordings.read_record(path).component == "9 deg"
 
 
+@pytest.mark.parametrize(
+    ("line", "component"),
+    [
+        ("Made up, 1/1/2020, Nowhere, 090", "090"),
+        ("Made up, Nowhere, UP", "UP"),
+        ("Made up, 090", ""),
+        ("090", ""),
+        ("Made up, 1/1/2020, a place of many words", ""),
+    ],
+)
+def test_the_last_field_of_a_peer_file_s_second_line_is_its_component(line, component, written):
+    first, _, *rest = at2("N-S").split(b"\n")
+    path = written("a.AT2", b"\n".join([first, line.encode(), *rest]))
+    assert recordings.read_record(path).component == component
+
+
+@pytest.mark.parametrize(
+    ("row", "by", "said"),
+    [
+        (b"Scale Factor      3920(gal)/6182761\n", b"", "Scale Factor in gal"),
+        (b"Sampling Freq(Hz) 100Hz\n", b"", "states Sampling Freq(Hz)"),
+        (b"3920(gal)/6182761", b"3920(gal)/0", "Scale Factor 3920(gal)/0 is not usable"),
+        (b"3920(gal)/6182761", b"0(gal)/6182761", "Scale Factor 0(gal)/6182761 is not usable"),
+    ],
+)
+def test_a_k_net_file_states_its_rate_and_its_scale(row, by, said, written, fault_of):
+    content = knet("N-S")
+    assert row in content
+    path = written("a.NS", content.replace(row, by))
+    assert said in str(fault_of(recordings.read_record, path))
+
+
+def test_a_v2_file_may_have_a_number_a_line(written):
+    lines = csmip("N-S").decode().replace("(8f10.6)", "(1f10.5)").splitlines(keepends=True)
+    rows = _fixed(motion("N-S") * 100, 1, "10.5f")
+    first = next(n for n, line in enumerate(lines) if "points of accel data" in line)
+    text = "".join([*lines[: first + 1], rows, lines[-1]])
+    np.testing.assert_allclose(
+        recordings.read_record(written("a.V2", text)).samples, motion("N-S"), atol=1.01e-7
+    )
+
+
 def test_k_net_takes_out_the_offset_and_says_so(written):
     record = recordings.read_record(
         written("MYG0041103111446.NS", knet("N-S", "4")), recordings.Reading(component=4)
