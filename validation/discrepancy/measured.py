@@ -15,6 +15,7 @@ import scipy  # it loads its parts as they are used
 from rockcheck.scenes import (
     Cost,
     Finite,
+    Floats,
     Frozen,
     History,
     InputError,
@@ -117,16 +118,20 @@ def time_shift(reference: History, candidate: History) -> float:
     ]
     of_longer = np.maximum(beside[len(second) > len(first)], 1.0)
     lags = scipy.signal.correlation_lags(len(first), len(second))
-    top, between = int(np.argmax(product / np.sqrt(of_longer))), 0.0
-    shares = product / np.sqrt(np.multiply(*beside))
-    while 0 < top < len(shares) - 1:
-        left, middle, right = shares[top - 1 : top + 2]
+    top = int(np.argmax(product / np.sqrt(of_longer)))
+    place = _top_beside(product / np.sqrt(np.multiply(*beside)), top)
+    return float((lags[0] + place) * step + grids[0][0] - grids[1][0])
+
+
+def _top_beside(values: Floats, top: int) -> float:
+    """Where the values have their nearest top, in places: a parabola's through three of them."""
+    while 0 < top < len(values) - 1:
+        left, middle, right = values[top - 1 : top + 2]
         if middle >= max(left, right):
             bend = left - 2.0 * middle + right
-            between = 0.5 * (left - right) / bend if bend < 0.0 else 0.0
-            break
+            return top + (0.5 * float((left - right) / bend) if bend < 0.0 else 0.0)
         top += 1 if right > left else -1
-    return float((lags[top] + between) * step + grids[0][0] - grids[1][0])
+    return float(top)
 
 
 def shifted(history: History, offset: float) -> History:
