@@ -22,6 +22,7 @@ from rockcheck import EventBasedModel
 from rockcheck.ebm import fates
 from rockcheck.scenes import PAPER_BLOCK, Block, Floor, InputError, Record, Ricker, Scene, files
 from rockcheck.scenes.buildings import Regular
+from rockcheck.scenes.recordings.synthetic import Target, synthetic_motions
 from rockcheck.validation.finding import Plot, Table
 from rockcheck.validation.studies.population import damage, damage_blocks, damage_files
 from rockcheck.validation.studies.population.capacities import (
@@ -394,17 +395,14 @@ def test_the_library_says_what_made_it():
 
 @pytest.mark.slow
 def test_medians_and_dispersions_are_those_of_a_loop_of_ones_own():
-    """Records on a storey, by an oscillator and `simulate` alone: the least factor of a look every
-    1 % from where the block moves, halved to 0.1 %."""
+    """Twelve motions on a storey, by an oscillator and `simulate` alone: the least factor of a look
+    every 1 % from where the block moves, halved to 0.1 %."""
     block = Block(half_width=0.25, half_height=0.9)
-    chance = np.random.default_rng(8)
-    capacities = [Capacity("rotation", 0.3), Capacity("top", 0.1), Capacity("top", 0.2)]
+    capacities = [Capacity("rotation", 0.3), Capacity("top", 0.1), Capacity("rotation", 0.5)]
     building = Regular(storeys=1, storey=1, period=0.5, damping=0.05)
     cases, least = {}, {capacity.name: [] for capacity in capacities}
-    for number in range(4):
-        ground = Record.from_samples(
-            np.sin(0.5 * np.pi * np.arange(121) / 120.0) * chance.normal(0.0, 1.5, 121), 0.05
-        )
+    for number, motion in enumerate(synthetic_motions(Target(), 12, duration=8.0, step=0.02)):
+        ground = Record.from_samples(motion.samples, motion.time_step)
         scene = Scene(
             name=f"record {number}",
             block=block,
