@@ -16,7 +16,7 @@ from rockcheck.validation.studies.stress.conditions import conditions
 from rockcheck.validation.studies.stress.energy import energy_error, energy_without_source
 from rockcheck.validation.studies.stress.forces import tilted_forces
 from rockcheck.validation.studies.stress.horizon import Horizon, disturbed
-from rockcheck.validation.studies.stress.invariants import CheckedRun
+from rockcheck.validation.studies.stress.invariants import INVARIANTS, CheckedRun
 from rockcheck.validation.studies.stress.motion import Motion
 
 
@@ -176,7 +176,9 @@ def test_an_audited_run_has_rows_for_the_block_and_for_a_pulse():
 
 #: The least that must be noticed of each invariant.
 LEAST = {
-    **dict.fromkeys(("ends", "finite", "outcome", "mirror", "clearance", "fate", "ties"), 1.0),
+    **dict.fromkeys(
+        ("ends", "finite", "outcome", "mirror", "clearance", "fate", "ties", "storey"), 1.0
+    ),
     **dict.fromkeys(("penetration", "floor", "stick", "energy", "extremes", "rows"), 3e-9),
     **dict.fromkeys(("coulomb", "push"), 3e-7),
     **dict.fromkeys(("similarity", "tolerance", "decided"), 3e-6),
@@ -184,7 +186,7 @@ LEAST = {
 }
 
 
-@pytest.mark.parametrize("name", LEAST)
+@pytest.mark.parametrize("name", INVARIANTS)
 def test_the_least_fault_of_each_kind_is_noticed(name):
     assert CheckedRun(figures={name: LEAST[name]}).broken == [name]
     assert CheckedRun(figures={name: math.nan}).broken == [name]
