@@ -144,7 +144,6 @@ def test_on_a_cluster_what_compiles_goes_to_each_machine_and_all_else_to_one():
 
 @pytest.mark.parametrize(("count", "allowed"), [(0, False), (1, True), (256, True), (257, False)])
 def test_up_to_256_workers_are_started_here(count, allowed):
-    pytest.importorskip("distributed")
     if allowed:
         assert pool.local_workers(f"local:{count}") == count
         return
