@@ -244,7 +244,8 @@ def _states(pole: complex, step: float, pushed: Floats, left: Floats) -> NDArray
     """
     from scipy.signal import lfilter
 
-    added = pushed @ np.exp(pole * left)
+    # Not by BLAS, whose threads would wait for each other beside other work.
+    added = np.einsum("ij,j->i", pushed, np.exp(pole * left))
     states = lfilter([1.0], [1.0, -np.exp(pole * step)], added)
     return np.concatenate([[0.0], states])
 
