@@ -168,7 +168,7 @@ def assess(
     if varied.storeys is not None:
         check_for_storeys(varied, given)
         plans = {
-            number: on_storey(planned, given, number)
+            number: plan_of_storey(planned, given, number)
             for number in storeys_of(varied.storeys, given)
         }
         run_study(Storeys(plans=plans), played)
@@ -200,7 +200,7 @@ def check_for_storeys(varied: Varied, given: files.UncertainScene) -> None:
             raise InputError(f"does not go with {option}", "--storeys")
 
 
-def on_storey(planned: plan.Plan, given: files.UncertainScene, number: int) -> plan.Plan:
+def plan_of_storey(planned: plan.Plan, given: files.UncertainScene, number: int) -> plan.Plan:
     """The plan with the block on another storey, under the same motions of the ground."""
     assert isinstance(given.building, Regular)
     building = given.building.replace(storey=number)

@@ -69,7 +69,7 @@ def run(
     components, faults = sets.read_files(paths, reading, keep_going=True)
     given = scene_with_building(building)
     motions = [
-        (path, name, on_storey(recording, given) if given else recording)
+        (path, name, floor_recording(recording, given) if given else recording)
         for path, pairs in components.items()
         for name, recording in pairs
     ]
@@ -111,7 +111,7 @@ def scene_with_building(name: str | None) -> scene_files.UncertainScene | None:
     return given
 
 
-def on_storey(
+def floor_recording(
     ground: recordings.Recording, given: scene_files.UncertainScene
 ) -> recordings.Recording:
     """The motion of the storey on which a scene's block stands, under one of the ground."""
