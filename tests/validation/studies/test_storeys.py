@@ -43,7 +43,7 @@ TOP = Capacity("top", 0.05)
 @pytest.fixture(scope="module")
 def played():
     planned = Plan(own=CASES["weak"], cases=CASES, recorded=True, measure=PGA, capacities=(TOP,))
-    plans = {number: command.on_storey(planned, CASES["weak"], number) for number in (0, 3)}
+    plans = {number: command.plan_of_storey(planned, CASES["weak"], number) for number in (0, 3)}
     study = storeys.Storeys(plans=plans)
     done = {task: task.play() for task in study.tasks({})}
     return study, done, study.gather(done)
