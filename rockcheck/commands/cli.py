@@ -25,7 +25,6 @@ COMMANDS = {
     "scenes": ("simulate:scenes", "rockcheck scenes"),
     "new": ("simulate:new", "rockcheck new cabinet.toml"),
     "record": ("record:run", "rockcheck record station.V2 --read component=1 --plot station.png"),
-    "motions": ("motions:run", "rockcheck motions records --ground C"),
     "simulate": (
         "simulate:run",
         "rockcheck simulate fig5a --model mujoco --set time_step=1e-3 -o mujoco.csv",
@@ -49,7 +48,7 @@ COMMANDS = {
 HIDDEN = ("warm",)
 
 #: Commands that take no time worth printing.
-AT_ONCE = ("scenes", "new", "record", "motions", "compare")
+AT_ONCE = ("scenes", "new", "record", "compare")
 
 #: Options that name models: a command has one, and takes the other as well.
 MODEL_OPTIONS = ("--models", "--model")

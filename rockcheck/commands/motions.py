@@ -1,5 +1,9 @@
-"""`rockcheck motions`: synthetic ground motions, for whom no records are at hand."""
+"""Synthetic ground motions of `rockcheck new`, for whom no records are at hand.
 
+In: a folder, and what is asked for. Out: a CSV file a motion. The command `new` calls it.
+"""
+
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated
 
@@ -12,52 +16,85 @@ from rockcheck.scenes.recordings import Recording, intensity, synthetic
 from rockcheck.validation.finding import Column, Finding, Table, Text, text
 
 
-def run(
-    folder: Annotated[Path, typer.Argument(help="Folder to write to; it is made if need be.")],
-    count: Annotated[
-        int, typer.Option("--count", min=1, max=synthetic.MOST_MOTIONS, help="How many.")
-    ] = 12,
-    ground: Annotated[
-        str,
-        typer.Option(
-            "--ground", help=f"Type of ground of the target: {', '.join(synthetic.GROUNDS)}."
-        ),
-    ] = "B",
-    acceleration: Annotated[
-        float,
-        typer.Option("--acceleration", help="Peak acceleration of rock (g), a_g of the target."),
-    ] = 0.3,
-    duration: Annotated[
-        float, typer.Option("--duration", min=5.0, max=200.0, help="Length of each, s.")
-    ] = 20.0,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, max=2**31, help="Other seeds make other motions.")
-    ] = 1,
-) -> None:
-    """Write synthetic ground motions.
+@dataclass(frozen=True)
+class Synthetic:
+    """The options of synthetic motions: without `motions` there are none."""
 
-    They follow the horizontal elastic spectrum of EN 1998-1, type 1, 5 % damped. Each motion is a
-    CSV file that all commands read, the same on every call. Such motions differ less from each
-    other than recorded ones do.
-    """
-    if ground not in synthetic.GROUNDS:
-        raise InputError(
-            f"{printable(repr(ground))} is not allowed: one of {', '.join(synthetic.GROUNDS)}",
+    motions: Annotated[
+        int | None,
+        typer.Option(
+            "--motions",
+            min=1,
+            max=synthetic.MOST_MOTIONS,
+            help="Write so many synthetic ground motions to a folder in place of a scene.",
+        ),
+    ] = None
+    ground: Annotated[
+        str | None,
+        typer.Option(
             "--ground",
-        )
-    try:
-        target = synthetic.Target(ground=ground, acceleration=acceleration)
-    except InputError as error:
-        raise InputError(error.reason, f"--{error.key}") from None
-    motions = {
-        f"synthetic-{number:02d}.csv": motion
-        for number, motion in enumerate(
-            synthetic.synthetic_motions(target, count, seed=seed, duration=duration), 1
-        )
-    }
+            help="Of motions: the type of ground of their spectrum, one of"
+            f" {', '.join(synthetic.GROUNDS)} (default: B).",
+        ),
+    ] = None
+    acceleration: Annotated[
+        float | None,
+        typer.Option(
+            "--acceleration", help="Of motions: peak acceleration of rock, a_g, g (default: 0.3)."
+        ),
+    ] = None
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            "--duration", min=5.0, max=200.0, help="Of motions: their length, s (default: 20)."
+        ),
+    ] = None
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed", min=0, max=2**31, help="Of motions: other seeds make others (default: 1)."
+        ),
+    ] = None
+
+
+def check_none_asked(asked: Synthetic) -> None:
+    """Raises `InputError` for an option of motions where none are asked for."""
+    for option in fields(asked):
+        if getattr(asked, option.name) is not None:
+            raise InputError("goes with --motions", f"--{option.name}")
+
+
+def write_motions(folder: Path, asked: Synthetic) -> None:
+    """Writes the motions that are asked for, and tells them."""
+    assert asked.motions is not None, "asked for"
+    target = target_of(asked)
+    found = synthetic.synthetic_motions(
+        target,
+        asked.motions,
+        seed=1 if asked.seed is None else asked.seed,
+        duration=asked.duration or 20.0,
+    )
+    motions = {f"synthetic-{number:02d}.csv": motion for number, motion in enumerate(found, 1)}
     made = usable_folder(folder)
     writing.write_together({made / name: file_text(motion) for name, motion in motions.items()})
     finish_command(finding_of(motions, target, folder))
+
+
+def target_of(asked: Synthetic) -> synthetic.Target:
+    """The spectrum that is asked for. Raises `InputError`."""
+    if asked.ground is not None and asked.ground not in synthetic.GROUNDS:
+        raise InputError(
+            f"{printable(repr(asked.ground))} is not allowed: one of"
+            f" {', '.join(synthetic.GROUNDS)}",
+            "--ground",
+        )
+    given = {"ground": asked.ground, "acceleration": asked.acceleration}
+    try:
+        return synthetic.Target().replace(
+            **{name: value for name, value in given.items() if value is not None}
+        )
+    except InputError as error:
+        raise InputError(error.reason, f"--{error.key}") from None
 
 
 def file_text(motion: Recording) -> str:

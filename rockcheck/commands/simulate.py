@@ -18,6 +18,7 @@ from rockcheck.commands.checks import check_file
 from rockcheck.commands.console import console, report_file
 from rockcheck.commands.ending import finish_command
 from rockcheck.commands.model_choice import check_one_model, settings_of
+from rockcheck.commands.motions import Synthetic, check_none_asked, write_motions
 from rockcheck.commands.options import AllowCodeOption, JobsOption, model_names, scene_names
 from rockcheck.commands.progress_bar import progress
 from rockcheck.reports.style import ENDINGS, FORMATS, kind_of, save_as
@@ -53,14 +54,26 @@ def scenes() -> None:
 
 def new(
     path: Annotated[
-        Path, typer.Argument(metavar="FILE.toml", help="File to write; it must not exist yet.")
+        Path,
+        typer.Argument(
+            metavar="FILE.toml",
+            help="File to write; it must not exist yet. With --motions a folder.",
+        ),
     ],
+    motions: Synthetic = Synthetic(),
 ) -> None:
-    """Write a scene file to start from.
+    """Write a scene file to start from, or ground motions.
 
-    It is ready to run, and has a remark on every setting. A file that is there already is left as
-    it is.
+    The scene is ready to run, and has a remark on every setting. A file that is there already is
+    left as it is.
+
+    Motions follow the horizontal elastic spectrum of EN 1998-1, type 1, 5 % damped. Each is a CSV
+    file that all commands read, the same on every call. They differ less from each other than
+    recorded ones do.
     """
+    if motions.motions is not None:
+        write_motions(path, motions)
+    check_none_asked(motions)
     if path.suffix.lower() != ".toml":
         raise errors.InputError(f"{printable(path)}: give the name of a .toml file")
     template = Path(str(resources.files("rockcheck.validation"))) / "data" / "new_scene.toml"

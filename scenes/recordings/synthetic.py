@@ -1,6 +1,6 @@
 """Synthetic ground motions that follow a target spectrum, for examples and first studies.
 
-In: a target, how many motions, a seed. Out: recordings. Called by the command `motions`.
+In: a target, how many motions, a seed. Out: recordings. Called by the command `new`.
 
 A motion begins as noise with random phases under an envelope. Its Fourier amplitudes are scaled by
 the ratio of the target to its own spectrum, again and again (Gasparini and Vanmarcke 1976). Such

@@ -89,7 +89,7 @@ def fifth_floor(tmp_path_factory):
     scene = re.search(r'```toml title="bookcase.toml"\n(.*?)```', page, re.DOTALL)
     assert scene is not None
     (folder / "bookcase.toml").write_text(scene[1], encoding="utf-8")
-    main(["motions", str(folder / "records"), "-q"])
+    main(["new", str(folder / "records"), "--motions", "12", "-q"])
     return folder
 
 

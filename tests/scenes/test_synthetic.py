@@ -126,7 +126,7 @@ def test_a_motion_has_the_length_and_step_that_are_asked_for():
 
 
 def test_the_files_are_the_motions(tmp_path, typed, motions):
-    typed("motions", str(tmp_path / "records"), "--count", "2")
+    typed("new", str(tmp_path / "records"), "--motions", "2")
     names = sorted(path.name for path in (tmp_path / "records").iterdir())
     assert names == ["synthetic-01.csv", "synthetic-02.csv"]
     read = recordings.read_record(tmp_path / "records" / "synthetic-02.csv")
@@ -135,7 +135,8 @@ def test_the_files_are_the_motions(tmp_path, typed, motions):
 
 
 def test_what_was_made_is_told_as_data(tmp_path, told):
-    found = told("motions", str(tmp_path), "--count", "1", "--ground", "D", "--acceleration", "0.1")
+    words = ("--motions", "1", "--ground", "D", "--acceleration", "0.1")
+    found = told("new", str(tmp_path), *words)
     assert "ground D, 0.1 g on rock" in found["target"]
     assert found["motions"][0]["file"] == "synthetic-01.csv"
     assert found["motions"][0]["pga"] == pytest.approx(0.135, rel=0.4)
@@ -147,17 +148,25 @@ def test_what_was_made_is_told_as_data(tmp_path, told):
         ("--ground", "F", "--ground: 'F' is not allowed: one of A, B, C, D, E"),
         ("--acceleration", "0", "--acceleration: 0.0 is not allowed"),
         ("--acceleration", "nan", "--acceleration: "),
-        ("--count", "0", "--count"),
-        ("--count", "101", "--count"),
+        ("--motions", "0", "--motions"),
+        ("--motions", "101", "--motions"),
         ("--duration", "4", "--duration"),
     ],
 )
 def test_what_makes_no_motion_is_refused_in_a_line(tmp_path, refused, option, value, said):
-    assert said in refused("motions", str(tmp_path / "new"), option, value)
+    words = [option, value] if option == "--motions" else ["--motions", "2", option, value]
+    assert said in refused("new", str(tmp_path / "new"), *words)
     assert not (tmp_path / "new").exists()
 
 
 def test_a_file_is_no_folder(tmp_path, refused):
     (tmp_path / "taken").write_text("mine", encoding="utf-8")
-    assert "cannot be used as a folder" in refused("motions", str(tmp_path / "taken"))
+    assert "cannot be used as a folder" in refused("new", str(tmp_path / "taken"), "--motions", "2")
     assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize("option", ["--ground=C", "--acceleration=0.2", "--duration=9", "--seed=3"])
+def test_an_option_of_motions_goes_with_them(tmp_path, refused, option):
+    said = refused("new", str(tmp_path / "shelf.toml"), option)
+    assert f"{option.partition('=')[0]}: goes with --motions" in said
+    assert not (tmp_path / "shelf.toml").exists()
