@@ -267,6 +267,24 @@ def test_a_k_net_file_states_its_rate_and_its_scale(row, by, said, written, faul
     assert said in str(fault_of(recordings.read_record, path))
 
 
+@pytest.mark.parametrize("form", [b"(0F10.5)", b"(8F0.5)"])
+def test_a_block_of_a_v2_file_has_fields(form, written, fault_of):
+    path = written("a.V2", cosmos("N-S").replace(b"(8F10.5)", form))
+    assert "a format without fields" in str(fault_of(recordings.read_record, path))
+
+
+@pytest.mark.parametrize(("seconds", "fits"), [(3, True), (5, True), (2, False), (6, False)])
+def test_the_seconds_of_a_v2_file_are_about_right(seconds, fits, written, fault_of):
+    content = cosmos("N-S").replace(
+        b"acceleration pts, approx    4", b"acceleration pts, approx %4d" % seconds
+    )
+    path = written("a.V2", content)
+    if fits:
+        assert len(recordings.read_record(path).samples) == 401
+    else:
+        assert f"says {seconds} s" in str(fault_of(recordings.read_record, path))
+
+
 def test_a_v2_file_may_have_a_number_a_line(written):
     lines = csmip("N-S").decode().replace("(8f10.6)", "(1f10.5)").splitlines(keepends=True)
     rows = _fixed(motion("N-S") * 100, 1, "10.5f")

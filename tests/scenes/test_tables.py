@@ -14,7 +14,7 @@ from rockcheck.scenes.recordings.layout import (
     layout_of,
 )
 from rockcheck.scenes.recordings.order import Shape, are_times, runs_along_rows
-from rockcheck.scenes.recordings.recording import known_unit
+from rockcheck.scenes.recordings.recording import known_unit, numbers
 from rockcheck.scenes.recordings.tables import unit_of_name
 from rockcheck.validation.studies.population.intensity_measures import measure_of
 from rockcheck.validation.suite.motions import RecordSet
@@ -252,10 +252,23 @@ def test_lines_are_even_but_for_a_shorter_last_one(widths, even):
         (np.round(np.arange(50) / 300, 2), True),
         (np.sin(np.arange(50)), False),
         (np.zeros(50), False),
+        (np.arange(10.0), True),
+        (np.arange(9.0), False),
+        # of ten steps one or two are negative
+        (np.array([0, 1, 2, 3, 4.1, 4, 6, 7, 8, 9, 10]), True),
+        (np.array([0, 1, 2, 3, 4.1, 4, 6.1, 6, 8, 9, 10]), False),
     ],
 )
 def test_which_numbers_are_times(values, times):
     assert are_times(values, is_step_given=True) == times
+
+
+def test_numbers_that_run_together_stand_in_columns_of_one_width(fault_of):
+    lines = [(1, "-1.5-2.5"), (2, "-3.5-4.5"), (3, "-5.5")]
+    assert numbers(lines, 5) == [-1.5, -2.5, -3.5, -4.5, -5.5]
+    uneven = [lines[0], (2, "-5.5"), (3, "-3.5-4.5")]
+    assert "'-1.5-2.5' is not a finite number" in str(fault_of(numbers, uneven, 5))
+    assert "'x' is not a finite number" in str(fault_of(numbers, [(1, "0.1 x")]))
 
 
 def test_a_folder_is_supplied_with_what_its_files_do_not_state(tmp_path):
