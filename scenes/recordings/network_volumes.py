@@ -88,7 +88,9 @@ def read_volume_one(lines: list[str], reading: Reading) -> list[Recording]:
 def _channel(lines: list[str], index: int, reading: Reading) -> tuple[Recording, int]:
     """The channel that begins at the index, and the index behind its samples."""
     header = _header(lines, index)
-    line = lines[header.data][:WIDE] if header.data < len(lines) else ""
+    if header.data >= len(lines):
+        raise fault("the file ends before its samples", len(lines))
+    line = lines[header.data][:WIDE]
     if equally := _EQUALLY.match(line):
         return _equally_spaced(lines, header, equally, reading)
     if re.search(r"[A-DF-Z]{2}", line, re.IGNORECASE):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
 from rockcheck.scenes import Floats, InputError, recordings
-from rockcheck.scenes.recordings import network_columns, networks, sets
+from rockcheck.scenes.recordings import network_columns, network_lines, networks, sets
 
 GRAVITY = recordings.GRAVITY_OF_RECORDS
 
@@ -620,6 +620,45 @@ def test_a_geonet_file_that_ends_with_its_header_is_refused(written):
     assert "line 26: the file ends within a header" in answers("GeoNet V1A", text, written)[1]
 
 
+def test_an_accelerogram_that_ends_with_its_header_is_refused(written):
+    text = "\n".join(renadic(96, 0.01, 3.0).splitlines()[:27])
+    said = answers("RENADIC", text, written)[1]
+    assert "line 27: the file ends before its samples" in said
+
+
+def test_a_count_that_is_stated_nowhere_is_missing(written):
+    text = usc(16)(96, 0.01, 3.0).replace(f"{500:5d}{96:5d}", f"{500:5d}{'':5}")
+    assert "line 14: the count of points 0 is not in" in answers("USC", text, written)[1]
+
+
+def test_an_accelerogram_may_have_a_number_a_line(written):
+    line = "{count:5d} points of accel data equally spaced at {step:.3f} sec, in g. (1f11.6)\n"
+    text = volume_one_equal(line, "11.6f")(96, 0.01, 3.0)
+    lines = [
+        "".join(f"{word:>11}\n" for word in one.split())
+        if re.fullmatch(r"( *-?[0-9]\.[0-9]{6})+\n", one)
+        else one
+        for one in text.splitlines(keepends=True)
+    ]
+    components, said = answers("CSMIP RAW, fields in words", "".join(lines), written)
+    assert said == ""
+    np.testing.assert_allclose(components[0].samples, motion(96, 3.0), atol=1e-5)
+
+
+def test_a_length_may_count_the_steps_between_samples(written):
+    text = bhrc(97, 0.01, 3.0).replace("DURATION =   0.970", "DURATION =   0.960")
+    (component,), _ = answers("BHRC", text, written)
+    assert component.time_step == 0.01
+
+
+def test_the_last_line_but_one_that_lost_a_digit_is_told():
+    lines = ["1.000 2.000"] * 10
+    lines[-2] = "1.000 2.00"
+    (note,) = network_lines.digit_notes(lines, 5)
+    assert note.startswith("line 13 has 10 characters")
+    assert network_lines.digit_notes([*lines[:-2], "1.000 2.000", "1.000"], 5) == []
+
+
 def test_one_sample_in_some_seconds_has_no_step(written):
     text = bhrc(1, 0.013, 3.0)
     assert "the time step 0.0 is not positive" in answers("BHRC", text, written)[1]
@@ -715,7 +754,7 @@ def test_words_and_integers_of_a_header_that_differ_are_named(written):
 
 def test_uneven_times_of_film_are_refused(written):
     text = volume_one_pairs(96, 0.01, 3.0).replace("  0.050", "  0.057")
-    assert "off the uniform step" in answers("RENADIC", text, written)[1]
+    assert "line 29: time 0.057 s is off the uniform step" in answers("RENADIC", text, written)[1]
 
 
 def test_a_unit_swapped_in_a_header_contradicts_its_peak(written):
