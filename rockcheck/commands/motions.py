@@ -108,9 +108,9 @@ def finding_of(motions: dict[str, Recording], target: synthetic.Target, folder: 
     """The motions, a row each, and what to do with them."""
     columns = [
         text("file"),
-        Column("pga", "PGA", "g", digits=3),
-        Column("pgv", "PGV", "m/s", digits=3),
-        Column("arias", "Arias", "m/s", digits=3),
+        Column("pga", "PGA", "g"),
+        Column("pgv", "PGV", "m/s"),
+        Column("arias", "Arias", "m/s"),
     ]
     rows = [
         [

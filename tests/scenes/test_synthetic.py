@@ -134,6 +134,14 @@ def test_the_files_are_the_motions(tmp_path, typed, motions):
     assert np.max(np.abs(read.samples - motions[1].samples)) <= 5e-7
 
 
+def test_files_have_micrometres_and_microseconds(tmp_path, typed):
+    typed("new", str(tmp_path), "--motions", "1", "--seed", "0")
+    rows = (tmp_path / "synthetic-01.csv").read_text("utf-8").splitlines()[2:]
+    decimals = [len(word.partition(".")[2]) for row in rows for word in row.split(",")]
+    assert max(len(row) for row in rows) < 20
+    assert max(decimals[1::2]) == 6
+
+
 def test_what_was_made_is_told_as_data(tmp_path, told):
     words = ("--motions", "1", "--ground", "D", "--acceleration", "0.1")
     found = told("new", str(tmp_path), *words)
