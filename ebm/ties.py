@@ -34,6 +34,10 @@ PARTED = 1e-3
 FARTHER, AS_SOON = 10.0, 2
 
 
+#: What is equal where a block may slide or rock, whatever the size of its base's motion.
+FRICTION = "friction equals B/H"
+
+
 @dataclass(frozen=True)
 class Tie:
     """More than one answer: `what` is equal, and from `from_s` (s) on the answers part.
@@ -101,7 +105,7 @@ def _friction_edges(scene: Scene) -> Iterator[Edge]:
     for slope in slopes:
         if _equal(scene.floor.mu_s, slope) or _equal(scene.floor.friction, slope):
             yield Edge(
-                "friction equals B/H",
+                FRICTION,
                 lambda by: (_with_friction(scene, 1.0 - by), _with_friction(scene, 1.0 + by)),
             )
             return

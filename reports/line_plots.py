@@ -72,19 +72,23 @@ def lines(plot: Plot) -> Figure:
 def _scale(ax: Any, of: Literal["x", "y"], axis: Axis) -> None:
     """One axis: limits, ticks, and where it is logarithmic at most seven powers of ten.
 
-    The common style leaves the $ of matplotlib's own labels of powers as it is.
+    Below two of them, ticks at 1, 2 and 5 of each. The common style leaves the $ of matplotlib's
+    own labels of powers as it is.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     if axis.log:
         ax.set(**{f"{of}scale": "log"})
+    if axis.limits is not None:
+        ax.set(**{f"{of}lim": axis.limits})
+    if axis.log:
+        low, high = getattr(ax, f"get_{of}lim")()
+        subs = (1.0, 2.0, 5.0) if high < 100.0 * low else (1.0,)
         getattr(ax, f"{of}axis").set(
-            major_locator=LogLocator(numticks=7),
+            major_locator=LogLocator(subs=subs, numticks=7),
             major_formatter=FuncFormatter(lambda value, _: power_of_ten(value)),
             minor_locator=NullLocator(),
         )
-    if axis.limits is not None:
-        ax.set(**{f"{of}lim": axis.limits})
     if axis.ticks:
         ax.set(**{f"{of}ticks": list(axis.ticks), f"{of}ticklabels": list(axis.ticks.values())})
 

@@ -168,8 +168,10 @@ def new_figure(**how: Any) -> Iterator[Figure]:
 
 
 def power_of_ten(value: float) -> str:
-    """10⁻³; plain from 0.1 to 1000."""
+    """10⁻³; plain from 0.1 to 1000, and where it is no power of ten."""
     exponent = round(math.log10(value))
+    if not math.isclose(value, 10.0**exponent):
+        return f"{value:g}"
     return f"{value:g}" if -1 <= exponent <= 3 else f"10{str(exponent).translate(SUPERSCRIPTS)}"
 
 

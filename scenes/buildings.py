@@ -99,10 +99,12 @@ class Regular(Frozen):
     @property
     def words(self) -> str:
         """Which storey of which building."""
-        return (
-            f"on storey {self.storey} of {self.storeys}, period {self.period:g} s, damping"
-            f" {self.damping:g}"
-        )
+        return f"on storey {self.storey} of {self.of_storeys}"
+
+    @property
+    def of_storeys(self) -> str:
+        """Which building."""
+        return f"{self.storeys}, period {self.period:g} s, damping {self.damping:g}"
 
 
 class Modal(Frozen):

@@ -34,6 +34,8 @@ from rockcheck.validation.studies.population.study import Assessment
 from rockcheck.validation.suite import motions
 
 MOST_LEVELS, MOST_SAMPLES = 1000, 1 << 16
+#: Half diagonals of the block that a capacity of its slip, or of its top, is at the most.
+MOST_LENGTHS = 20.0
 #: Draws of a scene's uncertain numbers under its own motion, and under each of its records.
 OWN_DRAWS, RECORD_DRAWS = 256, 64
 
@@ -198,6 +200,8 @@ def check_for_storeys(varied: Varied, given: files.UncertainScene) -> None:
     for option, value in (("--gaps", varied.gaps), ("--samples", varied.samples)):
         if value is not None:
             raise InputError(f"does not go with {option}", "--storeys")
+    if (varied.levels or "").count(":") > 1:
+        raise InputError("goes with a measure of --levels, and no bounds", "--storeys")
 
 
 def plan_of_storey(planned: plan.Plan, given: files.UncertainScene, number: int) -> plan.Plan:
@@ -224,6 +228,13 @@ def searched_capacities(
     for capacity in asked:
         if capacity.quantity == "wall_speed" and not scene.walls:
             raise InputError(f"{capacity.name}: the scene has no wall", "--capacity")
+        most = MOST_LENGTHS * scene.block.radius
+        if capacity.quantity in ("slip", "top") and capacity.value > most:
+            raise InputError(
+                f"{capacity.name}: is it in m? At most {most:.3g} m, {MOST_LENGTHS:g} half"
+                " diagonals of the block",
+                "--capacity",
+            )
     if recorded and has_bounds(varied.levels, measure):
         return tuple(capacity for capacity in asked if capacity.quantity != "rotation")
     return asked

@@ -76,6 +76,8 @@ def write_motions(folder: Path, asked: Synthetic) -> None:
     )
     motions = {f"synthetic-{number:02d}.csv": motion for number, motion in enumerate(found, 1)}
     made = usable_folder(folder)
+    if any(made.glob("synthetic-*.csv")):
+        raise InputError(f"{printable(folder)}: has synthetic motions; they are left as they are")
     writing.write_together({made / name: file_text(motion) for name, motion in motions.items()})
     finish_command(finding_of(motions, target, folder))
 

@@ -114,6 +114,7 @@ def test_an_option_without_its_value_says_what_it_is_for(words, said, refuses):
         ("validate paper --quick", "--quick"),
         ("assess fig4a --capacity wall_speed:1", "--capacity: wall_speed:1: the scene has no wall"),
         ("assess fig4a --storeys 1:2", "--storeys: needs a [building] of storeys"),
+        ("assess fig4a --capacity slip:50", "--capacity: slip:50: is it in m? At most"),
         ("assess fig4a --capacity slip:5mm", "--capacity: 'slip:5mm' is not allowed"),
     ],
 )

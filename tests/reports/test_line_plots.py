@@ -52,6 +52,21 @@ def test_axes_have_their_scale_limits_and_words():
     assert [word.get_text() for word in axes.get_yticklabels()] == ["one"]
 
 
+@pytest.mark.parametrize(
+    ("most", "words"), [(9.0, ["0.2", "0.5", "1", "2", "5"]), (90.0, ["1", "10"])]
+)
+def test_a_logarithmic_axis_below_two_powers_of_ten_names_what_is_between(most, words):
+    axis = Axis("x", log=True, limits=(0.15, most))
+    (axes,) = line_plots.lines(Plot("p", panels=panels(1), x=axis)).axes
+    axes.figure.draw_without_rendering()
+    shown = [
+        label.get_text()
+        for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        if 0.15 <= place <= most
+    ]
+    assert shown == words
+
+
 def test_a_band_stands_around_its_line_and_a_level_goes_across():
     series = [line(low=[0.0, 0.5, 3.0], high=[0.5, 2.0, 5.0]), Series("b", y=[2.0], style="level")]
     (axes,) = line_plots.lines(Plot("p", panels=[Panel("", series)])).axes

@@ -47,7 +47,15 @@ def test_models_of_ones_own_get_the_spare_looks_in_order():
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(1e-4, "10⁻⁴"), (0.01, "10⁻²"), (0.1, "0.1"), (1.0, "1"), (1e3, "1000"), (1e4, "10⁴")],
+    [
+        (1e-4, "10⁻⁴"),
+        (0.01, "10⁻²"),
+        (0.1, "0.1"),
+        (1.0, "1"),
+        (1e3, "1000"),
+        (1e4, "10⁴"),
+        (0.02, "0.02"),
+    ],
 )
 def test_a_power_of_ten_is_plain_from_a_tenth_to_a_thousand(value, words):
     assert style.power_of_ten(value) == words

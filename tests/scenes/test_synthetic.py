@@ -173,6 +173,14 @@ def test_a_file_is_no_folder(tmp_path, refused):
     assert (tmp_path / "taken").read_text(encoding="utf-8") == "mine"
 
 
+def test_motions_that_are_there_are_left_as_they_are(tmp_path, typed, refused):
+    typed("new", str(tmp_path), "--motions", "1")
+    first = (tmp_path / "synthetic-01.csv").read_bytes()
+    assert "they are left as they are" in refused("new", str(tmp_path), "--motions", "2")
+    assert [path.name for path in tmp_path.iterdir()] == ["synthetic-01.csv"]
+    assert (tmp_path / "synthetic-01.csv").read_bytes() == first
+
+
 @pytest.mark.parametrize("option", ["--ground=C", "--acceleration=0.2", "--duration=9", "--seed=3"])
 def test_an_option_of_motions_goes_with_them(tmp_path, refused, option):
     said = refused("new", str(tmp_path / "shelf.toml"), option)

@@ -51,8 +51,9 @@ document.addEventListener("DOMContentLoaded", () => {
     const u = new uPlot({
       ...size(), legend: { show: false }, padding: [8, 12, 0, 0], bands, series,
       cursor: { drag: { x: false, y: false }, points: { show: !chart.single }, y: false },
-      scales: { x: { time: false, distr: chart.log ? 3 : 1 }, y: { range: [chart.least, chart.most] } },
-      axes: [{ ...axis, label: chart.across, size: 30 }, { ...axis, label: chart.along, size: 48 }, ...(chart.per_unit ? [above] : [])],
+      scales: { x: { time: false, distr: chart.log ? 3 : 1, ...(chart.log ? { range: (u, low, high) => [low, high] } : {}) }, y: { range: [chart.least, chart.most] } },
+      // Below two powers of ten 1, 2 and 5 of each are named.
+      axes: [{ ...axis, label: chart.across, size: 30, ...(chart.log ? { filter: (u, splits) => splits.map(value => (u.scales.x.max < 100 * u.scales.x.min ? "125" : "1").includes(value.toExponential(0)[0]) ? value : null) } : {}) }, { ...axis, label: chart.along, size: 48 }, ...(chart.per_unit ? [above] : [])],
       hooks: { setCursor: [u => {
         const index = u.cursor.idx, y = u.cursor.top === null ? 0 : u.posToVal(u.cursor.top, "y");
         if (index === null || u.cursor.top < 0) return;

@@ -350,13 +350,34 @@ def test_few_motions_are_said_to_be_too_few_to_test():
 def test_a_component_has_the_median_and_the_dispersion_of_its_curve():
     files, answers = library()
     rows = list(csv.DictReader(io.StringIO(files["fragility_pelicun.csv"])))
-    assert [row["ID"] for row in rows] == ["rockcheck.slip.0_05", "rockcheck.overturns"]
+    assert [row["ID"] for row in rows] == [
+        "rockcheck.fig5a.slip.0_05",
+        "rockcheck.fig5a.overturns",
+    ]
     for row, answer in zip(rows, answers, strict=True):
         assert float(row["LS1-Theta_0"]) == answer.intensity.fit.median
         assert float(row["LS1-Theta_1"]) == answer.intensity.fit.dispersion
         assert row["LS1-Family"] == "lognormal"
         assert row["Demand-Type"] == "Peak Ground Acceleration"
         assert row["Demand-Unit"] == "g"
+
+
+def test_a_library_names_the_block_and_the_building():
+    building = Regular(storeys=4, storey=3, period=0.6, damping=0.05)
+    _, answers = library()
+    files = damage_files.pelicun_files(answers, CERTAIN.scene, "ebm", "1.2.3", building)
+    described = json.loads(files["fragility_pelicun.json"])["_GeneralInformation"]["Description"]
+    block = CERTAIN.scene.block
+    size = f"{2.0 * block.half_width:.4g} m wide, {2.0 * block.half_height:.4g} m high"
+    assert f"{size}, on storey 3 of 4, period 0.6 s" in described
+
+
+def test_a_name_of_a_scene_is_spelt_as_one_word_in_an_id():
+    _, answers = library()
+    scene = CERTAIN.scene.replace(name="my shelf, no. 2")
+    files = damage_files.pelicun_files(answers, scene, "ebm", "1.2.3")
+    rows = list(csv.DictReader(io.StringIO(files["fragility_pelicun.csv"])))
+    assert rows[1]["ID"] == "rockcheck.my_shelf_no_2.overturns"
 
 
 @pytest.mark.parametrize(
@@ -389,7 +410,9 @@ def test_the_library_says_what_made_it():
     assert text == json.dumps(described, indent=2, ensure_ascii=False) + "\n"
     assert described["_GeneralInformation"]["Version"] == "1.2.3"
     assert "ebm-unilateral" in described["_GeneralInformation"]["Description"]
-    limit = described["rockcheck.slip.0_05"]["LimitStates"]["LS1"]["DS1"]["Description"]
+    block = "fig5a: slip above 0.05 m"
+    assert described["rockcheck.fig5a.slip.0_05"]["Description"] == block
+    limit = described["rockcheck.fig5a.slip.0_05"]["LimitStates"]["LS1"]["DS1"]["Description"]
     assert limit == "slip above 0.05 m"
 
 

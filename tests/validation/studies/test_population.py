@@ -449,8 +449,8 @@ def test_capacities_have_curves_tables_and_a_library(records, tmp_path, told):
     folder = tmp_path / "rockcheck-report" / "assess"
     library = (folder / "fragility_pelicun.csv").read_text("utf-8").splitlines()
     assert [line.partition(",")[0] for line in library[1:]] == [
-        "rockcheck.top.0_1",
-        "rockcheck.overturns",
+        "rockcheck.rack.top.0_1",
+        "rockcheck.rack.overturns",
     ]
     assert "top displacement above 0.1 m" in (folder / "index.html").read_text("utf-8")
 

@@ -146,7 +146,13 @@ def test_a_scene_that_was_not_scaled_has_no_intensities():
 
 def test_a_record_may_stand_again():
     table = intensities([record("a", 0.6, (0.61234, 0.7), (0.8, 0.9))])["intensities"]
-    assert table.rows == [["a", 0.4, 0.6, 40.0, "0.612 to 0.7, 0.8 to 0.9"]]
+    assert table.rows == [["a", 0.4, 0.6, 40.0, "0.6123 to 0.7, 0.8 to 0.9", None]]
+
+
+def test_the_intensity_from_which_a_record_falls_for_good_is_shown():
+    falls = replace(record("a", 0.6, (0.6, 0.7)), for_good=0.9)
+    table = intensities([falls])["intensities"]
+    assert table.records()[0]["for_good"] == 0.9
 
 
 def test_the_least_intensity_is_shown_to_four_digits():

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from assessed import RUNS, SAFE, UNCERTAIN, gathered, interval, judged, ran
+from assessed import RUNS, SAFE, SCENE, UNCERTAIN, gathered, interval, judged, ran
 
 from rockcheck.validation.studies.population import results, sentences, statistics
 from rockcheck.validation.studies.population.certainty import (
@@ -319,13 +319,31 @@ def test_a_run_that_nobody_judged_is_not_converged():
     assert not sentences.is_converged(results.Certainty())
 
 
-def test_a_tie_of_many_runs_names_its_run():
-    tie = ("friction equals B/H", 0.3, ("at rest", "overturned left"))
-    words = certain({"a": CONVERGED, "b": CONVERGED.model_copy(update={"ties": (tie,)})})
+def tied(when, *fates):
+    return CONVERGED.model_copy(update={"ties": (("friction equals B/H", when, fates),)})
+
+
+def test_a_tie_is_told_once_with_the_runs_that_have_it():
+    words = certain({"a": CONVERGED, "b": tied(0.5, "at rest"), "c": tied(0.3, "overturned left")})
     assert words[1] == (
-        "From 0.3 s on, b the mechanics has more than one answer (friction equals B/H): at rest or"
-        " overturned left."
+        "From 0.3 s on the mechanics has more than one answer in 2 of 3 runs (friction equals B/H):"
+        " at rest or overturned left."
     )
+
+
+def test_a_tie_with_one_fate_says_that_both_sides_have_it():
+    words = certain({"a": tied(0.3, "at rest")})
+    assert words[1].endswith(
+        "has more than one answer (friction equals B/H): at rest on both sides."
+    )
+
+
+@pytest.mark.parametrize(("of_slope", "sentences_told"), [(1.0, 1), (1.001, 0), (0.999, 0)])
+def test_a_search_says_that_friction_equals_the_slope(of_slope, sentences_told):
+    scene = SCENE.replace(floor=SCENE.floor.replace(friction=of_slope * SCENE.block.slope))
+    told = sentences.edge_sentences(scene)
+    assert len(told) == sentences_told
+    assert all("Friction equals B/H" in sentence for sentence in told)
 
 
 def test_a_tie_of_a_single_run_names_none():

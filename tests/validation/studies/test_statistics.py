@@ -379,6 +379,12 @@ def test_an_island_of_intensities_is_between_two_factors():
     )
     assert answer.records[0].least == pytest.approx(1.5 * SIZE)
     assert answer.records[0].islands == ((1.5 * SIZE, 1.6 * SIZE),)
+    assert answer.records[0].for_good == 2.0 * SIZE
+
+
+def test_a_motion_under_which_it_stands_at_last_has_no_fall_for_good():
+    answer = intensities_of(a=[interval(0, 1.5, 1.6, 1.49, 1.61)])
+    assert answer.records[0].for_good is None
 
 
 def test_a_motion_that_overturns_at_no_factor_was_scaled_up_to_the_last():

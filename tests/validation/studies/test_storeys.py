@@ -100,6 +100,26 @@ def test_curves_are_drawn_over_the_storeys(played):
     assert plot.y.label == "median PGA, g"
 
 
+def test_the_page_says_what_stands_where_and_who_plays_it(played):
+    facts = dict(played[2].blocks[0].facts)
+    assert facts["block"] == "0.4 m wide, 1.6 m high"
+    assert facts["building"] == "storeys: 3, period 0.4 s, damping 0.05"
+    assert facts["base"].startswith("2 recorded motions")
+    assert facts["played by"].startswith("ebm-unilateral, rockcheck ")
+
+
+def test_the_page_names_a_friction_at_which_a_block_slides_or_rocks():
+    edge = SCENE.replace(floor=Floor(friction=0.25))
+    planned = Plan(own=replace(CASES["weak"], scene=edge), cases=CASES, recorded=True, measure=PGA)
+    assert "Friction equals B/H" in storeys.storeys_text(planned).items[0]
+
+
+def test_the_model_that_is_named_is_the_one_that_plays():
+    planned = Plan(own=CASES["weak"], cases=CASES, models={"cm": {}}, recorded=True, measure=PGA)
+    found = storeys.finding_of(made_up(0, 1), planned, {})
+    assert found.data["model"] == "ebm-unilateral"
+
+
 def made_up(*fallen):
     """Storeys on which so many of two motions overturn the block."""
     return [

@@ -7,10 +7,12 @@ capacity, with one limit state. Called by the study.
 import csv
 import io
 import json
+import re
 from collections.abc import Sequence
 from typing import Any
 
 from rockcheck.scenes import Scene
+from rockcheck.scenes.buildings import Building
 from rockcheck.validation.studies.population.damage import DamageAnswer
 
 #: Pelicun's names of the measures of intensity, and of their units.
@@ -34,7 +36,11 @@ COLUMNS = (
 
 
 def pelicun_files(
-    answers: Sequence[DamageAnswer], scene: Scene, model: str, version: str
+    answers: Sequence[DamageAnswer],
+    scene: Scene,
+    model: str,
+    version: str,
+    building: Building | None = None,
 ) -> dict[str, str]:
     """The library by file name; nothing where Pelicun has no name for the measure, or no curve.
 
@@ -50,14 +56,16 @@ def pelicun_files(
     described: dict[str, Any] = {
         "_GeneralInformation": {
             "ShortName": f"rockcheck: {scene.name}",
-            "Description": f"Fragility of a rocking block, played by {model}.",
+            "Description": f"Fragility of a rocking block, {2.0 * scene.block.half_width:.4g} m"
+            f" wide, {2.0 * scene.block.half_height:.4g} m high"
+            f"{f', {building.words}' if building else ''}, played by {model}.",
             "Version": version,
         }
     }
     for answer in curves:
         fit = answer.intensity.fit
         assert fit is not None, "chosen above"
-        name = component_of(answer)
+        name = component_of(answer, scene.name)
         row = ("0", *demand, "0", "1", "lognormal", repr(fit.median), repr(fit.dispersion), "")
         writer.writerow(dict(zip(COLUMNS, (name, *row), strict=True)))
         described[name] = {
@@ -72,9 +80,10 @@ def pelicun_files(
     return {"fragility_pelicun.csv": lines.getvalue(), "fragility_pelicun.json": text + "\n"}
 
 
-def component_of(answer: DamageAnswer) -> str:
-    """The component's ID: "rockcheck.slip.0_05"."""
-    return "rockcheck." + answer.capacity.name.replace(".", "_").replace(":", ".")
+def component_of(answer: DamageAnswer, name: str) -> str:
+    """The component's ID by the scene's name: "rockcheck.shelf.slip.0_05"."""
+    block = re.sub(r"\W+", "_", name)
+    return f"rockcheck.{block}." + answer.capacity.name.replace(".", "_").replace(":", ".")
 
 
 def _demand_of(measure: str) -> tuple[str, str] | None:

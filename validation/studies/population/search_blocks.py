@@ -147,7 +147,8 @@ def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
         Column("as_it_is", f"{answer.label} as it is", answer.unit),
         Column("least", "falls from", answer.unit, digits=4),
         Column("looked_up_to", "looked at up to", answer.unit, brief=False),
-        text("islands", "stands again after", brief=False),
+        text("islands", "falls in, then stands", brief=False),
+        Column("for_good", "falls for good from", answer.unit, digits=4, brief=False),
     ]
     rows = [
         [
@@ -155,7 +156,8 @@ def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
             record.as_it_is,
             record.least,
             record.beyond,
-            ", ".join(f"{low:.3g} to {high:.3g}" for low, high in record.islands),
+            ", ".join(f"{low:.4g} to {high:.4g}" for low, high in record.islands),
+            record.for_good,
         ]
         for record in answer.records
     ]
@@ -164,8 +166,9 @@ def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
         columns,
         rows,
         "At which intensity it falls",
-        note="Each motion was scaled in steps of 1 %, each change narrowed to 0.25 %. The curve is"
-        " lognormal, of the greatest likelihood; its interval is from drawing the motions anew.",
+        note="Each motion was scaled in steps of 1 %, each change narrowed to 0.25 %. Narrower"
+        " intervals of falls may be missed, also below the least one. The curve is lognormal, of"
+        " the greatest likelihood; its interval is from drawing the motions anew.",
         on="page" if len(rows) > 1 else "file",
         folded=len(rows) > 12,
     )

@@ -5,6 +5,8 @@ In: typed answers (`statistics`). Out: sentences. A sentence claims no more than
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from rockcheck.ebm.ties import FRICTION, edges_of
+from rockcheck.scenes import Scene
 from rockcheck.validation.studies.population import results
 from rockcheck.validation.studies.population.certainty import (
     MethodScore,
@@ -298,13 +300,29 @@ def _convergence_sentence(cases: Mapping[str, results.Certainty]) -> str:
 
 
 def _tie_sentences(cases: Mapping[str, results.Certainty]) -> Iterator[str]:
-    for case, sure in cases.items():
+    """What is equal, in how many runs and from when on, and the fates on both sides."""
+    alike: dict[str, list[tuple[float, tuple[str, ...]]]] = {}
+    for sure in cases.values():
         for what, when, fates in sure.ties:
-            where = f", {case}" if len(cases) > 1 else ""
-            yield (
-                f"From {when:.3g} s on{where} the mechanics has more than one answer ({what}):"
-                f" {' or '.join(fates)}."
-            )
+            alike.setdefault(what, []).append((when, fates))
+    for what, ties in alike.items():
+        where = f" in {len(ties)} of {len(cases)} runs" if len(cases) > 1 else ""
+        known = list(dict.fromkeys(fate for _, both in ties for fate in both))
+        also = " on both sides" if len(known) == 1 else ""
+        yield (
+            f"From {min(when for when, _ in ties):.3g} s on the mechanics has more than one"
+            f" answer{where} ({what}): {' or '.join(known)}{also}."
+        )
+
+
+def edge_sentences(scene: Scene) -> list[str]:
+    """That a search took one of two answers, where the block may slide or rock at each factor."""
+    if all(edge.what != FRICTION for edge in edges_of(scene)):
+        return []
+    return [
+        "Friction equals B/H, where a block slides or rocks: this took one of two answers. Assess"
+        " it with a friction a thousandth larger, too."
+    ]
 
 
 def _law_sentences(cases: Mapping[str, results.Certainty]) -> Iterator[str]:

@@ -290,8 +290,9 @@ def overturned_steps(answer: GapAnswer) -> tuple[list[float], list[float]]:
 class RecordIntensity:
     """The intensities at which a motion was seen to overturn the block.
 
-    `as_it_is` is its intensity, `least` the least at which it falls (None: not up to `beyond`), and
-    `islands` the intervals above which the block stands again.
+    `as_it_is` is its intensity, `least` the least at which it falls (None: not up to `beyond`),
+    `islands` the intervals above which the block stands again, and `for_good` the intensity from
+    which it falls up to `beyond` (None: it stands there).
     """
 
     case: str
@@ -299,6 +300,7 @@ class RecordIntensity:
     least: float | None
     beyond: float
     islands: tuple[tuple[float, float], ...]
+    for_good: float | None = None
 
 
 @dataclass(frozen=True)
@@ -356,6 +358,7 @@ def least_intensities(
                 least=size * falls[0].low if falls else None,
                 beyond=size * most[case],
                 islands=tuple((size * fall.low, size * fall.high) for fall in islands),
+                for_good=size * falls[-1].low if len(falls) > len(islands) else None,
             )
         )
     least = [record.least for record in records if record.least is not None]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from rockcheck.scenes.buildings import Regular
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.finding import (
     Axis,
@@ -21,12 +22,16 @@ from rockcheck.validation.finding import (
     Plot,
     Series,
     Table,
+    Text,
 )
 from rockcheck.validation.studies.population import damage, results, statistics
+from rockcheck.validation.studies.population.blocks import scene_text
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
 from rockcheck.validation.studies.population.plan import Plan
+from rockcheck.validation.studies.population.sentences import edge_sentences
 from rockcheck.validation.study import Study, Task
+from rockcheck.version import __version__
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,8 +101,8 @@ def finding_of(storeys: Sequence[Storey], plan: Plan, failures: Mapping[str, str
         "assess",
         f"Assessment by storey: {name}",
         answer_of(storeys, name),
-        [table, *storey_plot(storeys)],
-        {"scene": name, "model": plan.model, "storeys": table.records()},
+        [storeys_text(plan), table, *storey_plot(storeys)],
+        {"scene": name, "model": plan.batch_model, "storeys": table.records()},
         exit_code=3 if failures else 0,
         failures=failures,
     )
@@ -112,6 +117,15 @@ def answer_of(storeys: Sequence[Storey], name: str) -> str:
         f"{storey.number} ({storey.fallen} of {storey.runs} motions)" for storey in fallen
     )
     return f"{name} overturns on storey {words}."
+
+
+def storeys_text(plan: Plan) -> Text:
+    """Block, floor, walls, building and motions, in words; and a tie of the friction."""
+    facts = dict(scene_text(plan.own.scene, Gathered(plan, {})).facts)
+    assert isinstance(plan.own.building, Regular), "asked for by storey"
+    facts["building"] = f"storeys: {plan.own.building.of_storeys}"
+    facts["played by"] = f"{plan.batch_model}, rockcheck {__version__}"
+    return Text(facts=list(facts.items()), items=edge_sentences(plan.own.scene))
 
 
 def storey_table(storeys: Sequence[Storey], plan: Plan) -> Table:
@@ -155,7 +169,8 @@ def storey_table(storeys: Sequence[Storey], plan: Plan) -> Table:
         rows,
         "On which storeys it falls",
         note="Overturned: as the motions are. Medians are of the intensity of the ground, but for"
-        " the peak floor acceleration.",
+        " the peak floor acceleration. Empty: some motion, or none, exceeds it up to 32 times where"
+        " the block may rock.",
     )
 
 

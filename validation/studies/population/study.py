@@ -79,6 +79,8 @@ def finding_of(gathered: Gathered) -> Finding:
         HAND: sentences.method_sentences(scores, events),
     }
     answers[INTENSITY] += damage_blocks.damage_sentences(damages)
+    for question in (GAP, INTENSITY):
+        answers[question] += sentences.edge_sentences(scene)
     if plan.levels:
         answers[INTENSITY].append(level_blocks.sentence_of(plan.levels, curves))
     page: list[Block] = [
@@ -131,7 +133,9 @@ def finding_of(gathered: Gathered) -> Finding:
             for case, shown in gathered.shown.items()
             if shown.history
         }
-        | damage_files.pelicun_files(damages, scene, plan.batch_model, __version__),
+        | damage_files.pelicun_files(
+            damages, scene, plan.batch_model, __version__, plan.own.building
+        ),
     )
 
 
