@@ -114,6 +114,7 @@ def test_stable_steps_are_colours_and_numbers():
     data = {"tried": TRIED, "models": ["a", "b"], "panels": [("mass", [1.0, 2.0, 3.0], steps)] * 4}
     figure = line_plots.stable_steps(Plot("p", data=data))
     assert len(figure.axes) == 4
+    assert figure.get_figheight() < figure.get_figwidth()
     axes = figure.axes[0]
     assert [word.get_text() for word in axes.texts] == [
         *("0.01", "0.0001", "1e-05"),
