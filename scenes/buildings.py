@@ -157,7 +157,7 @@ def storey_motion(building: Building, ground: Excitation, quiet_below: float) ->
     return Record(
         unscaled=tuple(found.samples.tolist()),
         time_step=step,
-        source=f"{name}, {building.words}"[:200],
+        source=name[:200],
         notes=(
             *getattr(ground, "notes", ())[: MOST_NOTES - 1],
             f"{building.words}: lines every {step:.3g} s leave the motion by {error:.1e} of its"

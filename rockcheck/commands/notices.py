@@ -33,7 +33,7 @@ def tell_left_out(names: Sequence[str], hint: str = "") -> None:
 def tell_record_notes(scenes: Iterable[Scene]) -> None:
     """Print what readers of the scenes' records assumed or overrode, a line a note."""
     notes = [
-        f"{excitation.source.partition(', on storey')[0]}: {note}"
+        f"{excitation.source}: {note}"
         for scene in scenes
         for excitation in (scene.excitation, scene.vertical)
         if isinstance(excitation, Record)

@@ -29,7 +29,7 @@ from rockcheck.validation.studies.population.blocks import scene_text
 from rockcheck.validation.studies.population.gathered import Gathered
 from rockcheck.validation.studies.population.intensity_measures import measure_of, size_of
 from rockcheck.validation.studies.population.plan import Plan
-from rockcheck.validation.studies.population.sentences import edge_sentences
+from rockcheck.validation.studies.population.sentences import count_of, edge_sentences
 from rockcheck.validation.study import Study, Task
 from rockcheck.version import __version__
 
@@ -123,6 +123,8 @@ def storeys_text(plan: Plan) -> Text:
     """Block, floor, walls, building and motions, in words; and a tie of the friction."""
     facts = dict(scene_text(plan.own.scene, Gathered(plan, {})).facts)
     assert isinstance(plan.own.building, Regular), "asked for by storey"
+    if plan.recorded:
+        facts["base"] = count_of(len(plan.cases), "recorded motion")
     facts["building"] = f"storeys: {plan.own.building.of_storeys}"
     facts["played by"] = f"{plan.batch_model}, rockcheck {__version__}"
     return Text(facts=list(facts.items()), items=edge_sentences(plan.own.scene))
