@@ -48,6 +48,6 @@ def test_a_turn_moves_each_corner_across_its_arm(sense, near, away):
     upward = 0.8 * np.array([-1, -1, 1, -1, -1, 1])
     x = across * math.cos(phi) - upward * math.sin(phi)
     y = across * math.sin(phi) + upward * math.cos(phi)
-    contact_impacts.contact_rows(setting_of(LOADED), sense, phi, rows)
+    contact_impacts.contact_rows(setting_of(LOADED), sense, phi, True, rows)
     turns = [*x[:2], *-y[2:4], *y[4:], -y[0]]
     assert rows[:, 2] == pytest.approx(turns, abs=1e-15)

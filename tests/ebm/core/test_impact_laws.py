@@ -208,7 +208,7 @@ def impact_of(setting, phi: float, touching, e: float, v, sense=1.0):
 def rows_of(setting, sense: float, phi: float) -> np.ndarray:
     """The rows of the contacts, and of the floor's tangent."""
     rows = np.empty((7, 3))
-    ci.contact_rows(setting, sense, phi, rows)
+    ci.contact_rows(setting, sense, phi, True, rows)
     return rows
 
 
