@@ -71,10 +71,11 @@ def side_of(scene: Scene, side: Side) -> np.record:
         "e": wall.restitution if wall else 0.0,
     }
     if block.homogeneous:
-        arm, sine, cosine = math.sin(alpha), math.sin(2.0 * alpha), math.cos(2.0 * alpha)
+        sine, cosine = math.sin(2.0 * alpha), math.cos(2.0 * alpha)
+        stands = {"arm": math.sin(alpha), "height": math.cos(alpha)}
         turns = {"tip_sin": sine, "tip_cos": cosine, "far_sin": sine, "far_cos": cosine}
         corners = {"alpha": alpha, "radius": 1.0, "top_alpha": alpha, "top_radius": 1.0}
-        return filled(SIDE, **corners, **turns, **there, arm=arm, share=0.75)
+        return filled(SIDE, **corners, **turns, **there, **stands, share=0.75)
     pivot, other = block.pivot(side), block.pivot("right" if side == "left" else "left")
     top, radius = 2.0 * block.half_height - pivot.height, pivot.radius / unit
     square = pivot.radius**2
@@ -84,6 +85,7 @@ def side_of(scene: Scene, side: Side) -> np.record:
         radius=radius,
         # As gaps have it: flush with a wall they are 0 to the bit.
         arm=radius * math.sin(pivot.alpha),
+        height=radius * math.cos(pivot.alpha),
         top_alpha=math.atan2(pivot.arm, top),
         top_radius=math.hypot(pivot.arm, top) / unit,
         tip_sin=pivot.arm * (pivot.height + top) / square,

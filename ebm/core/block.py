@@ -1,5 +1,7 @@
 """The block with its floor and walls, a record that compiled code reads by name: SETTING."""
 
+import math
+
 from rockcheck.scenes.compiled import inner_kernel
 from rockcheck.scenes.named_record import record
 
@@ -9,8 +11,10 @@ SIDE = record(
     # Angle from the upright and distance of the lower corner, seen from the mass's centre.
     alpha="f8",
     radius="f8",
-    # Horizontal distance of the corners from the mass's centre.
+    # Horizontal distance of the corners from the mass's centre, and vertical one of the lower
+    # corner, where the block stands.
     arm="f8",
+    height="f8",
     # As alpha and radius, of the top corner.
     top_alpha="f8",
     top_radius="f8",
@@ -61,6 +65,21 @@ LEAST_FRICTION = 1e-9
 def side_of(block, sense):
     """The side to which a block tips whose rotation has this sign."""
     return block.left if sense > 0 else block.right
+
+
+@inner_kernel
+def arm_of(side, phi):
+    """Horizontal distance of the lower corner from the mass's centre of a block tipped by phi.
+
+    It tips to this side; with phi below 0 to the other one.
+    """
+    return side.arm if phi == 0.0 else side.radius * math.sin(side.alpha - phi)
+
+
+@inner_kernel
+def height_of(side, phi):
+    """Height of the mass's centre over the lower corner, of the same block."""
+    return side.height if phi == 0.0 else side.radius * math.cos(side.alpha - phi)
 
 
 @inner_kernel

@@ -28,7 +28,7 @@ import math
 
 import numpy as np
 
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import arm_of, height_of, side_of
 from rockcheck.ebm.core.contact_sets import (
     PARALLEL,
     ROUNDING,
@@ -90,14 +90,14 @@ def contact_rows(b, sense, phi, walls, rows):
     The block tips by phi to `sense`. Without `walls` only those of the floor.
     """
     pivot, other = side_of(b, sense), side_of(b, -sense)
-    s, c = pivot.radius * math.sin(pivot.alpha - phi), pivot.radius * math.cos(pivot.alpha - phi)
-    _write_row(rows, Contact.FOOT, -s)
-    _write_row(rows, Contact.OTHER, other.radius * math.sin(other.alpha + phi))
+    c = height_of(pivot, phi)
+    _write_row(rows, Contact.FOOT, -arm_of(pivot, phi))
+    _write_row(rows, Contact.OTHER, arm_of(other, -phi))
     _write_row(rows, Contact.TANGENT, c)
     if walls:
         _write_row(rows, Contact.TIP_TOP, -pivot.top_radius * math.cos(pivot.top_alpha + phi))
         _write_row(rows, Contact.TIP_BOTTOM, c)
-        _write_row(rows, Contact.FAR_BOTTOM, -other.radius * math.cos(other.alpha + phi))
+        _write_row(rows, Contact.FAR_BOTTOM, -height_of(other, -phi))
         _write_row(rows, Contact.FAR_TOP, other.top_radius * math.cos(other.top_alpha - phi))
 
 

@@ -6,7 +6,7 @@ position, one of velocity.
 
 import math
 
-from rockcheck.ebm.core.block import side_of, wall_corner
+from rockcheck.ebm.core.block import arm_of, height_of, side_of, wall_corner
 from rockcheck.ebm.core.series import INSTANT
 from rockcheck.scenes.compiled import inner_kernel
 
@@ -37,8 +37,7 @@ def lower(block, motion):
 @inner_kernel
 def height(block, motion):
     """Height of the mass's centre over the lower corner."""
-    side = lower(block, motion)
-    return side.radius * math.cos(side.alpha - abs(motion.theta))
+    return height_of(lower(block, motion), abs(motion.theta))
 
 
 @inner_kernel
@@ -78,8 +77,11 @@ def wall_gap(block, motion, side):
     faces = side_of(block, side)
     if faces.gap == math.inf:
         return faces.gap
-    radius, alpha = wall_corner(faces, side * motion.theta > 0.0)
-    return side * motion.x + faces.arm + faces.gap - radius * math.sin(alpha + abs(motion.theta))
+    reach = faces.arm
+    if motion.theta != 0.0:
+        radius, alpha = wall_corner(faces, side * motion.theta > 0.0)
+        reach = radius * math.sin(alpha + abs(motion.theta))
+    return side * motion.x + faces.arm + faces.gap - reach
 
 
 @inner_kernel
@@ -109,7 +111,7 @@ def closed_floor(block, motion):
     """Whether the lower corner rests on the floor."""
     turns = motion.w if lean(motion) > 0.0 else -motion.w
     side = lower(block, motion)
-    rate = motion.vy - side.radius * math.sin(side.alpha - abs(motion.theta)) * turns
+    rate = motion.vy - arm_of(side, abs(motion.theta)) * turns
     return abs(floor_gap(block, motion)) < CLOSED and abs(rate) < slowest(motion.w)
 
 
@@ -145,7 +147,7 @@ def land_upright(block, motion, sign, on_floor):
     A side that then touches a wall touches it exactly.
     """
     side = side_of(block, sign)
-    motion.x += sign * (side.arm - side.radius * math.sin(side.alpha - sign * motion.theta))
+    motion.x += sign * (side.arm - arm_of(side, sign * motion.theta))
     if on_floor:
         motion.y = block.height
     motion.theta = 0.0

@@ -2,7 +2,7 @@
 
 import math
 
-from rockcheck.ebm.core.block import LEAST_FRICTION, side_of
+from rockcheck.ebm.core.block import LEAST_FRICTION, arm_of, side_of
 from rockcheck.ebm.core.contacts import SLOW
 from rockcheck.ebm.core.extremes import has_met, reaches_wall
 from rockcheck.ebm.core.ground import acceleration, impulse_ahead, largest_ahead
@@ -143,10 +143,10 @@ def all_is_met(block, state):
     free = _sticks(block, block.left, energy) and _sticks(block, block.right, energy)
     if not (free and energy < corner and phi < side.alpha):
         return False
-    upright = motion.x + mode.sense * (side.arm - side.radius * math.sin(side.alpha - phi))
+    upright = motion.x + mode.sense * (side.arm - arm_of(side, phi))
     left, right = _highest(block, block.left, energy), _highest(block, block.right, energy)
-    at_left = upright - block.left.arm + block.left.radius * math.sin(block.left.alpha - left)
-    at_right = upright + block.right.arm - block.right.radius * math.sin(block.right.alpha - right)
+    at_left = upright - block.left.arm + arm_of(block.left, left)
+    at_right = upright + block.right.arm - arm_of(block.right, right)
     return (
         _changes_nothing(block, state, upright, 0.0)
         and _changes_nothing(block, state, at_left, left)

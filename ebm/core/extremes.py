@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core import lanes, series
-from rockcheck.ebm.core.block import side_of
+from rockcheck.ebm.core.block import arm_of, height_of, side_of
 from rockcheck.ebm.core.contacts import CLOSED, SLOW
 from rockcheck.ebm.core.motion import motion_at
 from rockcheck.ebm.core.names import Family, Guard, Kind, Pivot, Row
@@ -79,9 +79,9 @@ def _slip_and_lift(block, motion):
         return motion.x, motion.y - block.height
     sign = math.copysign(1.0, motion.theta)
     side = side_of(block, sign)
-    angle = side.alpha - abs(motion.theta)
-    slip = motion.x + sign * (side.arm - side.radius * math.sin(angle))
-    return slip, motion.y - side.radius * math.cos(angle)
+    phi = abs(motion.theta)
+    slip = motion.x + sign * (side.arm - arm_of(side, phi))
+    return slip, motion.y - height_of(side, phi)
 
 
 @called_kernel

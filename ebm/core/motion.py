@@ -39,11 +39,14 @@ from rockcheck.scenes.compiled import called_kernel, inner_kernel
 
 
 @inner_kernel
-def sine_cosine(angle, a):
-    """Sine and cosine of the angle. The workspace keeps the last ones."""
+def arm_and_height(side, phi, a):
+    """`arm_of` and `height_of` a block that tips by phi. The workspace keeps the last angle's."""
+    if phi == 0.0:
+        return side.arm, side.height
+    angle = side.alpha - phi
     if a[Row.ANGLE, 0] != angle:
         a[Row.ANGLE, 0], a[Row.ANGLE, 1], a[Row.ANGLE, 2] = angle, np.sin(angle), np.cos(angle)
-    return a[Row.ANGLE, 1], a[Row.ANGLE, 2]
+    return side.radius * a[Row.ANGLE, 1], side.radius * a[Row.ANGLE, 2]
 
 
 @inner_kernel
@@ -69,8 +72,7 @@ def mode_series(block, base, run, order, enough, reach):
         return _flat_series(block, run.state, order, a)
     a[Row.PHI, 0], a[Row.OMEGA, 0] = sign * motion.theta, sign * motion.w
     side = side_of(block, mode.sense)
-    sine, cosine = sine_cosine(side.alpha - a[Row.PHI, 0], a)
-    a[Row.SIN, 0], a[Row.COS, 0] = side.radius * sine, side.radius * cosine
+    a[Row.SIN, 0], a[Row.COS, 0] = arm_and_height(side, a[Row.PHI, 0], a)
     run.state.place = sign * motion.x - a[Row.SIN, 0]
     if rocks(mode):
         forces = block.unilateral or not block.no_slip
@@ -474,8 +476,7 @@ def motion_at(block, state, a, tau, motion):
     if (mode.pivot == Pivot.STICK and on_wall(mode)) or (mode.tip != 0 and mode.far != 0):
         phi, w = a[Row.PHI, 0], 0.0
     side = side_of(block, mode.sense)
-    sine, cosine = sine_cosine(side.alpha - phi, a)
-    s, c = side.radius * sine, side.radius * cosine
+    s, c = arm_and_height(side, phi, a)
     if mode.pivot == Pivot.STICK:
         xi, v = pivot + s, -c * w
     elif on_wall(mode):

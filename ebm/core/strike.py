@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from rockcheck.ebm.core import contacts, extremes, impacts, modes
-from rockcheck.ebm.core.block import side_of, wall_corner
+from rockcheck.ebm.core.block import arm_of, height_of, side_of, wall_corner
 from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
 from rockcheck.ebm.core.names import CONTACTS, Contact, Event, Family, Guard, Keep, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
@@ -87,14 +87,11 @@ def touch(block, mode, motion, which):
         motion.y = contacts.height(block, motion)
     elif which == Guard.TIP_GAP and mode.family == Family.TILT and mode.pivot == Pivot.STICK:
         sign, side = float(mode.sense), side_of(block, mode.sense)
-        pivot = sign * motion.x - side.radius * math.sin(side.alpha - phi)
-        arms = side.radius * math.cos(side.alpha - phi) + side.top_radius * math.cos(
-            side.top_alpha + phi
-        )
+        pivot = sign * motion.x - arm_of(side, phi)
+        arms = height_of(side, phi) + side.top_radius * math.cos(side.top_alpha + phi)
         turned = phi + contacts.wall_gap(block, motion, mode.sense) / arms
         if turned > 0.0:
-            s = side.radius * math.sin(side.alpha - turned)
-            c = side.radius * math.cos(side.alpha - turned)
+            s, c = arm_of(side, turned), height_of(side, turned)
             motion.x, motion.y, motion.theta = sign * (pivot + s), c, sign * turned
             motion.vx, motion.vy = -c * motion.w, s * sign * motion.w
         else:  # past upright it would stand on its other corner, without an impact
@@ -188,7 +185,7 @@ def _corner_impact(block, state, sw, e, resting):
     mode, motion = state.mode, state.motion
     phi, sign = abs(motion.theta), float(mode.sense)
     side, other = side_of(block, mode.sense), side_of(block, -mode.sense)
-    s, c = side.radius * math.sin(side.alpha - phi), side.radius * math.cos(side.alpha - phi)
+    s, c = arm_of(side, phi), height_of(side, phi)
     radius, alpha = wall_corner(side if sw > 0.0 else other, sw > 0.0)
     cp = radius * math.cos(alpha + phi)
     w1, xdot1 = sign * motion.w, sign * motion.vx
