@@ -102,6 +102,11 @@ def contact_rows(b, sense, phi, walls, rows):
 
 
 @inner_kernel
+def _touches_wall(impact):
+    return impact.touching[Contact.TIP_TOP] or impact.touching[Contact.FAR_BOTTOM]
+
+
+@inner_kernel
 def _write_row(rows, j, turn):
     rows[j, 0], rows[j, 1], rows[j, 2] = _ALONG[j], j <= Contact.OTHER, turn
 
@@ -186,8 +191,7 @@ def contact_impact(block, state):
     relative gain. It counts an impact in which no set of contacts fits, or whose stages do not end.
     """
     impact, v = state.impact, state.impact.v
-    walls = impact.touching[Contact.TIP_TOP] or impact.touching[Contact.FAR_BOTTOM]
-    contact_rows(block, impact.sense, impact.phi, walls, impact.rows)
+    contact_rows(block, impact.sense, impact.phi, _touches_wall(impact), impact.rows)
     impact.part[:], impact.after[:], impact.given[:] = 0.0, 0.0, 0.0
     rounding = ROUNDING * size(v)
     fits = True

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stepping import run_at, setting_of
 
-from rockcheck.ebm.core import contact_impacts, contacts
+from rockcheck.ebm.core import block, contact_impacts, contacts
 from rockcheck.scenes import Block, Wall
 
 #: Its mass's centre is 0.6 m from the right side, 0.8 m from the left one, and 0.8 m from the floor
@@ -22,12 +22,20 @@ def test_a_loaded_block_has_its_centre_over_the_corner_to_which_it_tips(tilt, ar
     assert contacts.height(setting_of(LOADED), motion) == pytest.approx(over, abs=1e-15)
 
 
+@pytest.mark.parametrize("sense", [1, -1])
+def test_where_it_stands_it_is_as_far_from_its_corners_as_just_before(sense):
+    """To the bit: a step that begins upright continues the one that ends there."""
+    side = block.side_of(setting_of(LOADED), sense)
+    assert block.arm_of(side, 0.0) == side.radius * math.sin(side.alpha)
+    assert block.height_of(side, 0.0) == side.radius * math.cos(side.alpha)
+
+
 @pytest.mark.parametrize(("side", "place"), [("left", -0.1), ("right", 0.1)])
 @pytest.mark.parametrize("off", [5e-11, -5e-11])
 def test_a_block_that_lands_flush_with_a_wall_touches_it_exactly(off, side, place):
-    block = setting_of(0.4, walls=[Wall(side=side, gap=0.1)])
+    setting = setting_of(0.4, walls=[Wall(side=side, gap=0.1)])
     motion = run_at((place + off, math.cos(0.4), 0.0, 0.0, 0.0, 0.0)).state.motion
-    contacts.land_upright(block, motion, 1, True)
+    contacts.land_upright(setting, motion, 1, True)
     assert motion.x == place
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stepping import block_of, run_at, setting_of
 
-from rockcheck.ebm.core import contact_impacts as ci, impacts
+from rockcheck.ebm.core import contact_impacts as ci, contact_sets, impacts
 from rockcheck.ebm.core.impacts import Branch, Landing
 from rockcheck.ebm.core.names import Contact
 from rockcheck.scenes import Block
@@ -237,9 +237,9 @@ def test_contact_impact_leaves_no_approach(e, lopsided):
         touching = [Contact.FOOT, *[Contact.OTHER] * (phi == 0.0)]
         touching += WALLS[rng.choice(list(WALLS))][phi == 0.0]
         v = rng.normal(0.0, 0.3, 3) * 10.0 ** rng.choice([0.0, 0.0, rng.uniform(-9.0, 0.0)])
-        before = ci.kinetic_energy(b.spin, v)
+        before = contact_sets.kinetic_energy(b.spin, v)
         after, state = impact_of(b, phi, touching, e, v, sense)
-        rows, energy = rows_of(b, sense, phi), ci.kinetic_energy(b.spin, after)
+        rows, energy = rows_of(b, sense, phi), contact_sets.kinetic_energy(b.spin, after)
         assert not state.rules.any()
         assert np.all(rows[touching] @ after >= -1e-8)
         assert state.impulse >= 0.0
@@ -256,6 +256,66 @@ def test_contact_impact_leaves_no_approach(e, lopsided):
         else:
             assert along == approx(-math.copysign(mu * up, slip), abs=1e-12)
     assert min(held[True], held[False]) > 8
+
+
+def motions_that_obey(rows, mass, v, target, mu_s, mu_k):
+    """The velocities after all impulses of the floor on two corners that obey the law.
+
+    `rows` are the corners' and the tangent's, `mass` one over mass and inertia, `target` the
+    velocities with which the corners leave at the least.
+    """
+    found, corners, along = [], rows[:2], rows[2]
+    for pushing in ([], [0], [1], [0, 1]):
+        for slip in (0.0, 1.0, -1.0):
+            pulls = [along] if slip == 0.0 and pushing else []
+            effects = [mass * (corners[j] - mu_k * slip * along) for j in pushing]
+            effects += [mass * pull for pull in pulls]
+            asked = [*corners[pushing], *pulls]
+            rates = np.array([[row @ effect for effect in effects] for row in asked])
+            wanted = [target[j] - corners[j] @ v for j in pushing] + [-(pull @ v) for pull in pulls]
+            if len(asked) > 2 and abs(np.linalg.det(rates)) < 1e-9:
+                continue
+            impulses = np.linalg.solve(rates, wanted) if asked else np.empty(0)
+            after = v + sum((p * effect for p, effect in zip(impulses, effects, strict=True)), 0.0)
+            push, size = impulses[: len(pushing)], 1e-10 * (1.0 + abs(after).sum())
+            rubs = abs(impulses[len(pushing) :]) <= mu_s * push.sum() + size
+            obeys = np.all(push >= -size) and np.all(corners @ after >= target - size)
+            if obeys and np.all(rubs) and slip * (along @ after) >= -size:
+                found.append(after)
+    return found
+
+
+@lopsided_or_not
+@pytest.mark.parametrize("bounce", [0.0, 0.4])
+def test_no_other_motion_obeys_the_law_where_a_landing_sticks(bounce, lopsided):
+    """Where the pivot sticks and the other corner lifts off nothing else is tried: it is the only
+    motion that obeys the law, also with a static friction above the kinetic one."""
+    rng, sticks = np.random.default_rng(31), Counter()
+    for _ in range(1500):
+        alpha = rng.uniform(0.03, 1.3)
+        block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
+        mu_k = rng.uniform(0.0, 3.0)
+        setting = setting_of(block, mu_k, bounce)
+        setting.mu_s = mu_k * rng.choice([1.0, 1.0, 1.4])
+        rows, w1 = rows_of(setting, 1.0, 0.0), -rng.uniform(0.01, 1.0)
+        at_corners = rows[[Contact.FOOT, Contact.OTHER, Contact.TANGENT]]
+        slip = rng.choice([0.0, rng.normal(0.0, 0.2)])
+        v = np.array([slip - setting.height * w1, -at_corners[0, 2] * w1, w1])
+        impact = run_at().state.impact
+        impact.rows[:], impact.v[:] = rows, v
+        impact.taking[[Contact.FOOT, Contact.OTHER]] = True
+        target = -bounce * np.minimum(at_corners[:2] @ v, 0.0)
+        impact.target[:2] = target
+        turns_on = contact_sets._turns_on(setting, impact)
+        sticks[bool(turns_on)] += 1
+        if turns_on:
+            mass = np.array([1.0, 1.0, setting.spin])
+            all_of_them = motions_that_obey(at_corners, mass, v, target, float(setting.mu_s), mu_k)
+            assert all_of_them
+            np.testing.assert_allclose(
+                all_of_them, [impact.after] * len(all_of_them), rtol=0.0, atol=1e-8
+            )
+    assert min(sticks[True], sticks[False]) > 200
 
 
 def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
