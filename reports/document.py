@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -42,6 +43,12 @@ def _draw(data: Path, path: Path, stamp: str = "") -> None:
     from rockcheck.reports import drawers  # with Matplotlib, which takes a second to import
 
     style.save_as(drawers.figure_of(plot), path, stamp=stamp, named=not stamp)
+
+
+def _work(drawn: tuple[Plot, Any]) -> int:
+    """How many axes a plot has, which is what takes time to draw."""
+    data = drawn[0].data
+    return len(data["panels"]) if isinstance(data, Mapping) and "panels" in data else 1
 
 
 def write_figure(folder: Path, name: str, path: Path) -> Path:
@@ -104,7 +111,8 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
         writing.write_whole(writing.made(folder, *parts) / last, content)
     figures = writing.made(folder, FIGURES)
     calls = []
-    for name, drawn in data.items():
+    longest_first = sorted(zip(plots, data.items(), strict=True), key=_work, reverse=True)
+    for _, (name, drawn) in longest_first:
         path, stamp = (folder / name).with_suffix(".svg"), style.stamp_of(drawn)
         if style.stamp_in(path) != stamp:
             calls.append(Call(_draw, (folder / name, path, stamp)))
