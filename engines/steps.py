@@ -233,7 +233,7 @@ class FixedStep:
         times = self.largest * np.arange(count + 1)
         world.ready(self.largest)
         base = base_motion.velocity_of(scene.excitation), base_motion.velocity_of(scene.vertical)
-        speeds = [[base_motion.velocity_at(t, *one) for one in base] for t in times.tolist()]
+        speeds = np.transpose([base_motion.velocities_at(times, one) for one in base])
         # The mean of -u and of -(g + vg) over each step.
         felt = -np.diff(speeds, axis=0) / np.diff(times)[:, None] - np.array([0.0, scene.gravity])
         return partial(march_fixed, world, scene, times, felt)

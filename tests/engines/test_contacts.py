@@ -120,6 +120,17 @@ def test_the_velocity_of_a_pulse_is_its_integral():
     assert velocities(Sine(amplitude=2.0, period=0.7), times) == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    "excitation",
+    [Rest(), Sine(amplitude=2.0, period=0.7), Record.from_samples([1.0, 3.0, -1.0], 0.3)],
+    ids=["rest", "sine", "record"],
+)
+def test_velocities_at_many_times_are_those_one_by_one(excitation):
+    times = np.arange(0.0, 1.5, 0.0013)
+    found = base_motion.velocities_at(times, base_motion.velocity_of(excitation))
+    np.testing.assert_array_equal(found, velocities(excitation, times.tolist()))
+
+
 def test_a_pulse_that_ends_between_two_samples_ends_there():
     """Half a sine of 0.7 s leaves a velocity of 2 times its duration over pi."""
     (last,) = velocities(HalfSine(amplitude=2.0, period=1.4), [5.0])

@@ -43,10 +43,7 @@ def base_of(scene: Scene) -> Floats:
     """The sampled base motion, a row a time, the columns of `BASE`."""
     t = BASE_STEP * np.arange(round(scene.duration / BASE_STEP) + 1)
     motions = scene.excitation, scene.vertical
-    velocities = []
-    for motion in motions:
-        pieces = base_motion.velocity_of(motion)
-        velocities.append([base_motion.velocity_at(time, *pieces) for time in t.tolist()])
+    velocities = [base_motion.velocities_at(t, base_motion.velocity_of(one)) for one in motions]
     accelerations = [motion.acceleration(t) for motion in motions]
     return np.column_stack([t, *velocities, *accelerations])
 
