@@ -289,18 +289,20 @@ def motions_that_obey(rows, mass, v, target, mu_s, mu_k):
 @pytest.mark.parametrize("bounce", [0.0, 0.4])
 def test_no_other_motion_obeys_the_law_where_a_landing_sticks(bounce, lopsided):
     """Where the pivot sticks and the other corner lifts off nothing else is tried: it is the only
-    motion that obeys the law, also with a static friction above the kinetic one."""
+    motion that obeys the law, also with a static friction above the kinetic one. With much friction
+    there are others: then all are tried."""
     rng, sticks = np.random.default_rng(31), Counter()
     for _ in range(1500):
         alpha = rng.uniform(0.03, 1.3)
         block = loaded(rng, block_of(alpha)) if lopsided else block_of(alpha)
-        mu_k = rng.uniform(0.0, 3.0)
+        mu_k = rng.uniform(0.0, 3.0) if rng.integers(0, 2) else rng.uniform(3.0, 30.0)
         setting = setting_of(block, mu_k, bounce)
         setting.mu_s = mu_k * rng.choice([1.0, 1.0, 1.4])
         rows, w1 = rows_of(setting, 1.0, 0.0), -rng.uniform(0.01, 1.0)
         at_corners = rows[[Contact.FOOT, Contact.OTHER, Contact.TANGENT]]
         slip = rng.choice([0.0, rng.normal(0.0, 0.2)])
         v = np.array([slip - setting.height * w1, -at_corners[0, 2] * w1, w1])
+        v += rng.integers(0, 2) * rng.normal(0.0, 0.3, 3)  # not only as it rocks
         impact = run_at().state.impact
         impact.rows[:], impact.v[:] = rows, v
         impact.taking[[Contact.FOOT, Contact.OTHER]] = True
@@ -315,7 +317,7 @@ def test_no_other_motion_obeys_the_law_where_a_landing_sticks(bounce, lopsided):
             np.testing.assert_allclose(
                 all_of_them, [impact.after] * len(all_of_them), rtol=0.0, atol=1e-8
             )
-    assert min(sticks[True], sticks[False]) > 200
+    assert min(sticks[True], sticks[False]) > 150
 
 
 def test_the_energy_cap_takes_the_largest_restitution_that_adds_none():
