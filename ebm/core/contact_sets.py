@@ -129,8 +129,7 @@ def _turns_on(block, impact):
         return False
     rounding = ROUNDING * (size(impact.v) + size(trial) + size(lam))
     parts = dot(rows[Contact.FOOT], trial) - impact.target[Contact.FOOT]
-    push, pull = lam[0], abs(lam[1])
-    if not (push > rounding and parts > rounding and pull < block.mu_k * push - rounding):
+    if not (parts > rounding and abs(lam[1]) < block.mu_k * lam[0] - rounding):
         return False
     _keep(impact, _OTHER_HELD)
     return True
