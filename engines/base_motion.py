@@ -58,11 +58,8 @@ def velocities_at(times: NDArray[np.floating[Any]], base: BaseVelocity) -> Float
     if not base.pieces:
         return np.full(len(times), base.last)
     index = np.minimum(times / base.interval, len(base.pieces)).astype(np.int64)
-    since, power, velocity = (
-        times - base.interval * index,
-        np.ones(len(times)),
-        np.zeros(len(times)),
-    )
+    since = times - base.interval * index
+    power, velocity = np.ones(len(times)), np.zeros(len(times))
     for coefficients in np.array([*base.pieces, np.zeros(len(base.pieces[0]))]).T:
         velocity += coefficients[index] * power
         power = power * since

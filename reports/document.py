@@ -8,7 +8,6 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -45,9 +44,9 @@ def _draw(data: Path, path: Path, stamp: str = "") -> None:
     style.save_as(drawers.figure_of(plot), path, stamp=stamp, named=not stamp)
 
 
-def _work(drawn: tuple[Plot, Any]) -> int:
-    """How many axes a plot has, which is what takes time to draw."""
-    data = drawn[0].data
+def _axes_of(plot: Plot) -> int:
+    """How many axes a plot has: they take the time to draw it."""
+    data = plot.data
     return len(data["panels"]) if isinstance(data, Mapping) and "panels" in data else 1
 
 
@@ -111,9 +110,9 @@ def publish(found: Finding, folder: Path, *, of_run: bool = False) -> Path:
         writing.write_whole(writing.made(folder, *parts) / last, content)
     figures = writing.made(folder, FIGURES)
     calls = []
-    longest_first = sorted(zip(plots, data.items(), strict=True), key=_work, reverse=True)
-    for _, (name, drawn) in longest_first:
-        path, stamp = (folder / name).with_suffix(".svg"), style.stamp_of(drawn)
+    axes = {f"{FIGURES}/{plot.name}.json": _axes_of(plot) for plot in plots}
+    for name in sorted(data, key=axes.__getitem__, reverse=True):  # what takes longest comes first
+        path, stamp = (folder / name).with_suffix(".svg"), style.stamp_of(data[name])
         if style.stamp_in(path) != stamp:
             calls.append(Call(_draw, (folder / name, path, stamp)))
     list(side_by_side(calls))
