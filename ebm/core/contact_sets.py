@@ -1,7 +1,7 @@
 """One stage of an impact: which of the contacts that take part push, and which way the floor rubs.
 
-Every set of these contacts is tried with every friction. What the contacts are, what a stage is and
-what is asked of it, see `contact_impacts`.
+Every set of these contacts is tried with every friction, unless one is known to be the only answer.
+What the contacts are, what a stage is and what is asked of it, see `contact_impacts`.
 """
 
 import numpy as np
@@ -35,7 +35,8 @@ _TRIALS = np.array(
     _TRIAL,
 )
 _BITS, _FREE = _TRIALS["bits"], _TRIALS["friction"] == Friction.FREE
-_ON_FLOOR = _BITS & (1 << Contact.FOOT | 1 << Contact.OTHER) != 0
+_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
+_ON_FLOOR = _BITS & _FLOOR != 0
 _LARGEST_FIRST = np.flatnonzero(_FREE)[np.argsort(-_TRIALS["count"][_FREE], kind="stable")]
 # What a stage tries: with friction where the floor is among the contacts.
 _STRIKING = np.flatnonzero(_ON_FLOOR != _FREE)
@@ -52,7 +53,6 @@ def _by_contacts(trials: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[
 
 _STRIKES, _STRIKES_FROM = _by_contacts(_STRIKING)
 _CLOSES, _CLOSES_FROM = _by_contacts(_LARGEST_FIRST)
-_FLOOR = 1 << Contact.FOOT | 1 << Contact.OTHER
 _OTHER_HELD = int(
     np.flatnonzero((_BITS == 1 << Contact.OTHER) & (_TRIALS["friction"] == Friction.HELD))[0]
 )
@@ -86,9 +86,10 @@ def kinetic_energy(spin, v):
 def strike_once(block, impact):
     """One stage over the contacts that take part: writes the velocities and impulses after it.
 
-    Every set of these contacts is tried with every friction. Of those that obey the law the one
-    that leaves the least energy is taken. Where none does, by rounding or by friction that jams
-    (Painleve), the one that contradicts it least is taken, and the result is False.
+    Every set of these contacts is tried with every friction, unless `_turns_on` knows the only
+    answer. Of those that obey the law the one that leaves the least energy is taken. Where none
+    does, by rounding or by friction that jams (Painleve), the one that contradicts it least is
+    taken, and the result is False.
     """
     bits = _bits_of(impact.taking)
     if bits == _FLOOR and _turns_on(block, impact):

@@ -11,7 +11,8 @@ import numpy as np
 
 from rockcheck.ebm.core import contacts, extremes, impacts, modes
 from rockcheck.ebm.core.block import arm_of, height_of, side_of, wall_corner
-from rockcheck.ebm.core.contact_impacts import ROUNDING, contact_impact
+from rockcheck.ebm.core.contact_impacts import contact_impact
+from rockcheck.ebm.core.contact_sets import ROUNDING
 from rockcheck.ebm.core.names import CONTACTS, Contact, Event, Family, Guard, Keep, Pivot, Rule
 from rockcheck.ebm.core.settle import SETTLE
 from rockcheck.ebm.core.state import on_wall, rock_on

@@ -172,10 +172,11 @@ def enough(t: Floats, values: Floats, ends: NDArray[np.int64], coarse: float) ->
         part = np.searchsorted(nodes, waiting) - 1
         first, last = nodes[part], nodes[part + 1]
         share = (t[waiting] - t[first]) / (t[last] - t[first])
-        farthest, begins = np.zeros(len(part)), np.flatnonzero(np.diff(part, prepend=-1))
+        farthest = np.zeros(len(part))
         for column in columns:
             line = (1.0 - share) * column[first] + share * column[last]
             np.maximum(farthest, np.abs(column[waiting] - line), out=farthest)
+        begins = np.flatnonzero(np.diff(part, prepend=-1))
         most = np.maximum.reduceat(farthest, begins)
         most = np.repeat(most, np.diff(begins, append=len(part)))
         split = np.flatnonzero((farthest == most) & (most > coarse))
