@@ -258,6 +258,19 @@ def test_contact_impact_leaves_no_approach(e, lopsided):
     assert min(held[True], held[False]) > 8
 
 
+@pytest.mark.parametrize("closing", [[Contact.FOOT], [Contact.FOOT, Contact.OTHER]])
+def test_a_contact_that_closes_slowly_is_closed_without_friction(closing):
+    """Slowly is slower than a resting contact moves: what it closes by is rounding, and a block
+    that slides at 1 m/s must not lose any of that by it."""
+    setting, impact = setting_of(0.3, 0.5, 0.0), run_at().state.impact
+    rows = rows_of(setting, 1.0, 0.0)
+    impact.rows[:], impact.v[:], impact.resting = rows, (1.0, -5e-10, 0.0), 1e-9
+    impact.touching[closing] = True
+    contact_sets.close_slow(setting, impact)
+    np.testing.assert_allclose(rows[closing] @ impact.v, 0.0, rtol=0.0, atol=1e-15)
+    assert impact.v[0] == 1.0
+
+
 def motions_that_obey(rows, mass, v, target, mu_s, mu_k):
     """The velocities after all impulses of the floor on two corners that obey the law.
 
