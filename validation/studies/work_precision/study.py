@@ -99,8 +99,8 @@ class WorkPrecision(Study):
     def _runs(self) -> Iterator[Task]:
         """Interleaved, so that other load of the machine affects all models equally.
 
-        An engine's smallest steps go to the workers; in a quick run one member plays those of
-        `QUICK_STEP`, and adaptive ones that cost as much.
+        An engine's smallest steps go to the workers, and in a quick run all do; in that one member
+        plays those of `QUICK_STEP`, and adaptive ones that cost as much.
         """
         members = benchmark_scenes.QUICK_MEMBERS if self.quick else benchmark_scenes.MEMBERS
         families = benchmark_scenes.QUICK if self.quick else benchmark_scenes.FAMILIES
@@ -118,7 +118,7 @@ class WorkPrecision(Study):
                 member,
                 line.label,
                 value,
-                where="worker" if step < SIDE_BY_SIDE else "timed",
+                where="worker" if self.quick or step < SIDE_BY_SIDE else "timed",
                 clocked=True,
                 expected=usual_time(line, value, 3.0),
             )
