@@ -6,8 +6,8 @@ LOCKED := $(if $(UNLOCKED),,$(CI))
 LOCK := .ci/requirements.txt
 VENV := .venv
 BIN := $(VENV)/bin
-# What installs: the machine's uv, or one that pip fetches into the virtual environment.
-UV := $(shell command -v uv 2>/dev/null)
+# What installs: the machine's uv, or one that pip fetches into the virtual environment. That of an active .venv goes as it is made anew.
+UV := $(filter-out $(abspath $(BIN))/%,$(shell command -v uv 2>/dev/null))
 INSTALL := $(or $(UV),$(BIN)/uv) pip install --quiet --python $(BIN)/python $(if $(PYTHONDONTWRITEBYTECODE),--compile-bytecode)
 
 .PHONY: help install validate test test-change test-all nightly coverage mutation lint format docs gallery wheel lock clean

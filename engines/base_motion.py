@@ -25,20 +25,31 @@ class BaseVelocity(NamedTuple):
 @lru_cache(maxsize=8)
 def velocity_of(excitation: Excitation) -> BaseVelocity:
     """The velocity of the base, zero at t = 0; for `velocity_at`, and not to be changed."""
-    from scipy.interpolate import CubicSpline, PPoly
-
     if isinstance(excitation, Rest) or excitation.quiet_after == 0.0:  # a record of one sample
         return BaseVelocity([], 1.0, 0.0)
     interval = excitation.sample_step
-    times = interval * np.arange(math.ceil(excitation.quiet_after / interval - 1e-9) + 1)
+    times = interval * np.arange(math.ceil(excitation.quiet_after / interval - 1e-9) + 1.0)
     last = times[-1]
     if last > excitation.quiet_after and math.isclose(last, excitation.quiet_after):
         times[-1] = excitation.quiet_after  # rounding, where the acceleration may jump
     samples = excitation.acceleration(times)
-    lines = np.array([np.diff(samples) / interval, samples[:-1]])
-    pieces = lines if isinstance(excitation, Record) else CubicSpline(times, samples).c
-    velocity = PPoly(pieces, times).antiderivative()
+    if isinstance(excitation, Record):
+        return _velocity_of_samples(times, samples, interval)
+    from scipy.interpolate import CubicSpline  # it takes longer to import than a run of a record
+
+    velocity = CubicSpline(times, samples).antiderivative()
     return BaseVelocity(velocity.c[::-1].T.tolist(), interval, float(velocity(times[-1])))
+
+
+def _velocity_of_samples(
+    times: Floats, samples: NDArray[np.floating[Any]], interval: float
+) -> BaseVelocity:
+    """The velocity of a base whose acceleration is linear between its samples."""
+    half_jerks, lengths = 0.5 * (np.diff(samples) / interval), np.diff(times)
+    gains = np.column_stack([samples[:-1] * lengths, half_jerks * (lengths * lengths)])
+    velocities = np.concatenate([[0.0], np.cumsum(gains)[1::2]])
+    pieces = np.column_stack([velocities[:-1], samples[:-1], half_jerks])
+    return BaseVelocity(pieces.tolist(), interval, float(velocities[-1]))
 
 
 def velocity_at(t: Any, pieces: Any, interval: Any, last: Any) -> Any:

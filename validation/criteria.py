@@ -27,6 +27,8 @@ _PER_PERIOD = 400
 _SLOWEST, _FASTEST, _COUNTS = 0.05, 20.0, (100, 25, 25)
 #: Angles, in parts of the last one, at which the rocking estimate compares capacity and demand.
 _ANGLES = 20
+#: Nodes of Gauss's rule.
+_NODES = 64
 #: The restitution of a block so wide that Housner's is none: its damping is nearly critical.
 _LEAST_RESTITUTION = 1e-6
 #: Damping of the spectrum that the sliding estimate uses.
@@ -60,16 +62,19 @@ def critical_double_impulse(block: Block, gravity: float) -> float:
 def time_from_balance(pivot: Pivot, gravity: float, start: float, end: float) -> float:
     """Time (s) in which a block that rocks without a slip goes from rest to another angle.
 
-    `start` and `end` are angles from its balance point (rad), to the same side. The pivot is that
-    of a pendulum upside down, phi'' = p^2 sin(phi): p t = K(m) - F(chi | m) with m =
-    cos^2(start/2), sin(chi) = cos(end/2)/cos(start/2), elliptic integrals of the first kind.
+    `start` and `end` are angles from its balance point towards that side (rad); inf where it rests
+    at the balance or beyond, from where it does not come. The pivot is that of a pendulum upside
+    down, phi'' = p^2 sin(phi), so that phi' = 2 p sin(start/2) sinh(v) with sin(phi/2) =
+    sin(start/2) cosh(v), and p t is the integral of 1/cos(phi/2) over v. It is smooth: Gauss's rule
+    gives all digits, also near the balance.
     """
-    from scipy.special import ellipkinc, ellipkm1
-
-    half = 0.5 * start
-    chi = math.asin(min(math.cos(0.5 * end) / math.cos(half), 1.0))
-    # The complete integral by 1 - m, which a start near the balance leaves its digits.
-    turn = ellipkm1(math.sin(half) ** 2) - ellipkinc(chi, math.cos(half) ** 2)
+    if start <= 0.0:
+        return math.inf
+    half = math.sin(0.5 * start)
+    last = math.acosh(max(math.sin(0.5 * end) / half, 1.0))
+    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
+    sines = half * np.cosh(0.5 * last * (1.0 + nodes))  # sin(phi/2)
+    turn = 0.5 * last * np.sum(weights / np.sqrt(1.0 - sines**2))
     return float(turn / pivot.frequency_parameter(gravity))
 
 
@@ -108,8 +113,6 @@ def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
     `ratios` are a/(g alpha) at `times` in 1/p. From the uplift s0 on, where the ratio first
     exceeds 1: the integral of f(s) exp(-(s - s0)) reaches 1 (linearised equation of motion).
     """
-    from scipy.integrate import trapezoid
-
     s, f = np.asarray(times, dtype=float), np.asarray(ratios, dtype=float)
     above = np.flatnonzero(f > 1.0)
     if not above.size:
@@ -119,7 +122,7 @@ def overturns_without_impact(times: ArrayLike, ratios: ArrayLike) -> bool:
         part = (1.0 - f[first - 1]) / (f[first] - f[first - 1])
         start = s[first - 1] + part * (s[first] - s[first - 1])
         s, f = np.concatenate([[start], s[first:]]), np.concatenate([[1.0], f[first:]])
-    return bool(trapezoid(f * np.exp(s[0] - s), s) >= 1.0)
+    return bool(np.trapezoid(f * np.exp(s[0] - s), s) >= 1.0)
 
 
 @dataclass(frozen=True)

@@ -194,6 +194,21 @@ def test_time_from_balance_is_that_of_the_pendulum_upside_down(block, start, end
     assert criteria.time_from_balance(pivot, G, first, last) == pytest.approx(found.t[-1], rel=1e-9)
 
 
+@pytest.mark.parametrize("tilt", [1.0, 1.2])
+def test_from_its_balance_or_beyond_a_block_does_not_fall_back(tilt):
+    pivot = BLOCKS[0].weaker_pivot
+    assert criteria.quarter_period(pivot, G, tilt * pivot.alpha) == math.inf
+
+
+@pytest.mark.parametrize("end", [1e-3, 1e-6])
+def test_near_the_balance_the_time_is_that_of_the_linear_pendulum(end):
+    """p t = acosh(end/start), whose digits a small angle must not cost."""
+    pivot, start = BLOCKS[0].weaker_pivot, 0.3 * end
+    linear = math.acosh(end / start) / pivot.frequency_parameter(G)
+    found = criteria.time_from_balance(pivot, G, start, end)
+    assert found == pytest.approx(linear, rel=0.2 * end**2 + 1e-14)
+
+
 def test_a_cube_leaves_its_balance_in_the_time_of_the_card():
     cube = Block(half_width=0.413, half_height=0.413).weaker_pivot
     start = 1e-3 * cube.alpha
