@@ -231,6 +231,15 @@ def test_fine_states_are_those_of_the_cubic_in_equal_parts():
     assert between.tolist() == [[1.0, 2.0]] * 3 + [[3.0, 4.0]]
 
 
+@pytest.mark.parametrize("step", [0, 1, 2])
+def test_each_step_has_a_cubic_of_its_own(step):
+    ends, states = 2.0 * steps.FINE * np.arange(4), np.random.default_rng(2).normal(size=(4, 6))
+    _, whole, _ = steps.in_fine_steps(ends, states, np.zeros((3, 2)))
+    its = slice(step, step + 2)
+    _, alone, _ = steps.in_fine_steps(ends[its], states[its], np.zeros((1, 2)))
+    assert whole[2 * step : 2 * step + 3] == pytest.approx(alone, rel=1e-9)
+
+
 # Settings
 
 
