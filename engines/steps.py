@@ -24,7 +24,7 @@ import numpy as np
 
 from rockcheck.engines import base_motion
 from rockcheck.scenes import Block, Floats, ModelFailure, Scene, kinematics, progress
-from rockcheck.scenes.interpolation import hermite, slope
+from rockcheck.scenes.interpolation import Track
 
 Vector = tuple[float, float, float]  # along x, y and theta
 State = tuple[float, float, float, float, float, float]
@@ -172,27 +172,14 @@ def at_output_times(scene: Scene, times: Floats, states: Floats, smooth: bool) -
     """
     inside = scene.run_times
     inside = np.minimum(inside[inside <= times[-1] * (1.0 + 1e-12) + 1e-12], times[-1])
-    if len(times) == 1:
-        return states[: len(inside)]
-    positions, slopes = _between(times, states, inside)
+    found = Track.of(times, states, ()).states_at(inside)
     # A cubic over a long step may show a fall that is none.
     upright = inside < time_of_fall(times, states)
-    positions[upright, 2] = np.clip(positions[upright, 2], -LYING, LYING)
-    if smooth:
-        return np.hstack([positions, slopes])
-    return np.column_stack(
-        [positions, *(np.interp(inside, times, states[:, column]) for column in (3, 4, 5))]
-    )
-
-
-def _between(times: Floats, states: Floats, wanted: Floats) -> tuple[Floats, Floats]:
-    """Positions at the wanted times on the cubics through the states, and their slopes."""
-    step = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
-    length = (times[step + 1] - times[step])[:, np.newaxis]
-    share = (wanted - times[step])[:, np.newaxis] / length
-    ends = states[step, :3], states[step + 1, :3]
-    rates = states[step, 3:] * length, states[step + 1, 3:] * length
-    return hermite(share, *ends, *rates), slope(share, *ends, *rates) / length
+    found[upright, 2] = np.clip(found[upright, 2], -LYING, LYING)
+    if not smooth:
+        for column in (3, 4, 5):
+            found[:, column] = np.interp(inside, times, states[:, column])
+    return found
 
 
 def in_fine_steps(times: Floats, states: Floats, felt: Floats) -> Marched:
@@ -205,7 +192,7 @@ def in_fine_steps(times: Floats, states: Floats, felt: Floats) -> Marched:
     step = np.repeat(np.arange(len(parts)), parts)
     share = (np.arange(1, len(step) + 1) - np.repeat(ends - parts, parts)) / parts[step]
     finer = np.concatenate([times[:1], times[step] + share * np.diff(times)[step]])
-    between = np.hstack(_between(times, states, finer))
+    between = Track.of(times, states, ()).states_at(finer)
     at_ends = np.concatenate([[0], ends])
     finer[at_ends], between[at_ends] = times, states
     return finer, between, felt[step]

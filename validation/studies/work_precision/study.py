@@ -99,7 +99,7 @@ class WorkPrecision(Study):
     def _runs(self) -> Iterator[Task]:
         """Interleaved, so that other load of the machine affects all models equally.
 
-        An engine's smallest steps go to the workers, and in a quick run all do; in that one member
+        An engine's smallest steps go to the workers, in a quick run all steps. There one member
         plays those of `QUICK_STEP`, and adaptive ones that cost as much.
         """
         members = benchmark_scenes.QUICK_MEMBERS if self.quick else benchmark_scenes.MEMBERS
