@@ -16,6 +16,7 @@ from unittest.mock import Mock
 
 import pytest
 from hostile import LIMITED, ROCKCHECK
+from pebble.pool.process import WorkerManager
 
 from rockcheck.commands.cli import main
 from rockcheck.scenes import writing
@@ -152,6 +153,26 @@ def test_interrupted(tmp_path, later):
     assert data["complete"] is False
     assert (tmp_path / "index.html").is_file()
     assert [*tmp_path.rglob("*.part")] == []
+
+
+def test_a_process_that_starts_as_its_pool_ends_says_nothing(tmp_path, monkeypatch, capfd):
+    """What it is to share with the run is still there when it looks for it."""
+    (tmp_path / "sitecustomize.py").write_text("import time\ntime.sleep(1.0)  # a slow start\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    end = WorkerManager.force_stop_workers
+
+    def end_late(manager: WorkerManager) -> None:
+        until = time.monotonic() + 30.0
+        while any(worker.is_alive() for worker in manager.workers.values()):
+            if time.monotonic() > until:
+                break
+            time.sleep(0.02)  # till it has seen that its pool has gone
+        end(manager)
+
+    monkeypatch.setattr(WorkerManager, "force_stop_workers", end_late)
+    with pytest.raises(KeyboardInterrupt), pool.Pool(1):
+        raise KeyboardInterrupt
+    assert capfd.readouterr().err == ""
 
 
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch):

@@ -140,7 +140,18 @@ class _Worker(context.SpawnProcess):
 
 
 class _Workers(context.SpawnContext):
+    # Pebble drops its locks, and with them their names, before it ends its processes. One that is
+    # just starting would look for these names in vain, with a traceback.
     Process = _Worker
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._locks: list[Any] = []
+
+    def RLock(self) -> Any:
+        lock = super().RLock()
+        self._locks.append(lock)
+        return lock
 
 
 @dataclass(eq=False)
