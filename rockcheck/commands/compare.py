@@ -52,11 +52,22 @@ def run(
         ),
     ] = None,
     plot: PlotOption = None,
+    changed_nodes: Annotated[
+        float | None,
+        typer.Option(
+            "--changed-nodes",
+            metavar="SHARE",
+            min=0.0,
+            max=1.0,
+            help="Of two runs of `spectrum`: the share of a spectrum's nodes that may end otherwise"
+            " (default: 0).",
+        ),
+    ] = None,
 ) -> None:
     """Compare two histories, or two finished runs.
 
-    Two folders: what changed between runs of a suite, or of `conformance`, exit 1 where a verdict
-    or a cell changed.
+    Two folders: what changed between runs of a suite, of `conformance` or of `spectrum`, exit 1
+    where a verdict or a cell changed, or too many nodes did.
 
     Histories that rockcheck wrote, or any CSV with columns t_s and theta_rad (or theta_deg,
     time_ms, x_mm, ...). --plot draws both rotations and their difference.
@@ -65,15 +76,9 @@ def run(
         _refuse_for_runs(
             {"--align": align, "--until": until, "--scene": scene, "--plot": plot},
         )
-    if reference.is_dir() or reference.suffix == ".json":
-        from rockcheck.validation.studies.conformance import changes
-
-        if changes.wrote(reference):
-            finish_command(changes.changes(reference, candidate))
-    if reference.is_dir() or candidate.is_dir():
-        finish_command(
-            run_changes.difference(results.Run.load(reference), results.Run.load(candidate))
-        )
+    between_runs = _changes_between_runs(reference, candidate, changed_nodes)
+    if between_runs is not None:
+        finish_command(between_runs)
     if plot is not None:
         check_file(plot, "--plot")
     common_scene = load_scene(scene) if scene else None
@@ -89,6 +94,25 @@ def run(
     finding = _finding(discrepancy, histories, common_scene, shift, _hint_words(hint, shift))
     figures = [("figure", save_as(discrepancy.plot(), plot))] if plot is not None else []
     finish_command(finding, said=figures, value=finding.as_dict())
+
+
+def _changes_between_runs(
+    reference: Path, candidate: Path, changed_nodes: float | None
+) -> Finding | None:
+    """What changed between two finished runs, of whatever kind; None of two histories."""
+    from rockcheck.validation.studies.conformance import changes
+    from rockcheck.validation.studies.spectrum import changes as spectrum_changes
+
+    is_run = reference.is_dir() or reference.suffix == ".json"
+    if is_run and spectrum_changes.wrote(reference):
+        return spectrum_changes.changes(reference, candidate, changed_nodes or 0.0)
+    if changed_nodes is not None:
+        raise InputError(f"{printable(reference)}: no run of `spectrum`", "--changed-nodes")
+    if is_run and changes.wrote(reference):
+        return changes.changes(reference, candidate)
+    if reference.is_dir() or candidate.is_dir():
+        return run_changes.difference(results.Run.load(reference), results.Run.load(candidate))
+    return None
 
 
 def _seconds(align: str | None) -> float | None:
