@@ -411,6 +411,19 @@ def test_factors_end_beyond_32_times_that():
     assert 32.0 <= factors[-1] / factors[0] < 32.0 * math.exp(0.01)
 
 
+@pytest.mark.parametrize("strong", [1.0, 7.3, 300.0])
+def test_the_motion_as_it_is_is_among_the_factors(strong):
+    """Also where it is more than 32 times as strong as what lifts the block."""
+    factors = factors_of(SCENE.replace(excitation=PUSH.scaled(4.0 * strong)))
+    assert list(factors) == sorted(set(factors))
+    assert 1.0 in factors
+    assert factors[-1] >= max(1.0, 32.0 * factors[0])
+
+
+def test_a_motion_that_is_too_weak_to_move_the_block_is_not_looked_at():
+    assert 1.0 not in factors_of(SCENE.replace(excitation=PUSH))
+
+
 def test_a_search_of_what_slides_begins_lower_at_the_same_factors():
     slippery = SCENE.replace(excitation=PUSH, floor=Floor(friction=0.5 * BLOCK.slope))
     rocks, slides = factors_of(slippery), factors_of(slippery, slides=True)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from rockcheck.scenes import PAPER_BLOCK, Floor, Scene, Wall
-from rockcheck.validation.studies.population.search import falls_within
+from rockcheck.validation.studies.population.search import Look, falls_within
 from rockcheck.validation.studies.population.tasks import GapTask
 
 GRID = np.linspace(0.0, 1.0, 101)
 NARROW = 1e-4
 
 
-def searched(*runs, grid=GRID, resolution=NARROW):
-    """The intervals found of runs that fall in the given intervals."""
+def searched(*runs, grid=GRID, resolution=NARROW, own=None):
+    """The intervals found of runs that fall in the given intervals; `own` is a value a run."""
 
     def stands(which, values):
         return np.array(
@@ -24,7 +24,10 @@ def searched(*runs, grid=GRID, resolution=NARROW):
 
     count = len(grid)
     seen = np.array([stands(np.full(count, run), grid) for run in range(len(runs))])
-    return falls_within(stands, seen, grid, resolution)
+    look = Look.at(grid, seen)
+    if own is not None:
+        look = look.with_own(np.array(own), stands)
+    return falls_within(stands, look, resolution)
 
 
 def test_the_ends_of_an_island_are_found_to_the_resolution():
@@ -61,6 +64,24 @@ def test_runs_are_searched_side_by_side():
 
 def test_what_lies_between_two_values_looked_at_is_missed():
     assert searched([(0.101, 0.109)]) == [[]]
+
+
+def test_a_run_that_falls_at_its_own_value_is_never_missed():
+    first, second = searched([(0.101, 0.109)], [(0.101, 0.109)], own=[0.104, 0.304])
+    assert [(fall.low, fall.high) for fall in first] == [pytest.approx((0.101, 0.109), abs=NARROW)]
+    assert second == []
+
+
+@pytest.mark.parametrize("own", [np.nan, -0.1, 0.0, 0.5, 1.0, 1.1])
+def test_an_own_value_beyond_the_look_or_in_it_is_not_played(own):
+    def never(which, values):
+        assert which.size == values.size == 0
+        return np.ones(0, dtype=bool)
+
+    stands = np.array([[True, True, False]])
+    look = Look.at(np.array([0.0, 0.5, 1.0]), stands).with_own(np.array([own]), never)
+    assert look.values.tolist() == [[0.0, 0.0, 0.5, 1.0]]
+    assert look.stands.tolist() == [[True, True, True, False]]
 
 
 def test_the_resolution_may_grow_with_the_value():

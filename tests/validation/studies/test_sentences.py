@@ -234,12 +234,14 @@ def test_what_never_falls_was_looked_at_up_to_the_least_of_all_ends():
 
 
 def test_a_single_motion_falls_at_a_factor_of_its_size():
-    assert intensity(record("a", 0.6)) == ["It overturns first at PGA 0.6 g, 1.5 times its own."]
+    assert intensity(record("a", 0.6)) == [
+        "It overturns first at PGA 0.6 g, 1.5 times its own (looked at every 1 %)."
+    ]
 
 
 def test_a_measure_without_a_unit_has_none():
     assert intensity(record("a", 0.6), unit="") == [
-        "It overturns first at PGA 0.6, 1.5 times its own."
+        "It overturns first at PGA 0.6, 1.5 times its own (looked at every 1 %)."
     ]
 
 
@@ -253,13 +255,13 @@ def test_of_many_motions_the_median_and_the_least_are_named():
     fit = Lognormal(0.7, 0.25, 0.5, 0.9, ())
     assert intensity(record("a", 0.8), record("b", 0.6), fit=fit) == [
         "Median PGA at which it overturns: 0.7 g, dispersion 0.25, of 2 records.",
-        "The least: 0.6 g, b.",
+        "The least: 0.6 g, b (looked at every 1 %).",
     ]
 
 
 def test_without_a_curve_the_least_is_named():
     assert intensity(record("a", 0.8), record("b", None)) == [
-        "The least: 0.8 g, a.",
+        "The least: 0.8 g, a (looked at every 1 %).",
         "1 record did not overturn it at any factor tried.",
     ]
 

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from assessed import SCENE
 
-from rockcheck import Record, Rest
+from rockcheck import Record, Rest, Wall
 from rockcheck.ebm import fates
 from rockcheck.validation.studies.population.factor_task import FactorTask
 from rockcheck.validation.studies.population.rows import table_of
 from rockcheck.validation.studies.population.tasks import (
     DrawTask,
+    GapTask,
     PeaksTask,
     effort,
     history_text,
@@ -69,6 +70,48 @@ def test_the_vertical_motion_is_left_as_it_is(batches):
 def test_the_vertical_motion_may_be_scaled_too(batches):
     factor_search(both=True)
     assert batches[0]["vertical_factor"].tolist() == list(LOOKED_AT)
+
+
+# Gaps
+
+GAPS = (0.0, 0.01, 0.02)
+#: The only gaps (m) at which it falls, between those that are looked at.
+DEADLY = (0.0132, 0.0138)
+
+
+def gap_search(monkeypatch, gaps):
+    """The search of a scene with this gap, and of draws with the others."""
+
+    def batch(task, which, gaps, restitution, *, keeps):
+        falls = (gaps[1] >= DEADLY[0]) & (gaps[1] <= DEADLY[1])
+        outcome = np.where(falls, fates.OVERTURNED_LEFT, fates.AT_REST)
+        return fates.Fates(outcome=outcome, time_s=np.ones(len(which)), peak=0.1 * ~falls)
+
+    monkeypatch.setattr(DrawTask, "batch", batch)
+    first, *others = gaps
+    return GapTask(
+        ("gaps",),
+        SCENE.replace(walls=[Wall(side="left", gap=first)]),
+        "ebm-unilateral",
+        draws=tuple((("walls.left.gap", gap),) for gap in others),
+        side="left",
+        fine=GAPS,
+        coarse=GAPS,
+        tabulated=GAPS,
+        reach=(math.inf,) * len(gaps),
+        free_stands=(True,) * len(gaps),
+    ).play()
+
+
+@pytest.mark.parametrize(
+    ("gaps", "falling"),
+    [([0.0135], [0]), ([0.011], []), ([0.011, 0.0135, 0.005], [1]), ([0.0135, 0.0134], [0, 1])],
+)
+def test_a_run_that_falls_at_its_own_gap_is_never_told_to_stand_there(monkeypatch, gaps, falling):
+    found = gap_search(monkeypatch, gaps)
+    assert [fall.draw for fall in found.intervals] == falling
+    for fall in found.intervals:
+        assert (fall.low, fall.high) == pytest.approx(DEADLY, abs=1e-4)
 
 
 # Peaks at factors

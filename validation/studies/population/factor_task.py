@@ -47,7 +47,8 @@ class FactorTask(DrawTask):
             return borne(once)[which, back]
 
         grid = np.array(self.factors)
-        found = search.falls_within(bears, borne(grid), grid, FACTOR_RESOLUTION * grid[:-1])
+        look = search.Look.at(grid, borne(grid))
+        found = search.falls_within(bears, look, FACTOR_RESOLUTION * grid[:-1])
         intervals = {
             capacity: tuple(fall_intervals(0, falls))
             for capacity, falls in zip(capacities, found, strict=True)

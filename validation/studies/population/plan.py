@@ -495,7 +495,8 @@ def factors_of(scene: Scene, *, slides: bool = False) -> tuple[float, ...]:
 
     The first is where a block at rest begins to rock, with `slides` to rock or slide; or a part of
     the motion as it is where it moves without the base's horizontal acceleration. Those at which it
-    may rock are the same in both cases.
+    may rock are the same in both cases. The motion as it is is among them, unless it is too weak to
+    move the block.
     """
     slopes = [pivot.arm / pivot.height for pivot in map(scene.block.pivot, results.SIDES)]
     motion = sampled(scene.excitation, scene.excitation.quiet_after)
@@ -512,5 +513,6 @@ def factors_of(scene: Scene, *, slides: bool = False) -> tuple[float, ...]:
     if slides:
         slide = first_at(scene.moving_acceleration)
         below = math.ceil(math.log(rocks / slide) / FACTOR_STEP) if slide < rocks else 0
-    count = math.ceil(math.log(FACTOR_RANGE) / FACTOR_STEP)
-    return tuple((rocks * np.exp(FACTOR_STEP * np.arange(-below, count + 1))).tolist())
+    count = math.ceil(math.log(max(FACTOR_RANGE, 1.0 / rocks)) / FACTOR_STEP)
+    factors = rocks * np.exp(FACTOR_STEP * np.arange(-below, count + 1))
+    return tuple(np.union1d(factors, max(1.0, factors[0])).tolist())

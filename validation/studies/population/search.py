@@ -4,7 +4,8 @@ In: a function that plays runs at values of the number. Out: for each run the in
 which it does not stand. Called by the searches over gaps and over intensities.
 
 A look at a grid finds every change between neighbours; bisection then narrows each change. An
-interval narrower than the grid may be missed, so whoever tells a result tells the grid as well.
+interval narrower than the grid may be missed, so whoever tells a result tells the grid as well. A
+run's own value is always among those looked at: no search contradicts the run as it is.
 """
 
 from collections.abc import Callable
@@ -39,26 +40,50 @@ class Fall:
         return self.stands_above is not None
 
 
-def falls_within(
-    stands: Stands, seen: NDArray[np.bool_], grid: Floats, resolution: Floats | float
-) -> list[list[Fall]]:
+@dataclass(frozen=True)
+class Look:
+    """What was seen of some runs (runs x values): the `values`, not decreasing, and which stand."""
+
+    values: Floats
+    stands: NDArray[np.bool_]
+
+    @staticmethod
+    def at(grid: Floats, stands: NDArray[np.bool_]) -> "Look":
+        """All runs at the same values."""
+        return Look(np.broadcast_to(grid, stands.shape), stands)
+
+    def with_own(self, own: Floats, stands: Stands) -> "Look":
+        """Each run at its own value, too, where that lies within and was not looked at."""
+        first, last = self.values[:, 0], self.values[:, -1]
+        known = np.any(self.values == own[:, None], axis=1)
+        new = np.flatnonzero((own > first) & (own < last) & ~known)
+        value, seen = first.copy(), self.stands[:, 0].copy()  # of the others the first, once more
+        value[new], seen[new] = own[new], stands(new, own[new])
+        values, seen = np.column_stack([value, self.values]), np.column_stack([seen, self.stands])
+        order = np.argsort(values, axis=1, kind="stable")
+        return Look(
+            np.take_along_axis(values, order, axis=1), np.take_along_axis(seen, order, axis=1)
+        )
+
+
+def falls_within(stands: Stands, look: Look, resolution: Floats | float) -> list[list[Fall]]:
     """The intervals in which each run does not stand, lowest first.
 
-    `seen` (runs x values) says which runs stand at the values of the `grid` (increasing). Each
-    change between neighbours is halved until it is narrower than the `resolution` (of one change,
-    or of those that begin at each value of the grid but the last).
+    Each change between neighbours of the `look` is halved until it is narrower than the
+    `resolution` (of one change, or of those that begin at each value but the last).
     """
+    seen = look.stands
     run, left = np.nonzero(seen[:, 1:] != seen[:, :-1])
-    low, high = grid[left].copy(), grid[left + 1].copy()
+    low, high = look.values[run, left], look.values[run, left + 1]
     low_stands = seen[run, left]
-    narrow = np.broadcast_to(np.asarray(resolution, dtype=float), (len(grid) - 1,))[left]
+    narrow = np.broadcast_to(np.asarray(resolution, dtype=float), (seen.shape[1] - 1,))[left]
     while (wide := np.flatnonzero(high - low > narrow)).size:
         middle = 0.5 * (low[wide] + high[wide])
         same_as_low = stands(run[wide], middle) == low_stands[wide]
         low[wide] = np.where(same_as_low, middle, low[wide])
         high[wide] = np.where(same_as_low, high[wide], middle)
     return [
-        _intervals(seen[k], grid, low[run == k], high[run == k], low_stands[run == k])
+        _intervals(seen[k], look.values[k], low[run == k], high[run == k], low_stands[run == k])
         for k in range(len(seen))
     ]
 

@@ -20,6 +20,8 @@ from rockcheck.validation.finding import (
     Table,
     text,
 )
+from rockcheck.validation.studies.population.factor_task import FACTOR_RESOLUTION
+from rockcheck.validation.studies.population.plan import FACTOR_STEP
 from rockcheck.validation.studies.population.results import FallInterval
 from rockcheck.validation.studies.population.sentences import looked_words
 from rockcheck.validation.studies.population.statistics import (
@@ -27,6 +29,7 @@ from rockcheck.validation.studies.population.statistics import (
     IntensityAnswer,
     overturned_steps,
 )
+from rockcheck.validation.studies.population.tasks import GAP_RESOLUTION
 
 
 def gap_blocks(answer: GapAnswer, scene: Scene) -> list[Block]:
@@ -84,8 +87,8 @@ def _interval_tables(answer: GapAnswer) -> list[Block]:
             columns,
             rows,
             "At which gaps it falls",
-            note=f"{looked_words(answer).capitalize()}, each change narrowed to 0.1 mm. Narrower"
-            " intervals may be missed.",
+            note=f"{looked_words(answer).capitalize()}, each change narrowed to"
+            f" {1e3 * GAP_RESOLUTION:g} mm. Narrower intervals may be missed.",
             on="page" if rows else "file",
             folded=len(rows) > 12,
         )
@@ -166,8 +169,9 @@ def intensity_blocks(answer: IntensityAnswer | None) -> list[Block]:
         columns,
         rows,
         "At which intensity it falls",
-        note="Each motion was scaled in steps of 1 %, each change narrowed to 0.25 %. Narrower"
-        " intervals of falls may be missed, also below the least one. The curve is lognormal, of"
+        note=f"Each motion was scaled in steps of {100.0 * FACTOR_STEP:g} %, each change narrowed"
+        f" to {100.0 * FACTOR_RESOLUTION:g} %. Narrower intervals of falls may be missed, also"
+        " below the least one. The curve is lognormal, of"
         " the greatest likelihood; its interval is from drawing the motions anew.",
         on="page" if len(rows) > 1 else "file",
         folded=len(rows) > 12,

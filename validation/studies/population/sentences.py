@@ -14,6 +14,7 @@ from rockcheck.validation.studies.population.certainty import (
     leading_number,
 )
 from rockcheck.validation.studies.population.gathered import Gathered
+from rockcheck.validation.studies.population.plan import FACTOR_STEP
 from rockcheck.validation.studies.population.results import UNDECIDED
 from rockcheck.validation.studies.population.statistics import (
     FallAnswer,
@@ -42,6 +43,8 @@ CHANGES = {
     "model form": "Another model",
     "law of impacts": "Another law of impacts",
 }
+#: How finely a search over a factor on the motion looks.
+FACTORS_LOOKED_AT = f"looked at every {100.0 * FACTOR_STEP:g} %"
 #: A contribution below this changes nothing.
 NEGLIGIBLE = 1e-6
 
@@ -265,7 +268,7 @@ def _several_intensities(answer: IntensityAnswer, unit: str) -> list[str]:
         )
     least = {record.case: record.least for record in answer.records if record.least is not None}
     weakest = min(least, key=lambda case: least[case])
-    sentences.append(f"The least: {least[weakest]:.3g}{unit}, {weakest}.")
+    sentences.append(f"The least: {least[weakest]:.3g}{unit}, {weakest} ({FACTORS_LOOKED_AT}).")
     harmless = len(answer.records) - len(least)
     if harmless:
         sentences.append(f"{count_of(harmless, 'record')} did not overturn it at any factor tried.")
@@ -275,7 +278,10 @@ def _several_intensities(answer: IntensityAnswer, unit: str) -> list[str]:
 def _single_intensity(record: RecordIntensity, label: str, unit: str) -> str:
     assert record.least is not None, "it falls"
     factor = record.least / record.as_it_is
-    return f"It overturns first at {label} {record.least:.3g}{unit}, {factor:.3g} times its own."
+    return (
+        f"It overturns first at {label} {record.least:.3g}{unit}, {factor:.3g} times its own"
+        f" ({FACTORS_LOOKED_AT})."
+    )
 
 
 def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[str]:

@@ -185,8 +185,9 @@ class GapTask(DrawTask):
         def stands(which: NDArray[np.int64], gaps: Floats) -> NDArray[np.bool_]:
             return self._at(which, gaps, counter).stands
 
-        as_it_is = np.array([0])
-        intervals = _searched(stands, as_it_is, np.array(self.fine), GAP_RESOLUTION)
+        as_it_is, fine = np.array([0]), np.array(self.fine)
+        seen = stands(np.repeat(as_it_is, len(fine)), fine).reshape(1, -1)
+        intervals = self._intervals(stands, as_it_is, search.Look.at(fine, seen))
         # The look at the draws is the table, too: no run of them is played twice.
         counted = np.arange(1 if self.draws else 0, len(self.scenes))
         grid = np.unique(np.round(self.coarse if self.draws else self.tabulated, 12))
@@ -195,13 +196,35 @@ class GapTask(DrawTask):
         )
         if self.draws:
             seen = look.stands.reshape(len(counted), -1)
-            intervals += narrowed(stands, counted, seen, grid, GAP_RESOLUTION)
+            intervals += self._intervals(stands, counted, search.Look.at(grid, seen))
         return results.GapSearch(
             intervals=tuple(intervals),
             rows=self._rows_of(look, grid),
             undecided=counter.undecided,
             runs=counter.runs,
         )
+
+    def _intervals(
+        self, stands: search.Stands, runs: NDArray[np.int64], look: search.Look
+    ) -> list[results.FallInterval]:
+        """The intervals of these runs, of a look at them and at the gap that each has."""
+
+        def stands_of(which: NDArray[np.int64], gaps: Floats) -> NDArray[np.bool_]:
+            return stands(runs[which], gaps)
+
+        look = look.with_own(self._own_gaps[runs], stands_of)
+        found = search.falls_within(stands_of, look, GAP_RESOLUTION)
+        return [
+            interval
+            for run, falls in zip(runs.tolist(), found, strict=True)
+            for interval in fall_intervals(run, falls)
+        ]
+
+    @cached_property
+    def _own_gaps(self) -> Floats:
+        """The gap (m) that each of the `scenes` has on this side, NaN without a wall there."""
+        walls = [scene.wall(self.side) for scene in self.scenes]
+        return np.array([np.nan if wall is None else wall.gap for wall in walls])
 
     def _at(
         self,
@@ -296,30 +319,6 @@ class Counter:
         self.runs += len(played.outcome)
         self.undecided += int((played.outcome >= fates.UNDECIDED).sum())
         return np.isin(played.outcome, (fates.AT_REST, fates.MOVING))
-
-
-def _searched(
-    stands: search.Stands, runs: NDArray[np.int64], grid: Floats, resolution: Floats | float
-) -> list[results.FallInterval]:
-    """The intervals of these runs in which they do not stand."""
-    seen = stands(np.repeat(runs, len(grid)), np.tile(grid, len(runs))).reshape(len(runs), -1)
-    return narrowed(stands, runs, seen, grid, resolution)
-
-
-def narrowed(
-    stands: search.Stands,
-    runs: NDArray[np.int64],
-    seen: NDArray[np.bool_],
-    grid: Floats,
-    resolution: Floats | float,
-) -> list[results.FallInterval]:
-    """The same, where it is `seen` (runs x values) which of them stand at the grid's values."""
-    found = search.falls_within(lambda which, at: stands(runs[which], at), seen, grid, resolution)
-    return [
-        interval
-        for run, falls in zip(runs.tolist(), found, strict=True)
-        for interval in fall_intervals(run, falls)
-    ]
 
 
 def fall_intervals(run: int, falls: Sequence[search.Fall]) -> list[results.FallInterval]:
