@@ -74,7 +74,8 @@ def _cache_folder(package: Path) -> Path | None:
     write to it: it belongs to the user, is closed to all others, and lies in a folder that only the
     user, the package's owner or root may change.
     """
-    sources = [Path(__file__), *sorted(package.rglob("*.py"))]
+    # A kernel of any package may call inner kernels of this one, such as the cubic between rows.
+    sources = [*sorted(Path(__file__).parent.glob("*.py")), *sorted(package.rglob("*.py"))]
     content = b"".join(one.name.encode() + b"\0" + one.read_bytes() for one in sources)
     name = f"{package.name}-kernels-{hashlib.sha256(content).hexdigest()[:16]}"
     user_wide = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rockcheck"
@@ -245,10 +246,11 @@ class _Cache:
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` with numba on its first call, with a cache on disk.
 
-    The cache holds until any source of the function's package changes. The compiled code releases
-    the interpreter's lock, so that batches run on threads, and divides as IEEE 754 does (no
-    exception for a zero divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger or to measure
-    coverage, it is interpreted and divides likewise.
+    The cache holds until any source of the function's package, or a module of `rockcheck.scenes`,
+    changes; it may call kernels of no other package. The compiled code releases the interpreter's
+    lock, so that batches run on threads, and divides as IEEE 754 does (no exception for a zero
+    divisor). Under NUMBA_DISABLE_JIT=1, as for a debugger or to measure coverage, it is interpreted
+    and divides likewise.
     """
     if config.DISABLE_JIT:
         return np.errstate(all="ignore")(function)

@@ -4,6 +4,7 @@ announce."""
 
 import contextlib
 import gc
+import importlib
 import json
 import os
 import runpy
@@ -139,6 +140,36 @@ def test_what_was_compiled_is_read_back_until_a_source_of_the_package_changes(
     assert replay(f"ready {READ}") == ""
     monkeypatch.setattr(compiled.config, "DISABLE_JIT", 1)
     assert replay("ready interpreted") == ""
+
+
+def test_what_was_compiled_is_not_read_back_after_a_change_of_the_scenes(tmp_path, monkeypatch):
+    """Kernels of every package may call the cubic of `rockcheck.scenes.interpolation`."""
+    scenes, package = tmp_path / "scenes", tmp_path / "tiny"
+    for folder in (scenes, package):
+        folder.mkdir()
+        (folder / "a.py").write_text("x = 1")
+    monkeypatch.setattr(compiled, "__file__", str(scenes / "compiled.py"))
+    monkeypatch.setattr(compiled.config, "CACHE_DIR", str(tmp_path / "cache"))
+    names = []
+    for text in ("x = 1", "x = 2", "x = 1"):
+        (scenes / "a.py").write_text(text)
+        names.append(compiled._cache_folder.__wrapped__(package).name)
+    assert names[0] == names[2] != names[1]
+
+
+@pytest.mark.parametrize("package", ["ebm", "cm", "engines"])
+def test_kernels_of_a_package_call_none_of_another_but_of_scenes(package):
+    """The key of what was compiled has the sources of these two."""
+    root = Path(compiled.__file__).parents[1]
+    allowed = {root / package, root / "scenes"}
+    for source in sorted((root / package).rglob("*.py")):
+        module = importlib.import_module(
+            ".".join(["rockcheck", *source.relative_to(root).with_suffix("").parts])
+        )
+        for value in vars(module).values():
+            if isinstance(value, compiled._Inner):
+                called = Path(value.py_func.__code__.co_filename)
+                assert any(called.is_relative_to(folder) for folder in allowed), called
 
 
 #: A pickle that makes a folder as it is read.

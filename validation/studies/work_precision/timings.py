@@ -20,7 +20,7 @@ import numpy as np
 
 from rockcheck.ebm import EventBasedModel, natural, spectrum
 from rockcheck.ebm.batch import pack, pack_pulses, run_batch
-from rockcheck.ebm.core.ground import Ground, acceleration
+from rockcheck.ebm.right_hand_side import right_hand_sides
 from rockcheck.scenes import (
     PAPER_BLOCK,
     Floats,
@@ -29,7 +29,6 @@ from rockcheck.scenes import (
     Wall,
     load_scene,
 )
-from rockcheck.scenes.compiled import kernel
 from rockcheck.validation.studies.work_precision.benchmark_scenes import pulse
 
 #: The grid of Ricker pulses: omega_p/p, a_p/(g tan alpha), and its nodes along each axis.
@@ -162,9 +161,9 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
     reference = play(reference_model)
     costs: dict[float, list[tuple[float, float]]] = {tolerance: [] for tolerance in TOLERANCES}
     ground = natural.base_of(PLAIN).horizontal
-    _right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
+    right_hand_sides(ground, PAPER_BLOCK.alpha, 1)
     right_hand_side = timed(
-        lambda _: _right_hand_sides(ground, PAPER_BLOCK.alpha, EVALUATIONS), EVALUATIONS
+        lambda _: right_hand_sides(ground, PAPER_BLOCK.alpha, EVALUATIONS), EVALUATIONS
     )
     found, ones, rows = {}, [], []
     for _ in range(ROUNDS):
@@ -195,21 +194,6 @@ def batch_times(name: str, nodes: int = NODES) -> list[BatchTime]:
             )
         )
     return rows
-
-
-@kernel
-def _right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
-    """(3) in natural units, `count` times, each at a place that depends on the one before.
-
-    Under a Ricker pulse it has sin, cos, exp and a polynomial.
-    """
-    theta = 0.1 * alpha
-    for k in range(count):
-        turn = 0.75 * (
-            acceleration(ground, 1e-6 * k) * math.cos(alpha - theta) - math.sin(alpha - theta)
-        )
-        theta += 1e-12 * turn
-    return theta
 
 
 _FRESH = """
