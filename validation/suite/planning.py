@@ -265,7 +265,7 @@ def window_ends(
 
 @dataclass(frozen=True)
 class ComparedKey:
-    """A reference in a `ComparisonKey`: what its result depends on, and what is measured."""
+    """A reference in a `ComparisonKey`: its history, as there, and what is measured."""
 
     against: str
     history: str
@@ -276,7 +276,7 @@ class ComparedKey:
 class ComparisonKey:
     """All that the comparisons of a cell depend on.
 
-    `history` is the key of the cell's history, `window_ends` are in s, `code` is the hash of the
+    `history` is the hash of the history that the cell has, `window_ends` are in s, `code` is the hash of the
     code that compares.
     """
 

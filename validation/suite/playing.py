@@ -99,11 +99,11 @@ class SuiteTasks(TaskSource):
             wanted, lambda: scene_results.horizon_of(self.store, cell.scene)
         )
         key = planning.ComparisonKey(
-            history=self._history_key(cell),
+            history=self._seal_of(cell),
             references=tuple(
                 planning.ComparedKey(
                     against,
-                    self._history_key(references[against]) if against in references else "",
+                    self._seal_of(references[against]) if against in references else "",
                     windows,
                 )
                 for against, windows in wanted.items()
@@ -126,14 +126,12 @@ class SuiteTasks(TaskSource):
 
         return self.store.once(COMPARISONS, key.name(cell), comparing.ComparisonRecord, compared)
 
-    def _history_key(self, cell: PlannedCell) -> str:
-        """What a comparison depends on of a history.
+    def _seal_of(self, cell: PlannedCell) -> str:
+        """What was played, not what was to be: a cell that is played again may differ.
 
-        A user's own model need not play alike again: of its history that is the content's hash.
+        A user's own model need not play alike, and no key knows the processor or a library's build.
         """
-        if models.is_own(cell.variant.family):
-            return self.store.seal_of(HISTORIES, cell.kept_as)
-        return cell.key
+        return self.store.seal_of(HISTORIES, cell.kept_as)
 
     def _reference(self, cell: PlannedCell, *, with_laws: bool) -> comparing.Reference:
         history, offset = self.store.load(cell.kept_as), _offset_of(cell.variant)

@@ -1,6 +1,7 @@
 """Suites end to end: cells in workers that crash, hang and eat memory; results kept and read
 back."""
 
+import dataclasses
 import json
 import math
 import os
@@ -15,6 +16,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Call, Pool
 from rockcheck.validation.suite import junit, reasons, results, suites
 from rockcheck.validation.suite.playing import SuiteTasks
@@ -148,6 +150,27 @@ def test_only_what_changed_runs_again(tmp_path, run, written, monkeypatch):
     assert [(one.read_back, results.value_of(one.figures, "peak_rotation")) for one in again] == [
         (False, pytest.approx(0.1 / math.atan(0.4 / 1.5)))
     ] * 3
+
+
+def test_a_run_that_is_forced_is_judged_by_what_it_played(tmp_path, monkeypatch):
+    """Also where no key knows why it plays otherwise, such as another processor."""
+    suite = suites.load_suite("smoke").only("smoke-rocking", "ebm")
+
+    def peaks(**options):
+        cells = run_suite(suite, tmp_path, jobs=0, **options).cells
+        return [results.value_of(cell.figures, "peak_rotation") for cell in cells]
+
+    simulate = models._simulate
+
+    def tilted(work, scene):
+        history = simulate(work, scene)
+        channels = {**history.channels, "theta": 1.5 * history.channels["theta"]}
+        return dataclasses.replace(history, channels=channels, model_extremes=None)
+
+    before = peaks()
+    monkeypatch.setattr(models, "_simulate", tilted)
+    assert peaks() == before
+    assert peaks(force=True) == pytest.approx([1.5 * peak for peak in before], rel=1e-3)
 
 
 def test_a_failed_reference_fails_what_needs_it(tmp_path, run):
