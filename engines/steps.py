@@ -271,7 +271,7 @@ class AdaptiveStep:
 
         Its compiled step is loaded. The scene is one of a block with R = 1, see `in_units_of`. The
         march raises `ModelFailure` if the motion blows up or needs more than 100,000 + 20 end /
-        `usual` steps, `end` the last of the scene's `run_times`.
+        `usual` steps, with those taken again, `end` the last of the scene's `run_times`.
         """
         from rockcheck.engines import adaptive_march, kernels
         from rockcheck.scenes.compiled import for_types_of
@@ -286,19 +286,19 @@ class AdaptiveStep:
         planned = kernels.plan(run, course)
 
         def march() -> Marched:
-            rows, count, going = first, 1, planned
+            rows, count, going, asked = first, 1, planned, 0
             while going:
+                asked += 1
                 x, y, theta, vx, vy, w, dt, ax, ay, impact = request.tolist()
                 kicked = world.push((x, y, theta), (vx, vy, w), dt, (ax, ay), impact != 0.0)
                 if count == len(rows):
                     rows = np.concatenate([rows, np.empty_like(rows)])
                 going = step(run, course, kicked, rows[count])
-                if going == kernels.AGAIN:
-                    continue
-                count += 1
-                if count % 512 == 0:
-                    progress.tell(rows[count - 1, 0], course.end)
-                if going == kernels.LOST or count > most_steps:
+                if going != kernels.AGAIN:
+                    count += 1
+                    if count % 512 == 0:
+                        progress.tell(rows[count - 1, 0], course.end)
+                if going == kernels.LOST or asked > most_steps:
                     raise ModelFailure(
                         "no end to the events, or a motion that blew up, after"
                         f" {count} steps at t = {rows[count - 1, 0]:g} s"

@@ -220,13 +220,14 @@ def stamp_of(shown: object) -> str:
 
 @cache
 def drawn_by() -> str:
-    """Hash of all that draws figures and pages: code, templates, scripts, styles, matplotlib."""
+    """Hash of all that draws figures and pages: code, templates, scripts, looks, matplotlib."""
     hashes = (
         hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(Path(__file__).parent.rglob("*"))
         if path.is_file() and path.suffix != ".pyc"
     )
-    return provenance.digest("\n".join([version("matplotlib"), *hashes]))
+    looks_of_models = map(repr, every_look())  # those of engines stand beside the engines
+    return provenance.digest("\n".join([version("matplotlib"), *looks_of_models, *hashes]))
 
 
 def stamp_in(path: Path) -> str:

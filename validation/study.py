@@ -164,10 +164,10 @@ def run(
 ) -> Finding:
     """Play what is not up to date in `folder`, keep each record as it comes, and gather.
 
-    `jobs` processes (default: one a core; 0: in this one), or the Dask cluster at `scheduler`.
-    Tasks that have not begun after `minutes` are left out. Ctrl-C ends the tasks, and what was
-    played is gathered; the exit code is then `INTERRUPTED`, unless the finding has another. Raises
-    `InputError` where the folder cannot be used or no cluster answers.
+    `jobs` processes (default: one a core; 0: in this one), no more than there is work for, or the
+    Dask cluster at `scheduler`. Tasks that have not begun after `minutes` are left out. Ctrl-C ends
+    the tasks, and what was played is gathered; the exit code is then `INTERRUPTED`, unless the
+    finding has another. Raises `InputError` where the folder cannot be used or no cluster answers.
     """
     began = time.monotonic()
     played = play_tasks(
@@ -265,18 +265,26 @@ class _Run:
         self.known: dict[Task, None] = {}
         self.done: dict[Task, Any] = {}
         self.stack = ExitStack()
+        self._workers: pool.Pool | None = None
         #: `Task.where` of the tasks that workers play.
         self.elsewhere = (
             ("worker", "here") if scheduler is not None else ("worker",) if jobs > 0 else ()
         )
 
-    @cached_property
-    def _workers(self) -> pool.Pool:
-        return self.stack.enter_context(
-            pool.Pool(self.jobs, self.source.memory_mb)
-            if self.scheduler is None
-            else pool.Cluster(self.scheduler, self.source.memory_mb)
-        )
+    def _workers_for(self, tasks: int) -> pool.Pool:
+        """The processes of this run: as many as asked for, if there are tasks, or cores, for them.
+
+        Tasks of a later wave are played by those that are there.
+        """
+        if self._workers is None:
+            jobs = min(self.jobs, max(tasks, os.cpu_count() or 1))
+            memory = self.source.memory_mb
+            self._workers = self.stack.enter_context(
+                pool.Pool(jobs, memory)
+                if self.scheduler is None
+                else pool.Cluster(self.scheduler, memory)
+            )
+        return self._workers
 
     def play(self, until: float) -> None:
         """Waves of tasks, until the study has no more."""
@@ -298,7 +306,8 @@ class _Run:
                     self.heard(len(self.done), len(self.known), task.label)
                     self._end(task, pool.guarded(self.source.play, task))
             if calls:
-                ends = self._workers.run(calls, until=until, on_playing=self._hear_playing)
+                workers = self._workers_for(len(calls))
+                ends = workers.run(calls, until=until, on_playing=self._hear_playing)
                 for ended in ends:
                     self._end(ended.call.key, ended.outcome)
             if len(self.done) < len(self.known):  # the time is over

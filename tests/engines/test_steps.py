@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rockcheck import Block, Floor, ModelFailure, Record, Scene, Wall
-from rockcheck.engines import steps
+from rockcheck.engines import kernels, steps
 from rockcheck.engines.steps import AdaptiveStep, FixedStep
+from rockcheck.scenes import compiled
 
 G = 9.81
 BLOCK = Block(half_width=0.6, half_height=0.8)
@@ -330,3 +331,11 @@ def test_a_block_that_drops_lands_in_time_and_stands():
     landed = np.flatnonzero(states[:, 4] == 0.0)[1]
     assert times[landed] == pytest.approx(math.sqrt(0.2 / G), abs=1e-6)
     assert states[-1, 1] == pytest.approx(0.8, abs=1e-9)
+
+
+def test_steps_that_are_taken_again_for_ever_end_the_run(monkeypatch):
+    """They write no row, and count all the same."""
+    monkeypatch.setattr(compiled, "for_types_of", lambda *given: lambda *asked: kernels.AGAIN)
+    march = AdaptiveStep(largest=0.1).ready(Air(), SCENE)
+    with pytest.raises(ModelFailure, match="after 1 steps at t = 0 s"):
+        march()

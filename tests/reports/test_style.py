@@ -1,5 +1,7 @@
 """How models and figures look."""
 
+from dataclasses import replace
+
 import pytest
 
 from rockcheck.reports import style
@@ -59,3 +61,14 @@ def test_models_of_ones_own_get_the_spare_looks_in_order():
 )
 def test_a_power_of_ten_is_plain_from_a_tenth_to_a_thousand(value, words):
     assert style.power_of_ten(value) == words
+
+
+def test_a_figure_is_drawn_anew_where_a_model_looks_otherwise(monkeypatch):
+    before = style.stamp_of("shown")
+    looks = style.every_look()
+    monkeypatch.setattr(style, "every_look", lambda: [replace(looks[0], light="#000"), *looks[1:]])
+    style.drawn_by.cache_clear()
+    after = style.stamp_of("shown")
+    style.drawn_by.cache_clear()
+    assert after.split()[0] == before.split()[0]
+    assert after != before

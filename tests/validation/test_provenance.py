@@ -201,3 +201,38 @@ def test_a_machine_that_says_little_of_itself_is_described_by_its_kind(monkeypat
     told = provenance.hardware()
     assert told["processor"] == "of wood"
     assert told["cores"] == "1"
+
+
+@pytest.mark.parametrize(
+    ("place", "name"),
+    [
+        ("version_of", "numpy"),
+        ("version_of", "scipy"),
+        ("version_of", "mujoco"),
+        ("platform.python_version", None),
+        ("platform.machine", None),
+    ],
+)
+def test_a_key_changes_with_the_libraries_python_and_the_machine(monkeypatch, place, name):
+    def key():
+        return provenance.cell_key(load_scene("fig5a"), "mujoco", {})
+
+    before = key()
+    whole = provenance.version_of
+    monkeypatch.setattr(
+        f"rockcheck.validation.execute.provenance.{place}",
+        (lambda library: "another" if library == name else whole(library))
+        if name
+        else lambda: "another",
+    )
+    assert key() != before
+
+
+def test_a_key_does_not_change_with_the_version_of_another_engine(monkeypatch):
+    scene = load_scene("fig5a")
+    before = provenance.cell_key(scene, "mujoco", {})
+    whole = provenance.version_of
+    monkeypatch.setattr(
+        provenance, "version_of", lambda library: "new" if library == "pymunk" else whole(library)
+    )
+    assert provenance.cell_key(scene, "mujoco", {}) == before

@@ -276,8 +276,8 @@ class ComparedKey:
 class ComparisonKey:
     """All that the comparisons of a cell depend on.
 
-    `history` is the hash of the history that the cell has, `window_ends` are in s, `code` is the hash of the
-    code that compares.
+    `history` is the hash of the history that the cell has, `window_ends` are in s, `code` is the
+    hash of the code that compares.
     """
 
     history: str

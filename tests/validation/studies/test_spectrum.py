@@ -23,7 +23,7 @@ from rockcheck import (
     overturning_spectrum,
 )
 from rockcheck.ebm.spectrum import node_scene
-from rockcheck.validation.execute import models, pool
+from rockcheck.validation.execute import models, pool, provenance
 from rockcheck.validation.paper import Panel, paper_panels
 from rockcheck.validation.studies.spectrum.spectrum_blocks import KEPT_AN_AXIS
 from rockcheck.validation.studies.spectrum.study import Spectra
@@ -305,3 +305,23 @@ def test_beside_a_wall_of_ones_own_the_block_may_hop(
     asked = ("spectrum", own, "--size", "3", "--refine", "--out", str(tmp_path))
     assert told(*asked, *words)["model"] == model
     assert {path.name for path in tmp_path.rglob("*.*")} >= {f"{stem}.npz", f"{stem}.svg"}
+
+
+@pytest.mark.parametrize(
+    ("model", "digest"),
+    [("ebm", "code_digest"), ("cm", "sources_digest"), ("mujoco", "sources_digest")],
+)
+def test_nodes_are_played_again_where_the_code_that_plays_them_changed(monkeypatch, model, digest):
+    """Of slow models only what plays nodes counts, beside the model's own code."""
+
+    def key():
+        (task,) = Request(2, model=model).nodes(PANELS["figure-8-unobstructed"].scene, ONE, ONE)
+        return task.key
+
+    before = key()
+    assert key() == before
+    monkeypatch.setattr(provenance, digest, lambda *files: "another")
+    assert key() != before
+
+
+ONE = np.ones(1)

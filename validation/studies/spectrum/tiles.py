@@ -9,10 +9,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rockcheck.ebm import EventBasedModel, Spectrum, overturning_spectrum
+from rockcheck.ebm import (
+    EventBasedModel,
+    Spectrum,
+    overturning_spectrum,
+    spectrum as nodes_of_spectra,
+)
 from rockcheck.ebm.spectrum import (
-    CALM,
-    FALLS,
     LEFT,
     RIGHT,
     SAFE,
@@ -248,7 +251,11 @@ class Request:
         """The tasks that play nodes (1-D arrays of one length) of a scene's spectrum, in order."""
         fast = compiled(models.build(self.model, self.settings))
         neutral = scene.replace(name="tile", description="", duration=1.0, output_step=STEP)
-        how = provenance.code_digest(__name__) if fast else f"{CALM} {FALLS} {ENOUGH} {STEP}"
+        how = (
+            provenance.code_digest(__name__)
+            if fast
+            else provenance.sources_digest(__file__, nodes_of_spectra.__file__)
+        )
         base = provenance.cell_key(neutral, self.model, self.settings) + what + how
         size = len(amplitudes) if what != "outcomes" else TILE if fast else SLOW_TILE
         one = A_MOTION if what == "motions" else A_NODE if fast else A_SLOW_NODE
