@@ -122,6 +122,22 @@ def test_the_run_at_3h_tells_convergence_from_chance(at, u_num):
     assert early.u_num == pytest.approx(u_num * math.sin(1.0), rel=1e-9)
 
 
+def test_where_the_finer_run_of_a_tolerance_ends_otherwise_nothing_is_converged():
+    given, finer = Made(lambda step: 1.0), Made(lambda step: 1.0, falls=lambda step: True)
+    found = numerical.numerical_uncertainty(
+        SimpleNamespace(simulate=given.simulate, finer=lambda: finer), BOOKCASE
+    )
+    assert not found.converged
+    assert found.reasons == ("the outcome changes with the tolerance",)
+
+
+def test_a_slip_after_the_last_row_counts(monkeypatch):
+    """The last slip may change by more than the rows do."""
+    one, other = (Made(lambda step: 1.0).simulate(BOOKCASE) for _ in range(2))
+    monkeypatch.setattr(numerical, "last_slip_of", lambda history: 0.02 if history is one else 0.03)
+    assert numerical._changes(BOOKCASE, one, other)["last_slip"] == pytest.approx(0.01)
+
+
 def test_of_a_tolerance_the_change_at_a_hundredth_of_it_counts():
     """F = 1.25 times the change: of 0.5 alpha sin t by 0.0099 of it."""
     given, finer = (Made(lambda step, wrong=wrong: 1.0 + wrong) for wrong in (1e-2, 1e-4))

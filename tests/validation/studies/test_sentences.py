@@ -18,6 +18,7 @@ from rockcheck.validation.studies.population.statistics import (
     RecordIntensity,
 )
 from rockcheck.validation.uncertainty.lognormal import Lognormal
+from rockcheck.validation.uncertainty.numerical import Numerical, Quantity
 
 # Does it fall?
 
@@ -286,6 +287,12 @@ def certain(certainty, *contributions, runs=None, **more):
     return sentences.certainty_sentences(gathered(chosen, certainty=certainty, **more), answer)
 
 
+def of_a_fall(u_num):
+    """Numerical uncertainty of a run that falls at 3 s, made up."""
+    fall = Quantity(name="end_time", unit="s", value=3.0, u_num=u_num, verdict="converged")
+    return Numerical(method="by hand", quantities=(fall,))
+
+
 CONVERGED = results.Certainty(numerical=judged(1e-9))
 COARSE = results.Certainty(numerical=judged(None))
 
@@ -303,7 +310,20 @@ def test_runs_that_nobody_judged_are_not_counted():
 @pytest.mark.parametrize(
     ("sure", "words"),
     [
-        (CONVERGED, "Numerically converged."),
+        (CONVERGED, "Numerically converged: its peak rotation to 1e-09 α."),
+        (
+            results.Certainty(numerical=judged(0.25)),
+            "Numerically converged, but its peak rotation to 0.25 α only, more than itself: play it"
+            " finer.",
+        ),
+        (
+            results.Certainty(numerical=of_a_fall(0.004)),
+            "Numerically converged: the time of its fall to 0.004 s.",
+        ),
+        (
+            results.Certainty(numerical=Numerical(method="by hand", quantities=())),
+            "Numerically converged.",
+        ),
         (COARSE, "Not converged: no figure is sure."),
         (results.Certainty(), "Its numerical error is not known."),
     ],

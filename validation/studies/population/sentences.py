@@ -23,6 +23,7 @@ from rockcheck.validation.studies.population.statistics import (
     QuantityAnswer,
     RecordIntensity,
 )
+from rockcheck.validation.uncertainty.numerical import Numerical
 
 #: Units as readers know them, where these are other words.
 UNITS = {"alpha": "α"}
@@ -45,6 +46,8 @@ CHANGES = {
 }
 #: How finely a search over a factor on the motion looks.
 FACTORS_LOOKED_AT = f"looked at every {100.0 * FACTOR_STEP:g} %"
+#: What is told of a converged run, by the name of the quantity.
+SURELY_KNOWN = {"peak_rotation": "its peak rotation", "end_time": "the time of its fall"}
 #: A contribution below this changes nothing.
 NEGLIGIBLE = 1e-6
 
@@ -297,12 +300,28 @@ def certainty_sentences(gathered: Gathered, answer: UncertaintyAnswer) -> list[s
 
 
 def _convergence_sentence(cases: Mapping[str, results.Certainty]) -> str:
-    converged = [is_converged(sure) for sure in cases.values() if sure.numerical is not None]
-    if len(cases) > 1 and converged:
+    judged = [(sure, sure.numerical) for sure in cases.values() if sure.numerical is not None]
+    if not judged:
+        return "Its numerical error is not known."
+    converged = [is_converged(sure) for sure, _ in judged]
+    if len(cases) > 1:
         return f"{sum(converged)} of {len(converged)} runs are numerically converged."
-    if converged:
-        return "Numerically converged." if converged[0] else "Not converged: no figure is sure."
-    return "Its numerical error is not known."
+    if not converged[0]:
+        return "Not converged: no figure is sure."
+    return f"Numerically converged{_accuracy_words(judged[0][1])}."
+
+
+def _accuracy_words(numerical: Numerical) -> str:
+    """How well the peak rotation of a converged run is known, or the time of its fall."""
+    for quantity in numerical.quantities:
+        if quantity.u_num is None or quantity.name not in SURELY_KNOWN:
+            continue
+        unit = UNITS.get(quantity.unit, quantity.unit)
+        words = f"{SURELY_KNOWN[quantity.name]} to {quantity.u_num:.2g} {unit}"
+        if isinstance(quantity.value, float) and quantity.u_num > abs(quantity.value) > NEGLIGIBLE:
+            return f", but {words} only, more than itself: play it finer"
+        return f": {words}"
+    return ""
 
 
 def _tie_sentences(cases: Mapping[str, results.Certainty]) -> Iterator[str]:
