@@ -34,6 +34,13 @@ _SECONDS = r"(?:m|milli)?s(?:ec(?:ond)?s?)?"
 _TIMES = re.compile(
     rf"(?:time|t)(?:[_ ]?{_SECONDS}|\s*+[\[(]\s*+{_SECONDS}\s*+[\])])?", re.IGNORECASE
 )
+#: Names of times in units that are not read: in s they would be another motion.
+_OTHER_TIMES = re.compile(
+    r"(?:time|t)(?:[_ ]|\s*+[\[(]\s*+)"
+    r"(?:min(?:ute)?s?|h(?:(?:ou)?rs?)?|(?:u|µ|μ|micro|n|nano)s(?:ec(?:ond)?s?)?|d(?:ays?)?|y(?:ea)?rs?)"
+    r"\s*+[\])]?",
+    re.IGNORECASE,
+)
 #: The end of a name of times that are in ms.
 _MILLISECONDS = re.compile(r"m(?:illi)?s(?:ec(?:ond)?s?)?\s*+[\])]?", re.IGNORECASE)
 _BRACKETS = re.compile(r"[\[(]([^\])]{1,20})[\])]")
@@ -49,6 +56,7 @@ def read_table(lines: list[str], reading: Reading) -> list[Recording]:
     against them.
     """
     cells = _cells_of(lines, reading)
+    _check_unit_of_time(cells)
     above = islice(enumerate(lines, 1), min(cells.rows[0][0] - 1, MOST_HEADER))
     facts = facts_of(above, reading.unit or "")
     time = _time_of(cells, reading)
@@ -269,6 +277,17 @@ def _time_notes(name: str, time: int) -> list[str]:
     return [] if _states_unit_of_time(name) else [f"column {time + 1} is taken as the time in s"]
 
 
+def _check_unit_of_time(cells: "_Cells") -> None:
+    """Raise `InputError` where a column's name states a unit of time that is not read."""
+    for name in cells.names:
+        if _OTHER_TIMES.fullmatch(name):
+            raise fault(
+                f"column {printable(name)!r}: times are read in s or in ms; convert them, and name"
+                " them time_s or time_ms",
+                cells.rows[0][0] - 1,
+            )
+
+
 def _are_milliseconds(name: str) -> bool:
     """Whether the name of a column of times says that they are in ms."""
     return bool(_TIMES.fullmatch(name) and _MILLISECONDS.search(name.lower().removeprefix("time")))
@@ -381,6 +400,19 @@ def _decimals(word: str) -> int:
     return len(mantissa.partition(".")[2]) - max(min(int(exponent[:5] or 0), 300), -300)
 
 
+def _off_step(time: Floats, first: int, step: float) -> tuple[int, float]:
+    """The number of a time that is off, and the step that it is off: where a sample is missing.
+
+    It is the `first` that is off the mean `step` where no gap stands out.
+    """
+    gaps = np.diff(time)
+    usual = float(np.median(gaps))
+    widest = int(np.argmax(gaps))
+    if np.all(gaps > 0.0) and gaps[widest] > 1.5 * usual:
+        return widest + 1, usual
+    return first, step
+
+
 def _step_of(
     time: Floats,
     words: Sequence[str],
@@ -391,8 +423,9 @@ def _step_of(
 
     It is the first of these that all times agree with: the mean step as printed; a whole number of
     samples a second, each time within its last digit; the mean step to twelve digits, each time
-    within its last digit or 1 % of a step. If `reading` gives a time step, only that one is tried.
-    Raises `InputError` where none fits.
+    within its last digit or 1 % of a step. Of a step that is a whole number of last digits no digit
+    is lost. If `reading` gives a time step, only that one is tried. Raises `InputError` where none
+    fits.
     """
     mean = float(f"{float(time[-1] - time[0]) / max(len(time) - 1, 1):.12g}")
     if len(words) < 2:
@@ -402,22 +435,26 @@ def _step_of(
     digit = 10.0 ** -min(max(map(_decimals, words)), 30)
     # A coarser digit could hide a sample that is missing or in the wrong place.
     tells = digit <= 0.5 * mean
-    slack = digit * (1.0 + 1e-6) if tells or reading.time_step else 0.0
+
+    def slack(step: float) -> float:
+        is_printed_whole = abs(step / digit - round(step / digit)) < 1e-6
+        return 0.0 if is_printed_whole else digit * (1.0 + 1e-6)
+
     rounding = 1e-9 * max(1.0, float(np.max(np.abs(time))))
     printed = float(f"{round(mean / digit) * digit:.12g}") if digit > 1e-12 else mean
     candidates = [
         (printed, min(rounding, 0.01 * mean)),
-        (1.0 / max(round(1.0 / mean), 1), slack),
-        (mean, max(0.01 * mean, slack) + 1e-9),
+        (whole := 1.0 / max(round(1.0 / mean), 1), slack(whole) if tells else 0.0),
+        (mean, max(0.01 * mean, slack(mean) if tells else 0.0) + 1e-9),
     ]
-    if reading.time_step is not None:
-        candidates = [(reading.time_step, max(0.01 * reading.time_step, slack) + 1e-9)]
+    if (given := reading.time_step) is not None:
+        candidates = [(given, max(0.01 * given, slack(given)) + 1e-9)]
     for step, most in candidates:
         uneven = np.flatnonzero(np.abs(time - time[0] - step * np.arange(len(time))) > most)
         if step > 0.0 and not uneven.size:
             break
     else:
-        first = int(uneven[0])
+        first, step = _off_step(time, int(uneven[0]), step)
         hint = "" if tells else f"; times of {digit:g} s may hide it: {option('time_step', 0.005)}"
         raise fault(
             f"time {words[first]} s is off the uniform step {step:.6g} s{hint}", lines[first]

@@ -240,6 +240,14 @@ def test_tables(text, options, samples, step, encoding, end, written):
     assert record.time_step == step
 
 
+@pytest.mark.parametrize("step", [None, 0.01, 0.005])
+def test_a_sample_that_is_missing_is_named_whatever_step_is_given(step, written, fault_of):
+    rows = "".join(f"{n / 100:.2f},0.1\n" for n in range(2000) if n != 1000)
+    path = written("a.csv", "time_s,acceleration_g\n" + rows)
+    said = str(fault_of(recordings.read_record, path, recordings.Reading(time_step=step)))
+    assert "line 1002: time 10.01 s is off the uniform step 0.01 s" in said
+
+
 @pytest.mark.parametrize(
     ("rate", "decimals"),
     [(300, 3), (300, 4), (128, 4), (128, 3), (100, 2), (200, 3), (60, 3), (75, 2)],

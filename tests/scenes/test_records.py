@@ -139,7 +139,15 @@ FAULTS = {
         (HEAD + "0,0\n0.1\n", "line 3: 1 fields where the header names 2"),
         (HEAD + "0,0\n0,0\n", "time_s does not increase"),
         (HEAD + "0,0\n-0.1,0\n", "time_s does not increase"),
-        (HEAD + "0,0\n0.1,0\n0.3,0\n0.4,0\n", "off the uniform step"),
+        (
+            HEAD + "0,0\n0.1,0\n0.3,0\n0.4,0\n",
+            "line 4: time 0.3 s is off the uniform step 0.1 s",
+        ),
+        # of a step that is a whole number of last digits none is lost
+        (HEAD + "0,0\n0.01,1\n0.05,2\n0.06,0\n", "line 4: time 0.05 s is off the uniform step"),
+        ("time_min,acceleration_g\n0,0\n0.1,1\n", "line 1: column 'time_min': times are read in s"),
+        ("# r\nTime [h],acceleration_g\n0,0\n0.1,1\n", "line 2: column 'Time [h]': times are read"),
+        ("t (µs),acceleration_g\n0,0\n0.1,1\n", "times are read in s or in ms; convert them"),
         (HEAD + "0,0\n0.2,0\n0.1,0\n0.3,0\n", "line 3: time 0.2 s is off the uniform step 0.1 s"),
         (
             HEAD + "".join(f"{n / 300:.3f},0.1\n" for n in range(1000) if n != 500),
