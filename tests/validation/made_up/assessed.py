@@ -1,6 +1,8 @@
 """Results of an assessment, made up: its plan, and what of its tasks has ended."""
 
 import math
+from dataclasses import replace
+from itertools import count
 
 import numpy as np
 
@@ -55,6 +57,13 @@ def judged(u_num):
     return numerical.Numerical(method="by hand", quantities=(peak,))
 
 
+def unlike(given):
+    """The scene under one motion after another, of which none is a copy, to rounding the same."""
+    for k in count():
+        motion = SCENE.excitation.scaled(1.0 + 1e-14 * k)
+        yield replace(given, scene=given.scene.replace(excitation=motion))
+
+
 def gathered(
     runs=RUNS,
     *,
@@ -70,7 +79,7 @@ def gathered(
     """The results of runs as they are, and of what else was `played`, by the plan's task groups."""
     plan = Plan(
         own=given,
-        cases=dict.fromkeys(runs, given),
+        cases=played.get("cases") or dict(zip(runs, unlike(given), strict=False)),
         recorded=recorded,
         draws=draws,
         measure=measure,

@@ -1,12 +1,13 @@
 """What an assessment plays: which tasks, in which waves, at which gaps and factors."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from assessed import interval, ran, search
 
-from rockcheck import Rest, Ricker, Wall, load_scene
+from rockcheck import Record, Rest, Ricker, Wall, load_scene
 from rockcheck.scenes import Floor, files
 from rockcheck.validation.execute.pool import Failure
 from rockcheck.validation.studies.population import results
@@ -42,6 +43,19 @@ def planned(scene=SCENE, *, cases=1, spreads=None, **more):
     own = given(scene, spreads)
     others = {f"R{k}": given(scene) for k in range(1, cases)}
     return Plan(own=own, cases={"R0": own, **others}, **more)
+
+
+@pytest.mark.parametrize(
+    ("change", "copies"),
+    [({}, 2), ({"source": "b.csv"}, 2), ({"notes": ("as told",)}, 2), ({"scale": 1.1}, 1)],
+)
+def test_copies_are_motions_that_differ_by_their_names_alone(change, copies):
+    record = Record.from_samples([0.0, 1.0, 0.0], 0.01)
+    other = record.model_copy(update=change)
+    scenes = [given(SCENE.replace(excitation=one)) for one in (record, record, other)]
+    plan = Plan(own=scenes[0], cases=dict(zip("abc", scenes, strict=True)), recorded=True)
+    assert plan.copies == copies
+    assert replace(plan, recorded=False).copies == 0
 
 
 # Which models

@@ -3,7 +3,18 @@
 from dataclasses import replace
 
 import pytest
-from assessed import RUNS, SAFE, SCENE, UNCERTAIN, gathered, interval, judged, ran
+from assessed import (
+    CERTAIN,
+    RUNS,
+    SAFE,
+    SCENE,
+    UNCERTAIN,
+    gathered,
+    interval,
+    judged,
+    ran,
+    unlike,
+)
 
 from rockcheck.validation.studies.population import results, sentences, statistics
 from rockcheck.validation.studies.population.certainty import (
@@ -99,6 +110,19 @@ def test_just_below_all_is_not_rounded_to_all():
 @pytest.mark.parametrize(("metres", "words"), [(0.0999, "99.9 mm"), (0.1, "0.1 m"), (2.5, "2.5 m")])
 def test_a_length_is_in_millimetres_below_a_tenth_of_a_metre(metres, words):
     assert sentences.length(metres) == words
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (1, "1 of these is a copy of another: the interval takes them for independent."),
+        (2, "2 of these are copies of another: the interval takes them for independent."),
+    ],
+)
+def test_records_that_are_copies_of_another_are_counted(count, words):
+    cases = dict(zip("abc", unlike(CERTAIN), strict=False))
+    cases |= dict.fromkeys("bc"[:count], cases["a"])
+    assert words in falls(gathered(cases=cases))
 
 
 # How far does it move?

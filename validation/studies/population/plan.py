@@ -14,7 +14,16 @@ from typing import Any, cast
 import numpy as np
 
 from rockcheck.ebm import EventBasedModel
-from rockcheck.scenes import InputError, Scene, Side, Wall, files, kinematics
+from rockcheck.scenes import (
+    Excitation,
+    InputError,
+    Record,
+    Scene,
+    Side,
+    Wall,
+    files,
+    kinematics,
+)
 from rockcheck.validation.criteria import sampled
 from rockcheck.validation.execute import models
 from rockcheck.validation.execute.pool import Failure
@@ -152,6 +161,16 @@ class Plan:
             case: draws_of(given, self.draws) if given.spreads else ()
             for case, given in self.cases.items()
         }
+
+    @cached_property
+    def copies(self) -> int:
+        """How many of the cases are under the motion of another, by another name."""
+        if not self.recorded:
+            return 0
+        scenes = [given.scene for given in self.cases.values()]
+        return len(scenes) - len(
+            {(_unnamed(one.excitation), _unnamed(one.vertical)) for one in scenes}
+        )
 
     @property
     def other_law(self) -> Mapping[str, Any] | None:
@@ -439,6 +458,13 @@ class Plan:
 def with_levels(plan: Plan, levels: Levels) -> Plan:
     """The plan with a population over given intensities."""
     return replace(plan, levels=levels)
+
+
+def _unnamed(motion: Excitation) -> Excitation:
+    """A motion without the name of its file, and what was noted as that was read."""
+    if isinstance(motion, Record):
+        return motion.model_copy(update={"source": "", "notes": ()})
+    return motion
 
 
 def lasting(scene: Scene, until: float) -> Scene:

@@ -102,6 +102,12 @@ def fall_sentences(name: str, answer: FallAnswer, gathered: Gathered) -> list[st
             f"{count_of(answer.records, 'record')} are too few for a probability: seven or more"
             " are asked for."
         )
+    copies = gathered.plan.copies
+    if copies:
+        sentences.append(
+            f"{copies} of these {'is a copy' if copies == 1 else 'are copies'}"
+            " of another: the interval takes them for independent."
+        )
     if answer.fates[UNDECIDED]:
         sentences.append(f"{count_of(answer.fates[UNDECIDED], 'run')} undecided.")
     if gathered.drawn and not gathered.plan.recorded:
