@@ -134,5 +134,7 @@ def from_validation(error: "ValidationError", keys: Iterable[str] = ()) -> Input
             message = f"{given} is not allowed: give a list, [...] or [[...]]"
         case _ if isinstance(fault["input"], int | float | str | bool):
             given = printable(fault["input"])
+            if isinstance(fault["input"], str) and re.fullmatch(r"\s*[-+.\deE]+\s*", given):
+                given = f"the text '{given}'"  # which looks like the number that is wanted
             message = f"{given} is not allowed: {message[0].lower()}{message[1:]}"
     return InputError(message, key)

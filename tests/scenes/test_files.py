@@ -51,7 +51,11 @@ def test_a_scene_file(written):
             "half_width = -0.397",
             "block.half_width: -0.397 is not allowed: input should be greater than 0",
         ),
-        ("half_width = 0.397", 'half_width = "0.397"', "block.half_width: 0.397 is not allowed"),
+        (
+            "half_width = 0.397",
+            'half_width = "0.397"',
+            "block.half_width: the text '0.397' is not allowed",
+        ),
         ('side = "left"', 'side = "top"', "walls.0.side: top is not allowed"),
         ('kind = "ricker"', 'kind = "morlet"', "excitation"),
         ('kind = "ricker"', "", "excitation: kind is missing"),
