@@ -294,10 +294,9 @@ class AdaptiveStep:
                 if count == len(rows):
                     rows = np.concatenate([rows, np.empty_like(rows)])
                 going = step(run, course, kicked, rows[count])
-                if going != kernels.AGAIN:
-                    count += 1
-                    if count % 512 == 0:
-                        progress.tell(rows[count - 1, 0], course.end)
+                count += going != kernels.AGAIN
+                if asked % 512 == 0:
+                    progress.tell(rows[count - 1, 0], course.end)
                 if going == kernels.LOST or asked > most_steps:
                     raise ModelFailure(
                         "no end to the events, or a motion that blew up, after"

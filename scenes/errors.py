@@ -101,6 +101,13 @@ def printable(value: object, limit: int = 80) -> str:
 _KINDS = ("int", "constrained-int", "constrained-str", "str", "tuple[str, ...]")
 
 
+def _shown(value: float | str) -> str:
+    """A value of a setting; of a text that looks like a number, that it is one."""
+    given = printable(value)
+    is_like_a_number = isinstance(value, str) and re.fullmatch(r"\s*[-+.\deE]+\s*", given)
+    return f"the text '{given}'" if is_like_a_number else given
+
+
 def from_validation(error: "ValidationError", keys: Iterable[str] = ()) -> InputError:
     """The first fault that pydantic found, as one line: key, value, what is allowed.
 
@@ -133,8 +140,6 @@ def from_validation(error: "ValidationError", keys: Iterable[str] = ()) -> Input
             given = printable(fault["input"], 60)
             message = f"{given} is not allowed: give a list, [...] or [[...]]"
         case _ if isinstance(fault["input"], int | float | str | bool):
-            given = printable(fault["input"])
-            if isinstance(fault["input"], str) and re.fullmatch(r"\s*[-+.\deE]+\s*", given):
-                given = f"the text '{given}'"  # which looks like the number that is wanted
+            given = _shown(fault["input"])
             message = f"{given} is not allowed: {message[0].lower()}{message[1:]}"
     return InputError(message, key)
