@@ -11,15 +11,15 @@ from rockcheck.scenes.compiled import kernel
 
 
 @kernel
-def right_hand_sides(ground: Ground, alpha: float, count: int) -> float:
-    """(3) in natural units, `count` times, each at a place that depends on the one before.
+def right_hand_sides(ground: Ground, alpha: float, step: float, count: int) -> float:
+    """(3) in natural units, `count` times, a `step` apart, each at a place that the last one moves.
 
     Under a Ricker pulse it has sin, cos, exp and a polynomial.
     """
     theta = 0.1 * alpha
     for k in range(count):
         turn = 0.75 * (
-            acceleration(ground, 1e-6 * k) * math.cos(alpha - theta) - math.sin(alpha - theta)
+            acceleration(ground, step * k) * math.cos(alpha - theta) - math.sin(alpha - theta)
         )
-        theta += 1e-12 * turn
+        theta += step * step * turn
     return theta

@@ -235,7 +235,7 @@ HOSTILE = [
         rows_about('{"half_width": 1, "half_height": 2, "centre_of_mass": [3, 0]}'),
         "centre_of_mass: (3, 0) is not allowed",
     ),
-    (rows_about('{"half_width": "1"}'), "half_width: 1 is not allowed"),
+    (rows_about('{"half_width": "1"}'), "half_width: the text '1' is not allowed"),
     (rows_about('{"half_height": true}'), "half_height: True is not allowed"),
     (rows_about('{"half_height": Infinity}'), "half_height: inf is not allowed"),
     # What is too large to square: not warnings of the arithmetic later on.
