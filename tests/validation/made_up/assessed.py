@@ -58,9 +58,10 @@ def judged(u_num):
 
 
 def unlike(given):
-    """The scene under one motion after another, of which none is a copy, to rounding the same."""
+    """The scene under one motion after another, each with a zero more, so that none is a copy."""
     for k in count():
-        motion = SCENE.excitation.scaled(1.0 + 1e-14 * k)
+        samples = (*SCENE.excitation.unscaled, *[0.0] * k)
+        motion = SCENE.excitation.model_copy(update={"unscaled": samples})
         yield replace(given, scene=given.scene.replace(excitation=motion))
 
 
