@@ -1,5 +1,6 @@
 """The answers of an assessment in words: each says what its numbers say, and no more."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -123,6 +124,22 @@ def test_records_that_are_copies_of_another_are_counted(count, words):
     cases = dict(zip("abc", unlike(CERTAIN), strict=False))
     cases |= dict.fromkeys("bc"[:count], cases["a"])
     assert words in falls(gathered(cases=cases))
+
+
+@pytest.mark.parametrize(
+    ("metres", "down", "up"),
+    [
+        (0.03215, "32.1 mm", "32.2 mm"),
+        (0.0355, "35.5 mm", "35.5 mm"),
+        (0.12345, "0.123 m", "0.124 m"),
+        (0.09996, "99.9 mm", "0.1 m"),
+        (0.0, "0 mm", "0 mm"),
+        (1.0, "1 m", "1 m"),
+    ],
+)
+def test_a_safe_length_is_rounded_to_the_safe_side(metres, down, up):
+    assert sentences.safe_length(metres, math.floor) == down
+    assert sentences.safe_length(metres, math.ceil) == up
 
 
 # How far does it move?

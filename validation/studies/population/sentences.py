@@ -3,7 +3,8 @@
 In: typed answers (`statistics`). Out: sentences. A sentence claims no more than was looked at.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from rockcheck.ebm.ties import FRICTION, edges_of
 from rockcheck.scenes import Scene
@@ -55,6 +56,15 @@ NEGLIGIBLE = 1e-6
 def length(metres: float) -> str:
     """A length: in mm below 0.1 m."""
     return f"{1e3 * metres:.3g} mm" if metres < 0.1 else f"{metres:.3g} m"
+
+
+def safe_length(metres: float, rounded: Callable[[float], int]) -> str:
+    """A length to three digits, rounded by `math.floor` or `math.ceil` to the safe side."""
+    if metres <= 0.0:
+        return length(metres)
+    digit = 10.0 ** (math.floor(math.log10(metres)) - 2)
+    nearest = round(metres / digit, 6)  # of what is a digit but for rounding none is lost
+    return length(digit * rounded(nearest))
 
 
 def percent(share: float) -> str:
@@ -184,8 +194,9 @@ def _gap_sentences(answer: GapAnswer, where: str) -> list[str]:
         )
     else:
         falls = first_falls or f"{answer.first.case} falls first"
+        safe_up_to = safe_length(answer.safe_up_to, math.floor)
         sentences.append(
-            f"{where}{none_falls} at gaps up to {length(answer.safe_up_to)} ({looked}); just above,"
+            f"{where}{none_falls} at gaps up to {safe_up_to} ({looked}); just above,"
             f" {falls}{again_words(answer)}; {reach}."
         )
     if answer.islands and answer.has_safe_gap:
@@ -213,7 +224,7 @@ def reach_words(answer: GapAnswer) -> str:
 def again_words(answer: GapAnswer) -> str:
     """From where on nothing falls, if it is so."""
     again = safe_again_from(answer)
-    return "" if again is None else f"; none falls from {length(again)} on"
+    return "" if again is None else f"; none falls from {safe_length(again, math.ceil)} on"
 
 
 def looked_words(answer: GapAnswer) -> str:
