@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rockcheck.scenes import InputError, printable, reading
 from rockcheck.validation.finding import Column, Finding, Table, Verdict, text
 
-#: How a spectrum's CSV file begins (`spectrum_files`).
+#: How a spectrum's CSV file begins; `spectrum_files` writes it.
 REMARK = "# rockcheck spectrum "
 #: Outcomes by what stands in the file: the side to which the block falls, 0 if it stays.
 UNDECIDED = 2

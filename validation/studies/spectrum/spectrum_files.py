@@ -15,6 +15,7 @@ from rockcheck.scenes import writing
 from rockcheck.validation.execute import provenance
 from rockcheck.validation.paper import Panel
 from rockcheck.validation.studies.spectrum import tiles
+from rockcheck.validation.studies.spectrum.changes import REMARK
 from rockcheck.validation.studies.spectrum.spectrum_blocks import stem_of
 
 
@@ -39,7 +40,7 @@ def files_of(panel: Panel, spectrum: Spectrum, request: tiles.Request) -> dict[s
         }
     )
     return {
-        "csv": f"# rockcheck spectrum {about}\n{_csv_table(spectrum)}".encode(),
+        "csv": f"{REMARK}{about}\n{_csv_table(spectrum)}".encode(),
         "npz": _npz(spectrum, about),
     }
 
